@@ -1,22 +1,23 @@
-//! How the work on all images of a dataset together grows with their number: `finish` and `verify` of images of 16 × 12 pixels.
+//! Scaling of `dataset finish`, `verify` and `status` with the number of images of a dataset; images have 16 × 12 pixels.
 //!
 //!     cargo bench --bench collect                          1000 and 10 000 images, in folders and in packs
-//!     FURROW_COLLECT=100000 cargo bench --bench collect    so many
+//!     FURROW_COLLECT=100000 cargo bench --bench collect    another number of images
 //!
-//! Sixteen images are rendered; the others are copies of them under numbers of their own, with their own records and checksums. Told are seconds,
-//! core seconds and the most memory of each program, as the system counts them.
+//! Sixteen images are rendered; the others are copies of them with other numbers and their own records and checksums. The table reports
+//! seconds, core seconds and peak memory of each process, as measured by the operating system.
 
-use furrow::dataset::checksum_record::ChecksumRecord;
-use furrow::dataset::{File, Set, native};
+use furrow_dataset::read::checksum_record::ChecksumRecord;
+use furrow_dataset::read::native;
+use furrow_dataset::{File, Set};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// Images that are rendered.
+/// Number of images that are rendered.
 const RENDERED: u64 = 16;
 
-#[expect(clippy::print_stdout, reason = "a table is what a bench is for")]
+#[expect(clippy::print_stdout, reason = "the table is the result")]
 fn main() {
     let asked = std::env::var("FURROW_COLLECT").ok().and_then(|text| text.parse().ok());
     println!("| images | in | command | s | core s | peak MB |");
@@ -47,14 +48,14 @@ fn main() {
     }
 }
 
-/// The scene of the images.
+/// Scene file of the images.
 const SCENE: &str = "tests/ref/small.ron";
 
-/// Runs the program; what it took as a row of the table.
+/// Runs the program and returns its cost as a row of the table.
 fn row(count: u64, place: &str, name: &str, arguments: &[&str]) -> String {
     let begin = Instant::now();
     let mut command = Command::new("/usr/bin/env");
-    // Its own children's times, by the shell that waits for it.
+    // The shell that waits for the program reports the processor time of its children.
     let script = "\"$@\"; code=$?; times; exit $code";
     command.args(["bash", "-c", script, "bash", env!("CARGO_BIN_EXE_trace")]).args(arguments);
     command.current_dir(env!("CARGO_MANIFEST_DIR")).stderr(Stdio::inherit()).stdout(Stdio::piped());
@@ -70,13 +71,13 @@ fn row(count: u64, place: &str, name: &str, arguments: &[&str]) -> String {
     format!("| {count} | {place} | {name} | {seconds:.1} | {core:.1} | {peak:.0} |")
 }
 
-/// `1m2.5s` in seconds.
+/// Converts a time such as `1m2.5s` to seconds.
 fn time(text: &str) -> f64 {
     let (minutes, seconds) = text.trim_end_matches('s').split_once('m').unwrap_or(("0", "0"));
     60.0 * minutes.parse::<f64>().unwrap_or(0.0) + seconds.parse::<f64>().unwrap_or(0.0)
 }
 
-/// Most memory of the program that a shell runs, looked at until both are gone; bytes.
+/// Polls the peak memory of the program that a shell runs until the shell ends; returns bytes.
 fn peak(shell: u32) -> u64 {
     let mut most = 0;
     while Path::new(&format!("/proc/{shell}")).exists() {
@@ -87,7 +88,7 @@ fn peak(shell: u32) -> u64 {
                 about.lines().find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse().ok());
             most = most.max(kilobytes.unwrap_or(0_u64) * 1024);
         }
-        // A program that nobody waits for any more keeps its folder.
+        // A zombie keeps its folder in /proc until its parent waits for it.
         if fs::read_to_string(format!("/proc/{shell}/stat")).is_ok_and(|stat| stat.contains(") Z ")) {
             break;
         }
@@ -96,7 +97,7 @@ fn peak(shell: u32) -> u64 {
     most
 }
 
-/// A dataset of so many images, of which few were rendered; in folders, nothing finished.
+/// Makes a dataset of `count` images in folders, not yet finished; [`RENDERED`] images are rendered and the others copied.
 fn copies(data: &Path, count: u64) {
     let made =
         ["dataset", "--scene", SCENE, "--width", "16", "--height", "12", "--spp", "1", "--split", "1,0,0", "--quiet"];
@@ -120,13 +121,13 @@ fn copies(data: &Path, count: u64) {
     });
 }
 
-/// Threads that write copies: they wait for the disk.
+/// Number of threads that write copies; they mostly wait for the disk.
 const WORKERS: u64 = 16;
 
-/// An image's record, and its files by their names.
-type Source = (furrow::dataset::Record, Vec<(String, Vec<u8>)>);
+/// Record of an image, and its files by name.
+type Source = (furrow_dataset::Record, Vec<(String, Vec<u8>)>);
 
-/// Writes an image under another number.
+/// Writes a copy of an image under another number.
 fn write_copy(set: &Set, index: u64, (record, files): &Source) {
     let name = Set::name(index);
     let mut own = record.clone();
@@ -150,7 +151,7 @@ fn write_copy(set: &Set, index: u64, (record, files): &Source) {
     checksums.write(&set.folder).expect("a file");
 }
 
-/// An image of a dataset.
+/// Reads an image of a dataset.
 fn source(set: &Set, index: u64) -> Source {
     let folder = set.folder.join(native::folder(&Set::name(index)));
     let mut files = Vec::new();

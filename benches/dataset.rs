@@ -1,22 +1,23 @@
-//! Images an hour, from the program's start to the files on the disk, and what is spent beside drawing.
+//! Images per hour, from the start of the program to the files on disk, and the share of time outside rendering.
 //!
 //!     cargo bench --bench dataset
 //!
-//! Synthetic D with the formats PhenoBench and COCO, as users run it. What is not drawing (growing, labels, files) is told as a share of the
-//! time of the images: those under way at once have threads of their own, so their times add up. Rows that denoise need `OIDN_DIR`.
+//! Renders `synthetic-d` with the formats PhenoBench and COCO. Time outside rendering (scene construction, labels, files) is reported as a
+//! share of the summed times of the images: images in progress at the same time have separate threads, so their times add up. Rows with
+//! denoising need `OIDN_DIR`.
 
-use furrow::dataset::timing_log::{ImageTiming, rows};
+use furrow_dataset::make::timing_log::{ImageTiming, rows};
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-/// Width, height, samples a pixel, denoised, images.
+/// Width, height, samples per pixel, denoising, number of images.
 const ROWS: [(u32, u32, u32, bool, u64); 3] =
     [(480, 360, 32, false, 20), (480, 360, 16, true, 20), (1296, 966, 64, false, 6)];
 
-#[expect(clippy::print_stdout, reason = "a table is what a bench is for")]
+#[expect(clippy::print_stdout, reason = "the table is the result")]
 fn main() {
-    println!("| size | samples | denoised | images | images an hour | not drawing: growing / labels / files |");
+    println!("| size | samples | denoised | images | images an hour | not rendering: scene / labels / files |");
     println!("|---|---|---|---|---|---|");
     for (width, height, spp, denoise, count) in ROWS {
         if denoise && std::env::var_os("OIDN_DIR").is_none() {
@@ -40,7 +41,7 @@ fn main() {
     }
 }
 
-/// Makes a dataset; returns the seconds that the program took.
+/// Makes a dataset; returns the wall time of the program in seconds.
 fn make(out: &Path, [width, height, spp]: [u32; 3], count: u64, denoise: bool) -> f64 {
     let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
     command.current_dir(env!("CARGO_MANIFEST_DIR"));

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""How small an EXR file gets by each compression, and in which time: `python benches/exr.py out/field/radiance.exr`.
+"""Size and time of each compression of an EXR file: `python benches/exr.py out/field/radiance.exr`.
 
-Methods are those of OpenEXR's own library, whose levels cannot be set here; levels are those of zlib, over bytes that are sorted and predicted as its
-ZIP does, 16 rows at once. Core seconds, the least of three. It needs a Python with OpenEXR and numpy, as `race.py` does.
+The methods are those of the OpenEXR library, whose levels cannot be set here. The levels are those of zlib, on blocks of 16
+rows whose bytes are reordered and predicted as by OpenEXR's ZIP. Times are the minimum of three runs, in core seconds.
+Needs a Python with OpenEXR and numpy, as `race.py` does.
 """
 
 import sys
@@ -20,7 +21,7 @@ LEVELS = (1, 2, 4, 6, 9)
 
 
 def least(work):
-    """What `work` gives, and the least core seconds of three that it takes."""
+    """Returns the result of `work`, and the minimum of its core seconds in three runs."""
     taken = []
     for _ in range(3):
         began = time.process_time()
@@ -30,7 +31,7 @@ def least(work):
 
 
 def predicted(channels):
-    """The bytes of each 16 rows as ZIP compresses them: even ones before odd ones, each less the one before."""
+    """Returns the bytes of each block of 16 rows as ZIP compresses them: even bytes first, each minus its predecessor."""
     blocks = []
     for first in range(0, len(channels[0]), ROWS):
         plain = np.frombuffer(b"".join(row.tobytes() for rows in zip(*(c[first : first + ROWS] for c in channels)) for row in rows), np.uint8)

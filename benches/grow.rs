@@ -1,16 +1,16 @@
-//! Plants a second for every species, and the building of whole scenes. `cargo bench --bench grow`.
+//! Plants per second of every species, and the construction of a whole scene. `cargo bench --bench grow`.
 
 use criterion::{Criterion, Throughput};
-use furrow::accel::EmbreeAccel;
-use furrow::plant::{self, Stage};
-use furrow::render;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble;
-use furrow::scene::desc::SpeciesDesc;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_field::assemble;
+use furrow_field::desc::SpeciesDesc;
+use furrow_grow::plant::{self, Stage};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::render;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Plants grown by one iteration, each in a stream of its own.
+/// Plants grown per iteration, each with its own random stream.
 const PLANTS: u64 = 8;
 
 fn species() -> Vec<PathBuf> {

@@ -1,21 +1,21 @@
-//! Rays a second on the main scene: from the camera, scattered, and to the light; over the whole image, and over its plants
-//! alone, with the leaves' masks and with the same blades opaque. `cargo bench --bench intersect`; the last lines say what
-//! masks cost where there are leaves.
+//! Rays per second in the main scene: camera rays, scattered rays and shadow rays, for the whole image and for leaves alone, with
+//! leaf masks and with opaque leaves. `cargo bench --bench intersect`; the last lines report the cost of masks.
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use furrow::accel::{EmbreeAccel, Surface, prepare_thread};
-use furrow::geometry::{Interaction, Intersect, Ray};
-use furrow::math::{Frame, Vec3};
-use furrow::sampling::{Purpose, Stream, warp};
-use furrow::scene::{Field, Part, assemble};
+use furrow_base::geometry::{Interaction, Intersect, Ray};
+use furrow_base::math::{Frame, Vec3};
+use furrow_base::sampling::{Purpose, Stream, warp};
+use furrow_field::{Field, assemble};
+use furrow_render::accel::{EmbreeAccel, Surface, prepare_thread};
+use furrow_render::scene::Part;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 const WIDTH: u32 = 1296;
-/// Every so many pixels of the whole image give rays.
+/// Step between the pixels of the whole image that give rays.
 const STRIDE: u32 = 13;
-/// Where the light stands: 45° up in the south.
+/// Direction to the light: south, 45° above the horizon.
 const LIGHT: Vec3 = Vec3::new(0.0, -std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2);
 
 fn field() -> Field {
@@ -23,14 +23,14 @@ fn field() -> Field {
     assemble::field(Path::new("scenes/field.ron"), &options).expect("the main scene")
 }
 
-/// What a path asks of the geometry.
+/// Rays of a path by kind.
 struct Rays {
     primary: Vec<Ray>,
     bounce: Vec<Ray>,
     shadow: Vec<Ray>,
 }
 
-/// Rays through the centres of every `stride`th pixel whose first surface `wanted` accepts.
+/// Returns rays through the centres of every `stride`th pixel whose first surface is accepted by `wanted`.
 fn rays(field: &Field, geometry: &EmbreeAccel, stride: u32, wanted: fn(&Part) -> bool) -> Rays {
     let (scene, camera) = (&field.scene, &field.scene.camera);
     let mut stream = Stream::of(1, 0, Purpose::Test, 0);
@@ -61,7 +61,7 @@ fn occluded(geometry: &EmbreeAccel, rays: &[Ray]) -> usize {
     rays.iter().filter(|r| geometry.occluded(black_box(r))).count()
 }
 
-/// The best of five, as the machine's other work only slows it.
+/// Returns the shortest of five run times in seconds: other load on the machine can only make runs slower.
 fn best(mut run: impl FnMut() -> usize) -> f64 {
     let once = |run: &mut dyn FnMut() -> usize| {
         let begin = Instant::now();

@@ -1,10 +1,11 @@
-"""Our training steps against Python's torch, turn by turn on one machine: images a second of each, and their ratio.
+"""Compares training speed with PyTorch, alternating on one machine: images per second of each, and their ratio.
 
     cargo bench --features train --bench learn --no-run
     VENV/bin/python benches/learn.py --set DIR          # a venv with torch==2.11.0
 
-Both compute the same networks (SegNet and Basic SegNet; the U-Nets' encoders need torchvision's and EfficientNet-Lite0's blocks, written out
-here), Adam, the same batch, precision and threads. Torch gets random numbers that lie ready in memory; ours reads, varies and normalises images as well.
+Both train the same networks with Adam and the same batch size, precision and number of threads. The networks are defined
+here, with the encoder blocks of torchvision and EfficientNet-Lite0. PyTorch gets random input that is already in memory;
+Furrow also reads, augments and normalizes images.
 """
 import argparse
 import os
@@ -54,7 +55,7 @@ class Residual(nn.Module):
 
 
 class Light(nn.Sequential):
-    """Convolution, batch norm and ReLU6 as EfficientNet-Lite has them: with stride 2 one zero fewer before the first pixel than behind the last."""
+    """Convolution, batch norm and ReLU6 of EfficientNet-Lite. With stride 2 the padding before the first pixel is one less than after the last."""
 
     def __init__(self, a, b, k=1, stride=1, groups=1, relu=True):
         before, after = (k - stride) // 2, (k - stride + 1) // 2
@@ -90,7 +91,7 @@ def decode(blocks, head, y, skips, size):
 
 
 class LiteUNet(nn.Module):
-    # Blocks, kernel, stride, expansion and channels out of each stage of EfficientNet-Lite0.
+    # Stages of EfficientNet-Lite0: number of blocks, kernel size, stride, expansion, output channels.
     STAGES = [(1, 3, 1, 1, 16), (2, 3, 2, 6, 24), (2, 5, 2, 6, 40), (3, 3, 2, 6, 80), (3, 5, 1, 6, 112), (4, 5, 2, 6, 192), (1, 3, 1, 6, 320)]
 
     def __init__(self):
@@ -181,7 +182,7 @@ if __name__ == "__main__":
     p.add_argument("--precision", default="bf16", choices=["bf16", "f32"])
     a = p.parse_args()
     torch.set_num_threads(os.cpu_count())
-    print("| network | ours, images a second | torch | ratio |\n|---|---|---|---|")
+    print("| network | Furrow, images a second | PyTorch | ratio |\n|---|---|---|---|")
     for name in a.networks.split(","):
         pairs = [(ours(name, a), theirs(name, a)) for _ in range(a.rounds)]
         mine, torchs = (statistics.median(v) for v in zip(*pairs))

@@ -1,21 +1,21 @@
-//! Images learnt from in a second, by each network: `cargo bench --features train --bench learn -- --set DIR`.
+//! Training images per second of each network: `cargo bench --features train --bench learn -- --set DIR`.
 //!
-//! The whole of a training step counts: reading and varying images, the network forth and back, the optimiser. Told is the median over
-//! steps, so that the first ones, which set up kernels and decode the images of one batch, do not count. `benches/learn.py` runs the same networks in
-//! Python's torch, turn by turn with this program.
+//! A whole training step is measured: reading and augmenting images, forward and backward pass, optimiser. The table reports the
+//! median over the steps, which excludes the first ones, where kernels are set up and the images decoded. `benches/learn.py` runs
+//! the same networks in PyTorch, alternating with this program.
 
-#![allow(clippy::print_stdout, reason = "a program that prints a table")]
+#![allow(clippy::print_stdout, reason = "the table is the result")]
 
-use furrow::train::data::{Selection, Shape};
-use furrow::train::fit::{Callbacks, Hyperparameters, Plan};
-use furrow::train::net::Network;
-use furrow::train::session::{self, Machine};
-use furrow::train::torch::{Model, Precision, Where};
+use furrow_train::data::{Selection, Shape};
+use furrow_train::fit::{Callbacks, Hyperparameters, Plan};
+use furrow_train::net::Network;
+use furrow_train::session::{self, Machine};
+use furrow_train::torch::tch::Device;
+use furrow_train::torch::{Model, Precision, Where};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-use tch::Device;
 
 struct Asked {
     set: PathBuf,
@@ -26,7 +26,7 @@ struct Asked {
     networks: Vec<Network>,
 }
 
-/// `cargo bench` passes `--bench`, which nobody asked for.
+/// Parses the command line; ignores `--bench`, which `cargo bench` adds.
 fn asked() -> Asked {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     let of = |name: &str| words.iter().position(|w| w == name).and_then(|i| words.get(i + 1)).cloned();
@@ -48,13 +48,13 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 fn main() {
-    // As the program does.
-    furrow::train::memory::keep();
+    // The `train` program does the same.
+    furrow_train::memory::keep();
     let asked = asked();
     let precision = Precision::named(&asked.precision, Device::Cpu).expect("a precision");
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let (width, height) = asked.size;
-    println!("| network | size | precision | images a second, learning | seconds an image, answering |");
+    println!("| network | size | precision | images a second, training | seconds an image, prediction |");
     println!("|---|---|---|---|---|");
     for network in &asked.networks {
         let folder = tempfile::tempdir().expect("a folder");

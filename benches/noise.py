@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
-"""Compares two builds of `trace` by the noise that they leave for the time that they take.
+"""Compares two builds of `trace` by noise and render time.
 
     python benches/noise.py OLD NEW scenes/field.ron scenes/04-weeds.ron
 
-For each scene file both render the same pixels with as many samples. Error: relMSE as in `race.py`, against a long render by OLD with
-independent numbers (`--without qmc`), which has no sample of either. A long run of OLD's own points begins with the samples that are judged, and
-what is to be put right for that lies between nothing and n/N, by how well the points are spread. The reference's own noise is estimated by n
-of its own samples and taken off both errors. A few pixels may decide a mean: beside it stands that without the worst thousandth of pixels, which
-differs less from one set of samples to another.
-Time: core seconds of the process less those of one sample a pixel, which growing and building take. Efficiency is
-1 / (error × time): at twice of it an error is reached in half the time. It needs a Python with mitsuba and numpy, as `race.py` does.
+Both builds render each scene file with equal sizes and numbers of samples.
+
+Error: relMSE as in `race.py`, against a long render by OLD with independent samples (`--without qmc`), which shares no
+samples with either. A long run with OLD's own points would start with the samples under test, and the correction for that
+is between 0 and n/N, depending on how well the points are stratified. The noise of the reference is estimated from n of its
+own samples and subtracted from both errors. Few pixels may dominate the mean, so it is also reported without the worst
+thousandth of the pixels, which varies less between sample sets.
+
+Time: core seconds of the process minus those of a render with one sample per pixel, which is mostly scene construction. Efficiency is
+1 / (error × time): twice the efficiency reaches an error in half the time. Needs a Python with mitsuba and numpy, as `race.py` does.
 """
 
 import argparse
@@ -31,7 +34,7 @@ from race import ROOT, read_radiance
 
 
 def render(program, scene, spp, options, *more):
-    """Radiance, and the core seconds of the process."""
+    """Returns the radiance and the core seconds of the process."""
     with tempfile.TemporaryDirectory() as folder:
         command = [program, "--scene", scene, "--spp", str(spp), "--width", str(options.width), "--out", folder, "--quiet", *more]
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
@@ -42,23 +45,23 @@ def render(program, scene, spp, options, *more):
 
 
 def errors(image, reference):
-    """relMSE of all pixels, and without the worst thousandth of them."""
+    """Returns the relMSE of all pixels, and without the worst thousandth of them."""
     each = np.sort(((image - reference) ** 2 / (reference**2 + 0.01 * reference.mean() ** 2)).mean(-1), axis=None)
     return np.array([each.mean(), each[: int(len(each) * 0.999)].mean()])
 
 
 def independent_reference(program, scene, options):
-    """A long render with independent numbers, and its own errors."""
+    """Returns a long render with independent samples, and its own errors."""
     n, long = options.spp, options.reference_spp
     reference, beginning = (render(program, scene, spp, options, "--without", "qmc")[0] for spp in (long, n))
-    # Of independent samples the first n of N err by v/n − v/N against all of them, which err by v/N.
+    # For independent samples of variance v, the first n of N differ from all N by v/n − v/N; the error of all N is v/N.
     return reference, errors(beginning, reference) * n / (long - n)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("old", help="a build of trace")
-    parser.add_argument("new", help="another one")
+    parser.add_argument("old", help="reference build of trace")
+    parser.add_argument("new", help="build to compare with it")
     parser.add_argument("scenes", nargs="+", help="scene files")
     parser.add_argument("--width", type=int, default=324)
     parser.add_argument("--spp", type=int, default=32)

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Orders one set of images as a data team would, with everything that `trace dataset` has for them, and tells what each step took.
+"""Makes a dataset with most options of `trace dataset`, as a data team would, and reports the time of each step.
 
     python benches/order.py target/release/trace out/order
     python benches/order.py target/release/trace out/order --count 200 --width 240 --spp 4
 
-In turn: the bill; classes of one's own, limits, packs and pushing, killed once in the middle; status; check, with images rendered again;
-the same set in folders, whose files must be those of the packs; further formats; label maps left out; a stream. Python's own library is
-enough; it ends with 1 where a step fails or bytes differ. What was pushed lies in OUT/pushed.
+The steps are: cost estimate; a run with user-defined classes, size limits, packs and pushing, killed once in the middle;
+status; verification with images rendered again; the same dataset in folders, whose files must equal those in the packs;
+further formats; a dataset without most label maps; a stream. It needs only Python's standard library and exits with 1 if a
+step fails or bytes differ. The pushed files are in OUT/pushed.
 """
 
 import argparse
@@ -25,7 +26,7 @@ CLASSES = "soil; beet=BEAVX; fat hen=CHEAL; grass=ECHCG; weed; ignore=stone"
 
 
 def run(name, command, **options):
-    """Runs a command to its end, prints its row, and returns what it printed."""
+    """Runs a command to its end, prints the start of its row, and returns its output."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     done = subprocess.run([str(part) for part in command], capture_output=True, **options)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -41,13 +42,13 @@ def row(text):
 
 
 def size(folder):
-    """MB and number of the files of a folder, each counted once whatever its names."""
+    """Returns MB and number of the files of a folder; hard links to one file are counted once."""
     files = {(s.st_dev, s.st_ino): s.st_size for s in (p.stat() for p in Path(folder).rglob("*") if p.is_file())}
     return f"{sum(files.values()) / 1e6:.1f} MB in {len(files)} files"
 
 
 def samples(folder):
-    """Hashes of the images' files by `NUMBER.FILE`, from packs or folders."""
+    """Returns the hashes of the images' files by `NUMBER.FILE`, from packs or folders."""
     found = {}
     for pack in sorted(Path(folder, "packs").glob("*.tar")):
         with tarfile.open(pack) as archive:
@@ -59,22 +60,22 @@ def samples(folder):
 
 
 def kill_in_the_middle(command, packs):
-    """Kills a run once it has finished a pack, as a node does that loses power."""
+    """Kills a run once it has finished a pack, as a power failure would."""
     began = time.monotonic()
     with subprocess.Popen([str(part) for part in command], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as running:
         while running.poll() is None and not list(packs.glob("*.tar")):
             time.sleep(0.2)
         if running.poll() is not None:
-            sys.exit("it ended before it could be killed: take more images")
+            sys.exit("the run ended before it could be killed: use a larger --count")
         running.send_signal(signal.SIGKILL)
-    print(f"| the run, killed with its first archive | {time.monotonic() - began:.1f} | | ", end="")
+    print(f"| the run, killed after its first archive | {time.monotonic() - began:.1f} | | ", end="")
     row(f"{len(list(packs.glob('*.tar')))} archives")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("trace", help="a build of trace")
-    parser.add_argument("out", type=Path, help="folder that is made; it must not be there")
+    parser.add_argument("out", type=Path, help="folder to create; it must not exist")
     parser.add_argument("--scene", default="synthetic-d")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--width", type=int, default=240)
@@ -88,10 +89,10 @@ def main():
     order += ["--format", "coco,yolo,yolo-detect,yolo-pose", "--classes", CLASSES, "--min-pixels", 5, "--photo", "jpeg95"]
     push = ["--push", f"mkdir -p '{pushed}' && cp -a {{dir}}/. '{pushed}/'", "--push-check", f"diff -r {{dir}} '{pushed}' | grep -v '^Only in {pushed}' | (! grep .)"]
     packed, folders, least = out / "packed", out / "folders", out / "least"
-    print("| step | s | core s | what it gave |\n|---|---|---|---|")
+    print("| step | s | core s | result |\n|---|---|---|---|")
 
     told = run("`--dry-run`", [trace, "dataset", *order, "--out", packed, "--pack", options.pack, "--dry-run"]).decode()
-    row("; ".join(line.strip() for line in told.splitlines() if "core" in line or "memory" in line or "disk" in line) or "the bill")
+    row("; ".join(line.strip() for line in told.splitlines() if "core" in line or "memory" in line or "disk" in line) or "cost estimate")
     whole = [trace, "dataset", *order, "--out", packed, "--pack", options.pack, *push, "--quiet"]
     kill_in_the_middle(whole, packed / "packs")
     run("the same command again, pushing", whole)
@@ -100,7 +101,7 @@ def main():
     row(f"{status['done']} of {options.count} images")
     run("`verify --rerender 2`", [trace, "dataset", "verify", packed, "--rerender", 2])
     row("no fault")
-    run("`verify` of what was pushed", [trace, "dataset", "verify", pushed])
+    run("`verify` of the pushed files", [trace, "dataset", "verify", pushed])
     row(size(pushed))
 
     run("the same set in folders", [trace, "dataset", *order, "--out", folders, "--quiet"])
@@ -108,12 +109,12 @@ def main():
     here, there = samples(packed), samples(folders)
     if not here or here != there:
         sys.exit("files of packs and folders differ: " + ", ".join(sorted(set(here.items()) ^ set(there.items()))[0]))
-    print(f"| files of packs beside those of folders | | | {len(here)} equal |")
+    print(f"| files in packs compared with those in folders | | | {len(here)} equal |")
     run("`finish --format phenobench,voc,cityscapes`", [trace, "dataset", "finish", folders, "--format", "phenobench,voc,cityscapes", "--quiet"])
     row(size(folders))
 
     least_order = [part if part != "coco,yolo,yolo-detect,yolo-pose" else "imagefolder" for part in order]
-    run("photograph and classes alone", [trace, "dataset", *least_order, "--keep", "rgb,semantics", "--out", least, "--quiet"])
+    run("RGB image and class map only", [trace, "dataset", *least_order, "--keep", "rgb,semantics", "--out", least, "--quiet"])
     row(size(least))
     shutil.rmtree(least)
     stream = run("`stream`, read to its end", [trace, "stream", "--scene", options.scene, "--count", options.count, "--width", options.width, "--spp", 1, "--quiet"])

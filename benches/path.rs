@@ -1,28 +1,28 @@
-//! The whole path tracer: samples a second, rays a sample by kind, rays a second, and the share of the render that goes into
-//! Embree, as the table that README shows. `cargo bench --bench path`.
+//! The whole path tracer: samples per second, rays per sample by kind, rays per second, and Embree's share of the render time.
+//! `cargo bench --bench path`.
 //!
-//! Every ray of a render is written down and asked again alone, by the same threads in the same order; the time of that over
-//! the time of the render is Embree's share. Medians of [`RUNS`] runs, render and replay in turn.
+//! All ray queries of a render are recorded and replayed alone, by the same threads in the same order; the replay time divided by
+//! the render time is Embree's share. The table has medians of [`RUNS`] runs, alternating render and replay.
 
-#![allow(clippy::print_stdout, reason = "its table is its result")]
+#![allow(clippy::print_stdout, reason = "the table is the result")]
 
-use furrow::accel::EmbreeAccel;
-use furrow::geometry::{Hit, Intersect, PACKET, Ray, Window};
-use furrow::integrator::{PathTracer, World};
-use furrow::render::{self, Settings, Watch};
-use furrow::sampling::Points;
-use furrow::scene::assemble;
+use furrow_base::geometry::{Hit, Intersect, PACKET, Ray, Window};
+use furrow_base::sampling::Points;
+use furrow_field::assemble;
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::integrator::{PathTracer, World};
+use furrow_render::render::{self, Settings, Watch};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Runs of which the median counts.
+/// Number of runs; the table reports their median.
 const RUNS: usize = 5;
-/// Samples a pixel: one packet.
+/// Samples per pixel: one ray packet.
 const SPP: u32 = 8;
-/// Scenes: what it is, its page, and the width of its image.
+/// Scenes: name, scene file and image width (`None`: that of the scene file).
 const SCENES: [(&str, &str, Option<u32>); 3] = [
     ("main scene", "scenes/field.ron", None),
     ("one leaf close up", "scenes/01-one-leaf.ron", Some(480)),
@@ -31,7 +31,7 @@ const SCENES: [(&str, &str, Option<u32>); 3] = [
 
 type Packet = [Option<Ray>; PACKET];
 
-/// A question as it was asked.
+/// A recorded ray query.
 enum Query {
     Closest(Ray),
     Occluded(Ray),
@@ -40,7 +40,7 @@ enum Query {
 }
 
 impl Query {
-    /// Rays to a nearest surface, and rays to a light.
+    /// Returns the number of nearest-hit rays and of shadow rays.
     fn rays(&self) -> [usize; 2] {
         let some = |rays: &Packet| rays.iter().flatten().count();
         match self {
@@ -52,7 +52,7 @@ impl Query {
     }
 }
 
-/// Answers by another, and writes every question down, each thread into a list of its own.
+/// Intersector that forwards every query to `geometry` and records it in a list per thread.
 struct Recorder<'a> {
     geometry: &'a EmbreeAccel,
     asked: Vec<Mutex<Vec<Query>>>,
@@ -112,9 +112,9 @@ fn median(mut of: Vec<f64>) -> f64 {
 fn main() {
     let pool = render::pool(0).expect("a pool");
     let threads = pool.current_num_threads();
-    println!("{threads} threads, {SPP} samples a pixel, medians of {RUNS} runs\n");
+    println!("{threads} threads, {SPP} samples per pixel, medians of {RUNS} runs\n");
     println!(
-        "| scene | triangles | grow, s | build, s | Msamples/s | rays a sample: nearest + shadow | Mray/s | share inside Embree | labels, s | extents, s |"
+        "| scene | triangles | scene, s | BVH, s | Msamples/s | rays per sample: nearest + shadow | Mray/s | share inside Embree | labels, s | extents, s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for (name, page, width) in SCENES {
@@ -141,7 +141,7 @@ fn main() {
         let asked: Vec<Vec<Query>> =
             recorder.asked.into_iter().map(|list| list.into_inner().expect("a list")).collect();
         let replay = || {
-            // Each thread its own list, all at once: the wall time of the longest, made even by their lengths.
+            // All threads replay their own lists at once. The mean over the threads is the wall time of an even distribution.
             let times = pool.broadcast(|thread| seconds(|| ask(&geometry, &asked[thread.index()])));
             times.iter().sum::<f64>() / threads as f64
         };

@@ -1,31 +1,36 @@
 #!/usr/bin/env python3
-"""Races Furrow against Mitsuba 3 on one scene: seconds until the image's error falls below a bound.
+"""Compares the speed of Furrow and Mitsuba 3 on one scene: seconds until the error of the image falls below a target.
 
-    python benches/race.py --scene scenes/field.ron                     the claim: full size, some hours with its references
-    python benches/race.py --scene scenes/field.ron --width 324 --reference-spp 1024     a quick look
+    python benches/race.py --scene scenes/field.ron                     full size; takes hours, most of them for the references
+    python benches/race.py --scene scenes/field.ron --width 324 --reference-spp 1024     quick test
 
-It needs a Python with mitsuba and numpy (`python3 -m venv target/venv && target/venv/bin/pip install mitsuba numpy`), an LLVM that
-Dr.Jit can use (`apt-get install libllvm19`), and `cargo build --release`. Run it on a quiet machine.
+Needs a Python with mitsuba and numpy (`python3 -m venv target/venv && target/venv/bin/pip install mitsuba numpy`), an LLVM that
+Dr.Jit can use (`apt-get install libllvm19`), and `cargo build --release`. Run it on an idle machine.
 
-What is done: `trace export` writes the scene for Mitsuba (`scene.xml`: its own plugins, so materials are about equal, see
-`src/output/mitsuba/surface.rs`; same geometry, masks, textures, sun, sky, camera and filter). Both path trace to the same depth, 12 surfaces.
-Mitsuba runs `volpath` (masks need it) in `llvm_ad_rgb` (--variant) with the sampler, roulette and weight of the sun given by
---sampler, --rr-depth and --sun-weight. Each is measured against its own long reference, rendered with other seeds, which is kept
-under target/race/ and used again.
+Method: `trace export` writes the scene for Mitsuba as `scene.xml`, with the same geometry, masks, textures, sun, sky,
+camera and filter. It uses Mitsuba's own plugins, so materials are approximately equal (see
+`crates/output/src/mitsuba/surface.rs`). Both trace paths of at most 12 surfaces. Mitsuba runs `volpath` (masks need it) in
+`llvm_ad_rgb` (--variant) with the sampler, Russian roulette depth and sun weight of --sampler, --rr-depth and --sun-weight.
+Each program is compared with its own long reference, which is cached in target/race/.
 
-With `--filter box`, the default, a pixel gathers its own square in both programs. With `--filter page` it gathers as the page says: of a
-Gaussian ours draws the samples, so that pixels stay independent, while Mitsuba lets each sample count in all pixels around, which lowers
-the error of a pixel about threefold and ties its noise to that of its neighbours.
+With `--filter box`, the default, both programs use a box filter of one pixel. With `--filter page` they use the filter of
+the scene file. Furrow importance-samples a Gaussian filter, so that pixels stay independent. Mitsuba splats each sample to
+all pixels around it, which lowers the error of a pixel about threefold and correlates its noise with that of its
+neighbours.
 
-Error: relMSE = mean over pixels and R, G, B of (x − ref)² / (ref² + 0.01 mean(ref)²), put right for the noise of the
-reference: Mitsuba's N samples are others than the n of a run, so 1/N is too much; Furrow's run is the beginning of its reference, so 1/N is
-missing (with stratified points less than that, for both: what is put right favours Mitsuba). Runs of the two alternate, --rounds times;
-medians are shown. From the errors, which fall as 1/n, follow the
-samples that reach --target; a last run with that many confirms error and time. As samples come in blocks of 16 or in squares, it has
-some too many or too few: its seconds times its error over the target are compared. Seconds are those of rendering; Mitsuba's first
-kernels are compiled before, and their time and that of loading stand below the table, beside the whole time of Furrow's process.
-A render of Mitsuba's takes some time before its first sample, more of it with many materials; what further samples alone cost, times the
-error, stands below the table too.
+Error: relMSE = mean over pixels and R, G, B of (x − ref)² / (ref² + 0.01 mean(ref)²), corrected for the noise of the
+reference. Mitsuba's N reference samples are independent of the n samples of a run, so the error has an additional 1/N term,
+which is removed. A run of Furrow is the start of its reference, so that a 1/N term is missing, which is added. With
+stratified points both terms are smaller; the correction favours Mitsuba.
+
+Runs of the two programs alternate, --rounds times, and medians are reported. The error falls as 1/n, which gives the number
+of samples that reaches --target; a last run with this number confirms error and time. Because samples come in blocks of 16
+or in squares, the number is rounded, and the compared time is the time of the last run times its error divided by the
+target.
+
+Seconds are render times. Mitsuba's kernels are compiled in a run that is not measured; its loading and compile times are
+printed below the table, beside the remaining time of Furrow's process. A render by Mitsuba has a start-up time that grows
+with the number of materials, so the cost of additional samples alone, times the error, is printed as well.
 """
 
 import argparse
@@ -48,9 +53,9 @@ sys.path.insert(0, str(ROOT / "tests" / "mitsuba"))
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--scene", default="scenes/field.ron")
-    parser.add_argument("--width", type=int, help="image width; the page's unless given")
+    parser.add_argument("--width", type=int, help="image width; default: that of the scene file")
     parser.add_argument("--height", type=int)
-    parser.add_argument("--spp", type=int, nargs="+", default=[16, 64, 256], help="samples that are measured")
+    parser.add_argument("--spp", type=int, nargs="+", default=[16, 64, 256], help="numbers of samples per pixel to measure")
     parser.add_argument("--target", type=float, default=0.002, help="relMSE to reach")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--reference-spp", type=int, default=4096)
@@ -59,9 +64,9 @@ def arguments():
     parser.add_argument("--rr-depth", type=int, default=5)
     parser.add_argument("--sun-weight", type=float, default=16)
     parser.add_argument("--filter", choices=["box", "page"], default="box")
-    parser.add_argument("--threads", type=int, default=0, help="0: one for each core")
+    parser.add_argument("--threads", type=int, default=0, help="number of threads; 0: one per core")
     parser.add_argument("--trace", default=str(ROOT / "target/release/trace"))
-    parser.add_argument("--wavefront", type=int, default=1 << 24, help="most samples that Mitsuba traces at once")
+    parser.add_argument("--wavefront", type=int, default=1 << 24, help="maximum number of samples that Mitsuba traces at once")
     return parser.parse_args()
 
 
@@ -80,10 +85,10 @@ def relmse(x, reference):
 
 
 class Furrow:
-    """`trace`, a process for each run."""
+    """Furrow's `trace`; each run is a process."""
 
     name = "Furrow"
-    # A run is the beginning of the reference.
+    # The samples of a run are the first samples of the reference.
     share = -1
 
     def __init__(self, options, folder):
@@ -91,11 +96,11 @@ class Furrow:
 
     @staticmethod
     def possible(spp):
-        """Stratified samples come in blocks of 16: a part of a block is less even than its number tells."""
+        """Rounds up to blocks of 16 stratified samples: part of a block would be less well stratified."""
         return math.ceil(spp / 16) * 16
 
     def render(self, spp, take):
-        """Radiance, seconds of rendering; `take` is not looked at: equal runs are equal."""
+        """Returns radiance and render time in seconds; `take` is ignored, because runs are deterministic."""
         out = self.folder / "ours"
         size = [f"--{k}={v}" for k in ("width", "height") if (v := getattr(self.options, k))]
         command = [self.options.trace, "--scene", self.options.scene, "--spp", str(spp), "--out", str(out)]
@@ -110,14 +115,14 @@ class Furrow:
         return read_radiance(out / "radiance.exr"), seconds
 
     def words(self):
-        return f"growing, building and writing {self.rest:.1f} s"
+        return f"scene construction and output {self.rest:.1f} s"
 
 
 class Mitsuba:
-    """Mitsuba in a process that stays: its kernels are compiled once."""
+    """Mitsuba, in this process, so that its kernels are compiled once."""
 
     name = "Mitsuba 3"
-    # The reference has samples of its own.
+    # The samples of the reference are independent of those of a run.
     share = 1
 
     def __init__(self, options, folder):
@@ -136,7 +141,7 @@ class Mitsuba:
         text = (folder / "scene" / "scene.xml").read_text()
         path = folder / "scene" / "scene-race.xml"
         path.write_text(text.replace('type="independent"', f'type="{options.sampler}"'))
-        # Loading in parallel takes a thread for each of thousands of textures, more than many machines allow.
+        # Parallel loading starts a thread for each of thousands of textures, more than many machines allow.
         self.scene = mi.load_file(str(path), parallel=False, sun_weight=str(options.sun_weight))
         self.depth = int(re.search(r'"max_depth" value="(\d+)"', text).group(1))
         width, height = self.scene.sensors()[0].film().size()
@@ -147,11 +152,11 @@ class Mitsuba:
 
     @staticmethod
     def possible(spp):
-        """Multijittered samples come in squares."""
+        """Rounds up to a square number, as multijittered samples need."""
         return math.ceil(math.sqrt(spp)) ** 2
 
     def integrator(self, spp):
-        """Passes small enough for the memory."""
+        """Returns an integrator whose passes fit into memory."""
         passes = next(d for d in range(1, spp + 1) if spp % d == 0 and (self.pixels * spp // d <= self.options.wavefront or d == spp))
         return self.mi.load_dict(
             {
@@ -163,7 +168,7 @@ class Mitsuba:
         )
 
     def render(self, spp, take, timed=True):
-        """Radiance, seconds of rendering; with compiled kernels where time counts."""
+        """Returns radiance and render time in seconds; if `timed`, kernels are compiled in a run before."""
         import numpy as np
 
         if not timed:
@@ -183,7 +188,7 @@ class Mitsuba:
 
 
 def reference(program, options, folder, key):
-    """The program's long run, read from `folder` where it was made before."""
+    """Returns the program's reference image, read from `folder` if it was made before."""
     import numpy as np
 
     path = folder / f"reference-{program.name.split()[0].lower()}-{key}.npy"
@@ -194,7 +199,7 @@ def reference(program, options, folder, key):
     if program.share < 0:
         image, _ = program.render(spp, 0)
     else:
-        # In blocks, so that a lost hour is not a lost night.
+        # Rendered in blocks of about 256 samples, each with its own seed.
         blocks = max(1, spp // 256)
         image = sum(program.render(program.possible(spp // blocks), 20_000 + k, timed=False)[0] for k in range(blocks)) / blocks
     np.save(path, image)
@@ -202,7 +207,7 @@ def reference(program, options, folder, key):
 
 
 def fit(points, target):
-    """Samples and seconds at which the error is `target`: error = a / n, seconds = b n, both by the largest n measured."""
+    """Returns samples and seconds at which the error is `target`, for error = a / n and seconds = b n fitted at the largest n measured."""
     spp = max(points)
     error, seconds = points[spp]
     needed = max(1, math.ceil(error * spp / target))
@@ -210,14 +215,14 @@ def fit(points, target):
 
 
 def further(points):
-    """Seconds of a sample between the fewest and the most that were measured, times error and number of the most."""
+    """Returns the seconds per additional sample between the smallest and the largest n measured, times error and n of the largest."""
     few, many = min(points), max(points)
     return (points[many][1] - points[few][1]) / (many - few) * points[many][0] * many
 
 
 @contextlib.contextmanager
 def boxed(scene, wanted):
-    """The page's path, or that of a copy beside it whose pixels gather their own square; paths in it count from its folder."""
+    """Yields the path of the scene file, or of a temporary copy with a box filter beside it, so that relative paths stay valid."""
     if not wanted:
         yield scene
         return
@@ -241,7 +246,7 @@ def main():
 
 def race(options, name):
     if not Path(options.trace).exists():
-        sys.exit(f"{options.trace}: there is no such program; build it: cargo build --release")
+        sys.exit(f"{options.trace}: no such program; build it with: cargo build --release")
     folder = ROOT / "target" / "race" / Path(name).stem
     folder.mkdir(parents=True, exist_ok=True)
     size = [f"--{k}={v}" for k in ("width", "height") if (v := getattr(options, k))]
@@ -249,12 +254,12 @@ def race(options, name):
     subprocess.run(export + size, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
     text = (folder / "scene" / "scene.xml").read_text()
-    # References belong to one scene, size and renderer: to what the export says, and for ours to the program itself.
+    # References depend on the exported scene and, for Furrow, on the program itself.
     keys = {
         "Furrow": hashlib.sha256(Path(options.trace).read_bytes() + text.encode()),
         "Mitsuba 3": hashlib.sha256(text.encode()),
     }
-    # Mitsuba first: its module reads our images too.
+    # Mitsuba first: its module also reads the images of Furrow.
     theirs = Mitsuba(options, folder)
     programs = [Furrow(options, folder), theirs]
     references = {}
@@ -307,7 +312,7 @@ def race(options, name):
         print(f"{program.name}: {program.words()}")
     if len(options.spp) > 1:
         ratio = further(rows[1][1]) / further(rows[0][1])
-        print(f"Seconds that further samples take, times the error: {ratio:.2f} times as many with {theirs.name}.")
+        print(f"Time of additional samples times error, {theirs.name} over Furrow: {ratio:.2f}.")
     print(f"{name}, filter {options.filter}, {theirs.pixels} pixels, {os.cpu_count()} cores, {options.variant}, {options.sampler}; Furrow is {others / ours:.2f} times as fast.")
 
 

@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
-"""Races Furrow against Cycles, Blender's path tracer, on one GLB file: seconds until the image's error falls below a bound.
+"""Compares the speed of Furrow and Cycles, Blender's path tracer, on one GLB file: seconds until the image's error falls below a target.
 
     target/venv-bpy/bin/python benches/race_cycles.py --scene scenes/field.ron --width 648 --reference-spp 1024 --spp 16 64
 
-It needs Blender's module (`python3.11 -m venv target/venv-bpy && target/venv-bpy/bin/pip install bpy==5.0.1 numpy OpenEXR`; on Debian
+Needs Blender's Python module (`python3.11 -m venv target/venv-bpy && target/venv-bpy/bin/pip install bpy==5.0.1 numpy OpenEXR`; on Debian
 `apt-get install libgl1 libxi6 libsm6 libxkbcommon0 libxrender1 libxfixes3`), and `cargo build --release`. Options, error, references and
-rounds are those of race.py; options that are only Mitsuba's or the filter's change nothing.
+rounds are those of race.py; options for Mitsuba or the filter have no effect.
 
-What is done: `trace export` writes the page as a GLB file, and both render that file: the same triangles, normals, pictures, masks,
-camera and sun. glTF has no sky: Furrow's page of the GLB repeats the page's lights, Cycles gets the same sky as a picture, from
-`trace export --format mitsuba`. Both path trace 12 surfaces deep with pixels that gather their own square. Cycles runs on the CPU
-without denoising, adaptive sampling and clamping, all else as it comes. Its importer knows no diffuse transmission: materials are made here.
+Method: `trace export` writes the scene as a GLB file, and both programs render that file, with the same triangles, normals,
+textures, masks, camera and sun. glTF has no sky: the scene file that places the GLB for Furrow repeats the lights of the
+original, and Cycles gets the same sky as an environment map from `trace export --format mitsuba`. Both trace paths of at
+most 12 surfaces with a box filter of one pixel. Cycles runs on the CPU without denoising, adaptive sampling and clamping,
+otherwise with default settings. Its importer does not support diffuse transmission, so materials are built here.
 
-Alike are rough sheets (Diffuse and Translucent) and masks. About alike are soil (Oren & Nayar's model; Cycles has Fujii's, equal where light and
-eye lie on one side) and coats (GGX of IOR 1.5; Principled). Furrow filters pictures and relief over a ray's width, Cycles reads texels: relief is
-rougher there, the more so the smaller the image. Only Furrow's sun has a dark limb. Lamps become spots in the GLB: such pages differ.
-Seconds are those of sampling as each program tells them; "in all" is with importing, building and writing.
+Rough thin sheets (Diffuse and Translucent) and masks are equal. Soil (Oren–Nayar; Cycles uses Fujii's variant, equal if
+light and viewer are on one side) and coats (GGX with IOR 1.5; Principled) are approximately equal. Furrow filters textures
+and normal maps over a ray's footprint and Cycles reads single texels, so that its relief is rougher, more so in small
+images. Only Furrow's sun has limb darkening. Lamps become spot lights in the GLB, so that scenes with lamps differ.
+
+Seconds are sampling times as reported by each program; "in all" includes import, scene construction and output.
 """
 
 import hashlib
@@ -33,10 +36,10 @@ import numpy as np  # noqa: E402
 import OpenEXR  # noqa: E402
 import race  # noqa: E402
 
-PHOTOMETRIC = 106.857  # what the export multiplies watts by, over what Blender's importer divides by
-# From this α on Furrow sees no coat; the coat's albedo at normal incidence; light below it, c(20°) c(45°) of `src/bsdf/leaf.rs`.
+PHOTOMETRIC = 106.857  # factor of the export on watts, divided by the divisor of Blender's importer
+# Least α without a coat in Furrow; coat albedo at normal incidence; light below it, c(20°) c(45°) of `crates/optics/src/bsdf/leaf.rs`.
 MATTE, COAT, BELOW = 0.8, 0.04, 1.05
-# Oren & Nayar's B / A for a slope of 0.3 rad, and their A = .8881 over Fujii's, 1 / (1 + σ (1/2 − 2 / 3π)).
+# Oren–Nayar's B / A for a slope of 0.3 rad, and its A = 0.8881 divided by Fujii's, 1 / (1 + σ (1/2 − 2 / 3π)).
 ROUGHNESS, DARKER = 0.252, 0.8881 * (1 + 0.252 * (0.5 - 2 / (3 * np.pi)))
 
 
@@ -45,7 +48,7 @@ def read_radiance(path):
 
 
 def fields(text):
-    """The fields of a page as they are written, by name."""
+    """Returns the source text of a scene file's fields, by name."""
     text = re.sub(r'("(?:[^"\\]|\\.)*")|//[^\n]*|/\*.*?\*/', lambda m: m[1] or "", text, flags=re.DOTALL)
     parts, depth = [""], 0
     for token in re.findall(r'"(?:[^"\\]|\\.)*"|.', text[text.index("(") + 1 : text.rindex(")")], re.DOTALL):
@@ -55,14 +58,14 @@ def fields(text):
 
 
 def split(glb):
-    """The document and the bytes of a GLB file."""
+    """Returns the JSON document and the binary chunk of a GLB file."""
     data = glb.read_bytes()
     length = int.from_bytes(data[12:16], "little")
     return json.loads(data[20 : 20 + length]), data[28 + length :]
 
 
 def export(options, folder):
-    """Writes the GLB, the page that places it, and the lights alone; returns that page's path."""
+    """Writes the GLB, the scene file that places it, and a scene of the lights alone; returns the path of the scene file."""
     page = fields((race.ROOT / options.scene).read_text())
     if missing := {"camera", "lights"} - set(page):
         sys.exit(f"{options.scene} has no {' and no '.join(missing)} of its own")
@@ -77,15 +80,15 @@ def export(options, folder):
     both = [split(glb)[0] for glb in (folder / "scene.glb", folder / "light" / "scene.glb")]
     views = [[of["cameras"], of.get("extensions"), *(n["matrix"] for n in of["nodes"] if "mesh" not in n)] for of in both]
     if views[0] != views[1]:
-        sys.exit(f"{options.scene}: another camera or sun is drawn for the page of the GLB")
+        sys.exit(f"{options.scene}: the scene file of the GLB samples another camera or sun")
     return folder / "glb.ron"
 
 
 class Cycles:
-    """Cycles in a process that stays: the GLB is imported once."""
+    """Cycles, in this process, so that the GLB is imported once."""
 
-    name, share = "Cycles", 1  # the reference has samples of its own
-    possible = staticmethod(lambda spp: 1 << (spp - 1).bit_length())  # Sobol's points are even at powers of two
+    name, share = "Cycles", 1  # the samples of the reference are independent of those of a run
+    possible = staticmethod(lambda spp: 1 << (spp - 1).bit_length())  # Sobol points are well stratified at powers of two
 
     def __init__(self, options, folder):
         begin = time.perf_counter()
@@ -103,13 +106,13 @@ class Cycles:
         self.loading = time.perf_counter() - begin
 
     def world(self):
-        """The sky, of the lights alone that were exported for Mitsuba; returns the greatest number of bounces."""
+        """Sets the sky from the scene of the lights exported for Mitsuba; returns the maximum number of bounces."""
         text, sky = (self.folder / "light" / "scene.xml").read_text(), np.zeros((4, 8, 3), np.float32)
         if constant := re.search(r'type="constant">\s*<rgb name="radiance" value="([^"]+)"', text):
             sky += np.array(constant[1].split(), np.float32)
         elif 'type="envmap"' in text:
             sky = read_radiance(self.folder / "light" / "textures" / "sky.exr").astype(np.float32)
-            # Rows between Mitsuba's; columns from north by east, where Cycles begins in the west.
+            # Rows are averaged to lie between Mitsuba's; columns start in the north and run east, those of Cycles start in the west.
             sky = np.roll((sky[1:] + sky[:-1]) / 2, sky.shape[1] // 4, axis=1)
         OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": sky}).write(str(self.folder / "sky.exr"))
         world = bpy.context.scene.world = bpy.data.worlds.new("sky")
@@ -117,7 +120,7 @@ class Cycles:
         picture.image = bpy.data.images.load(str(self.folder / "sky.exr"))
         picture.image.colorspace_settings.name = "Non-Color"
         world.node_tree.links.new(picture.outputs["Color"], world.node_tree.nodes["Background"].inputs["Color"])
-        return int(re.search(r'"max_depth" value="(\d+)"', text)[1]) - 2  # Mitsuba counts first surface and emitter, too
+        return int(re.search(r'"max_depth" value="(\d+)"', text)[1]) - 2  # Mitsuba also counts the first surface and the emitter
 
     def settings(self, options, depth):
         scene, of = bpy.context.scene, self.document["cameras"][0]["extras"]
@@ -135,7 +138,7 @@ class Cycles:
         picture.color_mode = "RGB"
 
     def material(self, material):
-        """Nodes for a material of the document; a sheet's mix would take its share of the coat, so that is made stronger."""
+        """Builds the nodes of a material of the document. The coat of a sheet is scaled up, because the mix with transmission weakens it."""
         tree, seen = bpy.data.materials[material["name"]].node_tree, {}
         tree.nodes.clear()
 
@@ -149,7 +152,7 @@ class Cycles:
             return new.outputs[0]
 
         def picture(info, space="sRGB", by="Closest"):
-            """A picture of the GLB, one node each, its colours as they are whatever their opacity."""
+            """Returns the output of an image texture of the GLB, one node per image; alpha is not premultiplied."""
             number = self.document["textures"][info["index"]]["source"]
             if number not in self.images:
                 span = self.document["bufferViews"][self.document["images"][number]["bufferView"]]
@@ -161,7 +164,7 @@ class Cycles:
                 seen[number] = node("TexImage", [("image", self.images[number]), ("extension", "EXTEND"), ("interpolation", by)])
             return seen[number]
 
-        def color(info, factor, less=0.0):  # nowhere below 0
+        def color(info, factor, less=0.0):  # clamped at 0
             if not info:
                 return (*(max(f - less, 0) for f in factor), 1)
             if not less and factor == [1, 1, 1]:
@@ -190,7 +193,7 @@ class Cycles:
         tree.links.new(shader, tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
 
     def render(self, spp, take, timed=True):
-        """Radiance, seconds of sampling."""
+        """Returns radiance and sampling time in seconds."""
         scene, begin = bpy.context.scene, time.perf_counter()
         scene.cycles.samples, scene.cycles.seed = spp, take
         bpy.ops.render.render(write_still=True)
@@ -203,7 +206,7 @@ class Cycles:
 
 def main():
     options, table = race.arguments(), os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # Blender tells its progress on stdout
+    os.dup2(2, 1)  # Blender prints its progress to stdout
     name, folder = options.scene, race.ROOT / "target" / "race" / f"{race.Path(options.scene).stem}-cycles"
     folder.mkdir(parents=True, exist_ok=True)
     options.scene, race.read_radiance = str(export(options, folder)), read_radiance

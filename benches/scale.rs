@@ -1,29 +1,30 @@
-//! How time and memory grow: with pixels, samples, plants, triangles, threads, images and area of ground.
+//! Scaling of time and memory with pixels, samples, plants, triangles, threads, images and ground area.
 //!
-//!     cargo bench --bench scale            all; `-- pixels plants` for some of the tables
+//!     cargo bench --bench scale            all tables; `-- pixels plants` for some of them
 //!
-//! The table of areas, whose pictures have as many pixels whatever they show, is drawn as a chart too: `FURROW_SCALE_CHART=FILE.svg` says where.
+//! All images of the area table have the same number of pixels. `FURROW_SCALE_CHART=FILE.svg` also writes this table as a chart.
 //!
-//! Each row is a run of this bench of its own, so that its peak memory is its own. Time is that of all cores together, from Linux's clock of
-//! the process (a hundredth of a second), since a busy machine stretches every other; of threads it is the clock on the wall. The exponents are
-//! slopes of the logarithms by least squares: 1 is linear, 0 constant.
+//! Each row runs in its own process, so that its peak memory is measured separately. Times are core seconds of the process
+//! (resolution of the Linux clock: 0.01 s), because wall time depends on other load; the table of threads is compared by wall time.
+//! The exponents are least-squares slopes of the logarithms: 1 is linear, 0 constant.
 
-#![allow(clippy::print_stdout, reason = "its tables are its result")]
+#![allow(clippy::print_stdout, reason = "the tables are the result")]
 
-use furrow::accel::EmbreeAccel;
-use furrow::dataset::meter;
-use furrow::geometry::Window;
-use furrow::integrator::{PathTracer, World};
-use furrow::render::{self, Settings, Watch};
-use furrow::report::chart::{Chart, Curve};
-use furrow::sampling::Points;
-use furrow::scene::assemble;
-use furrow::scene::traits::Traits;
+use furrow_base::geometry::Window;
+use furrow_base::sampling::Points;
+use furrow_dataset::make::meter;
+use furrow_field::assemble;
+use furrow_field::traits::Traits;
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::integrator::{PathTracer, World};
+use furrow_render::render::{self, Settings, Watch};
+use furrow_report::chart::{Chart, Curve};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// A row: pixels across (three to two down), samples, crop plants on a square metre, clods over 5 mm on it, threads, images, height of the camera in metres.
+/// Parameters of a row: image width in pixels (aspect ratio 3:2), samples per pixel, crop plants per m², clods over 5 mm per m²,
+/// threads, images, and camera height in metres.
 #[derive(Clone, Copy)]
 struct Row {
     width: u32,
@@ -35,27 +36,28 @@ struct Row {
     height: f64,
 }
 
-/// What the tables vary one value of.
+/// Default parameters; each table varies one of them.
 const BASE: Row = Row { width: 324, spp: 8, density: 60.0, clods: 9000, threads: 1, images: 1, height: LOW };
 
-/// Height from which the tables but that of areas look, metres; from higher up detail goes by the pixel, and far plants share meshes.
+/// Camera height of all tables but that of areas, metres. From greater heights, detail depends on the pixel size and distant plants
+/// share meshes.
 const LOW: f64 = 1.0;
-/// The table of areas.
+/// Name of the table of ground areas.
 const AREA: &str = "area";
 
-/// What a row took.
+/// Measured cost of a row.
 #[derive(Clone, Copy, Default)]
 struct Cost {
     plants: f64,
     triangles: f64,
-    /// Seconds of a core: growing, building, drawing, labels with extents and traits.
+    /// Core seconds of scene construction, BVH build, rendering, and labels with extents and traits.
     seconds: [f64; 4],
     wall: f64,
-    /// Most memory, bytes.
+    /// Peak memory, bytes.
     peak: f64,
 }
 
-/// A table: its name, what varies, and its rows.
+/// Returns the tables: name, and rows with the value that varies.
 fn tables() -> Vec<(&'static str, Vec<(f64, Row)>)> {
     let rows = |values: &[u32], of: fn(u32) -> Row| values.iter().map(|v| (f64::from(*v), of(*v))).collect();
     let pixels = [162, 324, 648, 1296].map(|width| {
@@ -65,12 +67,12 @@ fn tables() -> Vec<(&'static str, Vec<(f64, Row)>)> {
     vec![
         ("pixels", pixels.to_vec()),
         ("samples", rows(&[4, 8, 16, 32, 64], |spp| Row { spp, ..BASE })),
-        // The field of which about 1.1 m² is planted holds 67, 250, 1 000 and 4 000.
+        // About 1.1 m² of the field is planted: 67, 250, 1 000 and 4 000 plants.
         ("plants", rows(&[37, 140, 560, 2240], |density| Row { density: f64::from(density), ..BASE })),
         ("triangles", rows(&[1000, 4000, 16000, 64000], |clods| Row { clods, ..BASE })),
         ("threads", rows(&[1, 2], |threads| Row { threads: threads as usize, spp: 32, ..BASE })),
         ("images", rows(&[1, 2, 4, 8], |images| Row { images: u64::from(images), ..BASE })),
-        // From 2 to 20 m, a hundred times the ground.
+        // Heights from 2 to 20 m: a hundredfold ground area.
         (
             AREA,
             [2.0, 4.0, 8.0, 20.0].map(|height| (ground(height), Row { height, width: 648, spp: 16, ..BASE })).to_vec(),
@@ -82,7 +84,7 @@ fn height(width: u32) -> u32 {
     width * 2 / 3
 }
 
-/// Ground that an image shows from a height, m².
+/// Returns the ground area in an image from a camera height in metres, m².
 fn ground(height: f64) -> f64 {
     let wide = 2.0 * height * (ANGLE_DEG / 2.0).to_radians().tan();
     wide * wide / 1.5
@@ -91,7 +93,7 @@ fn ground(height: f64) -> f64 {
 /// Horizontal angle of view.
 const ANGLE_DEG: f64 = 50.0;
 
-/// The scene of a row: seedlings in rows so narrow that they stand all over a piece of ground, of the same age whatever their number.
+/// Returns the scene file of a row: seedlings of one age on a square grid of the row's density.
 fn scene(row: &Row) -> String {
     let side = (1.0 / row.density).sqrt();
     let detail = if row.height > LOW { "detail: Instanced, reach_m: 12," } else { "" };
@@ -114,7 +116,7 @@ fn scene(row: &Row) -> String {
     )
 }
 
-/// Makes the images of a row one after another, and tells what that took.
+/// Makes the images of a row one after another; returns the cost.
 fn run(row: &Row) -> Cost {
     let pool = render::pool(row.threads).expect("threads");
     let text = scene(row);
@@ -152,7 +154,7 @@ fn run(row: &Row) -> Cost {
     cost
 }
 
-/// The same in a process of its own.
+/// Runs a row in a separate process; returns the cost.
 fn measured(row: &Row) -> Cost {
     let Row { width, spp, density, clods, threads, images, height } = row;
     let program = std::env::current_exe().expect("this program");
@@ -165,10 +167,10 @@ fn measured(row: &Row) -> Cost {
     Cost { plants, triangles, seconds: [a, b, c, d], wall, peak }
 }
 
-/// Names the variable that makes a run of one row.
+/// Environment variable with the parameters of a single row to run.
 const ROW: &str = "FURROW_SCALE_ROW";
 
-/// Slope of the logarithms by least squares.
+/// Returns the least-squares slope of ln y over ln x.
 fn exponent(x: &[f64], y: &[f64]) -> f64 {
     let of = |v: &[f64]| -> Vec<f64> { v.iter().map(|v| v.max(1e-3).ln()).collect() };
     let (x, y) = (of(x), of(y));
@@ -179,23 +181,23 @@ fn exponent(x: &[f64], y: &[f64]) -> f64 {
     above / below
 }
 
-/// Names the variable that says where the chart goes.
+/// Environment variable with the path of the chart.
 const CHART: &str = "FURROW_SCALE_CHART";
 
-/// What the same number of pixels costs, by the ground that they show.
+/// Returns the chart of core seconds over ground area, for a constant number of pixels.
 fn chart(costs: &[(f64, Cost)]) -> Chart {
     let curve = |name: &str, value: &dyn Fn(&Cost) -> f64| Curve {
         name: name.into(),
         points: costs.iter().map(|(area, cost)| (area.log10(), value(cost))).collect(),
     };
     Chart {
-        title: "As many pixels, more ground".into(),
-        across: "log₁₀ of the ground, m²".into(),
+        title: "Constant pixels, growing ground area".into(),
+        across: "log₁₀ of the ground area, m²".into(),
         upwards: "core seconds".into(),
         curves: vec![
             curve("all", &|c| c.seconds.iter().sum()),
-            curve("grow", &|c| c.seconds[0]),
-            curve("draw", &|c| c.seconds[2]),
+            curve("scene", &|c| c.seconds[0]),
+            curve("render", &|c| c.seconds[2]),
             curve("labels", &|c| c.seconds[3]),
         ],
         logarithmic: false,
@@ -224,7 +226,7 @@ fn main() {
         if !wanted.is_empty() && !wanted.iter().any(|word| word == name) {
             continue;
         }
-        println!("| {name} | plants | triangles | grow, s | build, s | draw, s | labels, s | wall, s | peak, MB |");
+        println!("| {name} | plants | triangles | scene, s | BVH, s | render, s | labels, s | wall, s | peak, MB |");
         println!("|---|---|---|---|---|---|---|---|---|");
         let costs: Vec<(f64, Cost)> = rows.iter().map(|(value, row)| (*value, measured(row))).collect();
         for (value, cost) in &costs {
@@ -237,7 +239,7 @@ fn main() {
                 cost.peak / 1e6
             );
         }
-        // Of triangles and plants as they came out, for densities tell them only about.
+        // The actual numbers of triangles and plants, since densities determine them only approximately.
         let x: Vec<f64> = costs
             .iter()
             .map(|(value, cost)| match name {
@@ -249,7 +251,7 @@ fn main() {
         let of =
             |value: &dyn Fn(&Cost) -> f64| exponent(&x, &costs.iter().map(|(_, cost)| value(cost)).collect::<Vec<_>>());
         println!(
-            "\nexponents: grow {:.2}, build {:.2}, draw {:.2}, labels {:.2}, all {:.2}, wall {:.2}, memory {:.2}\n",
+            "\nexponents: scene {:.2}, BVH {:.2}, render {:.2}, labels {:.2}, all {:.2}, wall {:.2}, memory {:.2}\n",
             of(&|c| c.seconds[0]),
             of(&|c| c.seconds[1]),
             of(&|c| c.seconds[2]),

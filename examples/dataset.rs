@@ -1,8 +1,8 @@
-//! A small dataset with labels for other tools, as `trace dataset` makes it. Stopped, the same command goes on.
+//! Makes a small dataset with labels in two formats of other tools, as `trace dataset` does. If it is stopped, the same command resumes.
 //!
 //! ```sh
 //! cargo run --release --example dataset                                       # 10 images
-//! cargo run --release --example dataset -- scenes/01-one-leaf.ron 2 1 48      # 2 images of 48 pixels, 1 sample a pixel
+//! cargo run --release --example dataset -- scenes/01-one-leaf.ron 2 1 48      # 2 images, 48 pixels wide, 1 sample per pixel
 //! ```
 
 #![expect(clippy::print_stdout, reason = "the paths are the result")]

@@ -1,8 +1,8 @@
-//! One field, rendered and labelled, as `trace --scene scenes/field.ron` does it.
+//! Renders and labels one field, as `trace --scene scenes/field.ron` does.
 //!
 //! ```sh
-//! cargo run --release --example render                                   # the main scene, 64 samples a pixel
-//! cargo run --release --example render -- scenes/02-one-plant.ron 4 96   # another one, 4 samples a pixel, 96 pixels wide
+//! cargo run --release --example render                                   # the main scene, 64 samples per pixel
+//! cargo run --release --example render -- scenes/02-one-plant.ron 4 96   # another scene, 4 samples per pixel, 96 pixels wide
 //! ```
 
 #![expect(clippy::print_stdout, reason = "the paths are the result")]

@@ -1,10 +1,10 @@
-//! A network learns from a dataset and is evaluated on its test set, as `train fit` and `train eval` do it. Stopped, the same command
-//! goes on.
+//! Trains a network on a dataset and evaluates it on the test set, as `train fit` and `train eval` do. If it is stopped, the same command
+//! resumes.
 //!
 //! ```sh
-//! cargo run --release --example dataset                                                # images to learn from
+//! cargo run --release --example dataset                                                # the dataset
 //! cargo run --release --features train --example train                                 # Basic SegNet, 400 steps
-//! cargo run --release --features train --example train -- DATASET RUN 20 unet          # another set, folder, steps, network
+//! cargo run --release --features train --example train -- DATASET RUN 20 unet          # another dataset, folder, steps, network
 //! ```
 
 #![expect(clippy::print_stdout, reason = "scores and paths are the result")]

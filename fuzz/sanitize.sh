@@ -1,5 +1,5 @@
 #!/bin/sh
-# AddressSanitizer over what is unsafe, the bindings of Embree in src/accel/rtc and of Open Image Denoise in src/output/denoise/oidn: the tests that go through it, built with it: sh fuzz/sanitize.sh
+# AddressSanitizer over what is unsafe, the bindings of Embree in crates/render/src/accel/rtc and of Open Image Denoise in crates/output/src/denoise/oidn: the tests that go through it, built with it: sh fuzz/sanitize.sh
 set -eu
 cd "$(dirname "$0")/.."
 # The sanitizer comes with the stable compiler; its flag is asked for by name. Embree's worker threads are never joined, so leaks are not told;

@@ -1,6 +1,6 @@
 //! Furrow grows procedural crop fields, path traces them and labels every pixel exactly.
 //!
-//! Three lines make an image, the same bytes as the program `trace` writes:
+//! Three lines render an image, byte-identical to the output of the program `trace`:
 //!
 //! ```
 //! # let out = tempfile::tempdir().expect("a folder");
@@ -17,119 +17,60 @@
 //! # The pipeline
 //!
 //! ```text
-//! scene file ──draw──▶ field ──path trace──▶ film ──sensor──▶ photograph ─┐
+//! scene file ──draw──▶ field ──path trace──▶ film ──sensor──▶ image ──────┐
 //!    RON                 │      or rasterize                              ├─▶ files
-//!                        └──one ray a pixel──▶ label map ─────────────────┘
+//!                        └─one ray per pixel─▶ label map ─────────────────┘
 //! ```
 //!
-//! A scene file is a distribution over fields; file, seed and index are one field, and always the same bits, whatever the number of threads.
-//! Plants are grown as meshes, bent leaf by leaf by linear blend skinning, and stand on displaced ground. The path tracer fills a film of
-//! four bands (red, green, blue, near infrared) with mean and variance; a sensor turns it into a photograph.
-//! Labels come from one unfiltered ray through each pixel's centre, so they are exact.
+//! A scene file is a distribution over fields. Scene file, seed and index determine one field, bit-identical for any number of threads.
+//! Plants are grown as meshes, bent leaf by leaf by linear blend skinning, on displaced ground. The path tracer accumulates mean and
+//! variance of four bands (red, green, blue, near infrared) in a film; a sensor model turns it into an image. Labels come from one
+//! unfiltered ray through each pixel centre, so they are exact.
 //!
 //! # Where to look
 //!
-//! | module | what it is for |
+//! | module | contents |
 //! |---|---|
 //! | [`prelude`] | what most programs need |
-//! | [`job`] | from a scene file to an image: grow, render, label, photograph, write |
+//! | [`job`] | from a scene file to an image: build, render, label, develop, write |
 //! | [`settings`] | engine, quality, techniques |
 //! | [`dataset`] | many images with all labels, in other tools' formats; resumable, in shards |
 //! | [`scene_format`] | every field of scene files and species files |
-//! | [`film`] | mean and variance by pixel |
-//! | [`train`] | networks that learn from datasets, and how they are evaluated |
+//! | [`film`] | mean and variance of each pixel |
+//! | `train` | networks: training, evaluation, prediction (feature `train`) |
 //! | [`error`] | what failed, where, and what to do |
 //!
-//! `examples/` holds whole programs. Words are explained in `docs/glossary.md`.
+//! `examples/` holds whole programs. Terms are explained in `docs/glossary.md`.
 //!
-//! # Layers
+//! # Crates
 //!
-//! The modules that documentation does not list are public for the programs and tests of this repository alone; they may change with any
-//! version. Modules import only modules of lower layers; `tests/architecture.rs` reads this table and holds them to it.
+//! This crate is the facade. The work is in `crates/`; each crate uses only crates of lower layers, which Cargo enforces. Modules of one
+//! crate are layered as well: `tests/architecture.rs` reads this table and the `use` lines.
 //!
-//! `scatter` says where plants stand, `accel` holds the BVH, `cli` is what the two programs share, `reference` is what they say about the files that people write.
-//!
-//! | layer | modules |
-//! |---|---|
-//! | 16 | [`prelude`], [`scene_format`], `reference` |
-//! | 15 | [`train`] |
-//! | 14 | `compare` |
-//! | 13 | [`dataset`] |
-//! | 12 | [`job`] |
-//! | 11 | `ablation`, `output`, `raster` |
-//! | 10 | `render` |
-//! | 9 | `integrator` |
-//! | 8 | `scene` |
-//! | 7 | `material`, `scatter` |
-//! | 6 | `bsdf`, `light`, `sensor`, `plant`, `soil`, `accel`, `model` |
-//! | 5 | `texture` |
-//! | 4 | `optics`, [`film`], `report`, `cli`, [`settings`] |
-//! | 3 | `ron_file` |
-//! | 2 | `sampling`, `geometry`, `input` |
-//! | 1 | `math`, [`error`] |
+//! | layer | crate | modules, lowest layer first |
+//! |---|---|---|
+//! | 13 | `furrow` | this facade; the programs `trace` and `train` |
+//! | 12 | `furrow-cli` | `cli`, `reference` |
+//! | 11 | `furrow-train` | networks |
+//! | 10 | `furrow-compare` | differences between images and between datasets |
+//! | 9 | `furrow-dataset` | datasets |
+//! | 8 | `furrow-job` | scene file → image → files |
+//! | 7 | `furrow-output` | file formats |
+//! | 6 | `furrow-field` | scene file → scene |
+//! | 5 | `furrow-render` | `film`, `settings` · `material`, `accel` · `scene` · `integrator` · `render` · `raster` |
+//! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model` |
+//! | 3 | `furrow-optics` | `optics` · `texture` · `bsdf`, `light`, `sensor` |
+//! | 2 | `furrow-report` | charts, tables, HTML pages |
+//! | 2 | `furrow-base` | `math`, `error` · `sampling`, `geometry`, `input` · `ron_file` |
+//! | 1 | `furrow-embree` | bindings to Embree |
 
 #![warn(clippy::print_stderr)]
 
-#[doc(hidden)]
-pub mod ablation;
-#[doc(hidden)]
-pub mod accel;
-#[doc(hidden)]
-pub mod bsdf;
-#[doc(hidden)]
-pub mod cli;
-#[doc(hidden)]
-pub mod compare;
-pub mod dataset;
-pub mod error;
-pub mod film;
-#[doc(hidden)]
-pub mod geometry;
-#[doc(hidden)]
-pub mod input;
-#[doc(hidden)]
-pub mod integrator;
-pub mod job;
-#[doc(hidden)]
-pub mod light;
-#[doc(hidden)]
-pub mod material;
-#[doc(hidden)]
-pub mod math;
-#[doc(hidden)]
-pub mod model;
-#[doc(hidden)]
-pub mod optics;
-#[doc(hidden)]
-pub mod output;
-#[doc(hidden)]
-pub mod plant;
 pub mod prelude;
-#[cfg(feature = "raster")]
-#[doc(hidden)]
-pub mod raster;
-#[doc(hidden)]
-pub mod reference;
-#[doc(hidden)]
-pub mod render;
-#[doc(hidden)]
-pub mod report;
-#[doc(hidden)]
-pub mod ron_file;
-#[doc(hidden)]
-pub mod sampling;
-#[doc(hidden)]
-pub mod scatter;
-#[doc(hidden)]
-pub mod scene;
 pub mod scene_format;
-#[doc(hidden)]
-pub mod sensor;
-pub mod settings;
-#[doc(hidden)]
-pub mod soil;
-#[doc(hidden)]
-pub mod texture;
-pub mod train;
 
-pub use error::{Error, Result};
+pub use furrow_base::error::{self, Error, Result};
+pub use furrow_render::{film, settings};
+#[cfg(feature = "train")]
+pub use furrow_train as train;
+pub use {furrow_dataset as dataset, furrow_job as job};

@@ -1,6 +1,6 @@
-//! What most programs need: `use furrow::prelude::*;`.
+//! Types that most programs need: `use furrow::prelude::*;`.
 
-pub use crate::dataset::{self, Order, Set};
-pub use crate::error::{Error, Result};
-pub use crate::job::{Field, Image, Renderer, Request, SceneFile, Threads, View};
-pub use crate::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
+pub use furrow_base::error::{Error, Result};
+pub use furrow_dataset::{self as dataset, Order, Set};
+pub use furrow_job::{Field, Image, Renderer, Request, SceneFile, Threads, View};
+pub use furrow_render::settings::{Engine, Quality, RenderOptions, Technique, Techniques};

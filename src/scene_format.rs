@@ -1,11 +1,11 @@
-//! What stands in scene files and species files: every type with its fields, units, ranges and defaults.
+//! Types of scene files and species files, with fields, units, ranges and defaults.
 //!
-//! A scene file holds one [`FieldDesc`], a species file one [`SpeciesDesc`]. Wherever a [`Num`] stands, a number or a
-//! [`Distribution`] may stand. Its parameter bounds what is drawn: [`Positive`], [`Fraction`] and so on; anything else is an error with line
-//! and column.
+//! A scene file contains one [`FieldDesc`], a species file one [`SpeciesDesc`]. A [`Num`] is a fixed number; a [`Vary`] is a number or a
+//! [`Distribution`]. Their type parameter is the allowed range: [`Positive`], [`Fraction`] and so on. A value outside the range is an
+//! error with line and column.
 //!
 //! ```
-//! # use furrow::ron_file::RonFile;
+//! # use furrow_base::ron_file::RonFile;
 //! use furrow::scene_format::FieldDesc;
 //!
 //! let text = r#"Field(
@@ -20,30 +20,30 @@
 //! ```
 
 #[doc(inline)]
-pub use crate::light::{GlowDesc, InfraredDesc, LightDesc, PointDesc, ShapeDesc, SunDesc};
-#[doc(inline)]
-pub use crate::material::LeafDesc;
-#[doc(inline)]
-pub use crate::plant::{ConditionDesc, LayerDesc, LeafKind, PlantDesc, Shape, Stage, StageDesc};
-#[doc(inline)]
-pub use crate::ron_file::{
+pub use furrow_base::ron_file::{
     Bound, Count, Distribution, Elevation, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary,
 };
 #[doc(inline)]
-pub use crate::scatter::{ClustersDesc, RowsDesc, WeedsDesc};
+pub use furrow_field::desc::{CropDesc, FieldDesc, Growth, ModelDesc, PlacedDesc, Role, SpeciesDesc, WeedDesc};
 #[doc(inline)]
-pub use crate::scene::desc::{CropDesc, FieldDesc, Growth, ModelDesc, PlacedDesc, Role, SpeciesDesc, WeedDesc};
+pub use furrow_field::drive::{DriveDesc, MountedDesc, PathDesc, ShakeDesc};
 #[doc(inline)]
-pub use crate::scene::drive::{DriveDesc, MountedDesc, PathDesc, ShakeDesc};
+pub use furrow_grow::plant::{ConditionDesc, LayerDesc, LeafKind, PlantDesc, Shape, Stage, StageDesc};
 #[doc(inline)]
-pub use crate::sensor::{
+pub use furrow_grow::scatter::{ClustersDesc, RowsDesc, WeedsDesc};
+#[doc(inline)]
+pub use furrow_grow::soil::{
+    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc,
+    SoilColor, SoilDesc, StonesDesc, WheelDesc,
+};
+#[doc(inline)]
+pub use furrow_optics::light::{GlowDesc, InfraredDesc, LightDesc, PointDesc, ShapeDesc, SunDesc};
+#[doc(inline)]
+pub use furrow_optics::sensor::{
     AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, MatrixDesc, MosaicDesc,
     MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,
 };
 #[doc(inline)]
-pub use crate::sensor::{BeamsDesc, LidarDesc, PulsesDesc, Returns};
+pub use furrow_optics::sensor::{BeamsDesc, LidarDesc, PulsesDesc, Returns};
 #[doc(inline)]
-pub use crate::soil::{
-    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc,
-    SoilColor, SoilDesc, StonesDesc, WheelDesc,
-};
+pub use furrow_render::material::LeafDesc;

@@ -1,47 +1,51 @@
-//! Edits: each changes one thing of a field, does what its name says, and leaves everything else bit for bit as it was.
+//! Edits for ablation studies: each changes exactly one aspect of a field, as its name says, and leaves everything else
+//! bit-identical.
 //!
-//! Rationale: what a network loses without a thing is only known if nothing else is missing with it. Expected: of shape, surfaces, light,
-//! camera, sensor and drawing one group differs, the one that the edit names; labels stay where it says so; datasets with edits
-//! are as resumable as those without. Source: none needed, equality is exact.
+//! Rationale: the effect of removing one aspect can only be measured if nothing else changes with it. Expected: of
+//! geometry, surfaces, lights, camera, sensor and render options, only the group the edit names differs; labels stay
+//! the same where the edit says so; datasets with edits can be resumed like those without. Source: none needed,
+//! equality is exact.
 
 use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, bits, scratch, trace};
-use furrow::ablation::{Change, EDITS, Edit, FULL};
-use furrow::accel::EmbreeAccel;
-use furrow::dataset::{Set, native};
-use furrow::film::Film;
-use furrow::geometry::{Hit, Interaction, Window};
-use furrow::integrator::{PathTracer, World};
-use furrow::light::{Emitter, Light};
-use furrow::material::Material;
-use furrow::math::Vec3;
-use furrow::render::{self, LabelMap, Settings, Watch};
-use furrow::sampling::Points;
-use furrow::scene::assemble::Options;
-use furrow::scene::{Field, Part, PlantRecord};
-use furrow::sensor::Photograph;
-use furrow::settings::{Engine, Quality, RenderOptions};
+use furrow_base::geometry::{Hit, Interaction, Window};
+use furrow_base::math::Vec3;
+use furrow_base::sampling::Points;
+use furrow_dataset::Set;
+use furrow_dataset::read::native;
+use furrow_field::ablation::{Change, EDITS, Edit, FULL};
+use furrow_field::assemble::Options;
+use furrow_field::{Field, PlantRecord};
+use furrow_optics::light::{Emitter, Light};
+use furrow_optics::sensor::Photograph;
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::Film;
+use furrow_render::integrator::{PathTracer, World};
+use furrow_render::material::Material;
+use furrow_render::render::{self, LabelMap, Settings, Watch};
+use furrow_render::scene::Part;
+use furrow_render::settings::{Engine, Quality, RenderOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// How the small field is rendered without an edit.
+/// Render options of the small field without an edit.
 fn options() -> RenderOptions {
     RenderOptions::path_traced(Quality::spp(2))
 }
 
-/// A field in which there is something to take away for every edit.
+/// Scene file with a field that contains everything the edits remove.
 const DRIVING: &str = "tests/ref/driving.ron";
 
 fn grow(edit: &Edit) -> Field {
     let options = Options { width: Some(72), ..Options::default() };
-    let source = edit.open(Path::new(DRIVING), furrow::input::Scope::Anywhere).unwrap();
+    let source = edit.open(Path::new(DRIVING), furrow_base::input::Scope::Anywhere).unwrap();
     render::pool(2).unwrap().install(|| edit.field(&source, &options)).unwrap()
 }
 
-/// What comes of a field.
+/// Rendered outputs of a field.
 struct Shot {
     film: Film,
     photograph: Photograph,
@@ -66,7 +70,7 @@ fn shoot(edit: &Edit, field: &Field, threads: usize) -> Shot {
     })
 }
 
-/// Where parts are and who they are, as numbers.
+/// Hash of the geometry of all parts and of their tags.
 fn shape(field: &Field) -> String {
     let numbers = field.scene.parts.iter().flat_map(|part| {
         let corners = part.mesh.positions.iter().chain(&part.mesh.normals).flat_map(Vec3::to_array).map(f32::to_bits);
@@ -76,7 +80,7 @@ fn shape(field: &Field) -> String {
     crate::common::program::hash(numbers)
 }
 
-/// How some places of every part scatter.
+/// BSDF values at a few points of every part.
 fn surfaces(field: &Field) -> Vec<String> {
     let scatter = |(i, part): (usize, &Part)| {
         let count = part.mesh.triangles.len() as u32;
@@ -91,7 +95,7 @@ fn surfaces(field: &Field) -> Vec<String> {
     field.scene.parts.iter().enumerate().map(scatter).collect()
 }
 
-/// The kinds of lights, and what each gives level ground.
+/// Kind of each light, and the irradiance that it gives level ground.
 fn lights(field: &Field) -> Vec<String> {
     let told = |light: &Light| match light {
         Light::Sun(sun) => format!("{sun:?}"),
@@ -148,10 +152,10 @@ fn every_edit_changes_one_thing_and_nothing_else() {
             let other = surfaces(&field) != surfaces(&full);
             assert_eq!(other, matches!(edit.change, Change::Materials(_)), "{name}: surfaces");
         }
-        // What was drawn for the field is drawn for it still, and the same plants stand in the same places.
+        // The random draws of the field are unchanged, and the same plants are at the same positions.
         assert_eq!(field.conditions, full.conditions, "{name}");
         assert_eq!((&field.hash, &field.species, field.sample_seed()), (&full.hash, &full.species, full.sample_seed()));
-        // Plants that reach neither view nor shadow are left out, which their size decides.
+        // Plants outside the view that cast no visible shadow are left out; whether that happens depends on their size.
         let number = |p: &PlantRecord| p.number;
         let both: Vec<(&PlantRecord, &PlantRecord)> = field
             .plants
@@ -169,14 +173,14 @@ fn every_edit_changes_one_thing_and_nothing_else() {
 #[test]
 fn every_edit_shows_and_keeps_labels_where_it_says_so() {
     let full = shoot(&FULL, &grow(&FULL), 2);
-    // What another engine draws is `raster.rs`'s matter, where that is built.
+    // `raster.rs` tests the edits of the raster engine, if that is built.
     for edit in EDITS.iter().filter(|edit| edit.options(options()).engine == Engine::Trace) {
         let shot = shoot(edit, &grow(edit), 2);
         let same_labels = shot.labels.tags == full.labels.tags;
         assert_eq!(same_labels, edit.keeps_labels, "{}", edit.name);
         let same_film = bits(&shot.film) == bits(&full.film);
         let behind = matches!(edit.change, Change::Sensor(_) | Change::Photograph(_) | Change::Labels(_));
-        // The denoiser works on the film's photograph; it is not everywhere.
+        // The denoiser changes the film's image, and it is not available everywhere.
         let denoised = edit.options(options()).quality.denoise;
         assert_eq!(same_film, behind || denoised, "{}", edit.name);
         let same_picture = shot.photograph == full.photograph;
@@ -184,7 +188,7 @@ fn every_edit_shows_and_keeps_labels_where_it_says_so() {
     }
 }
 
-/// The parts of all plants, in their order.
+/// Parts of all plants, in order.
 fn plant_parts(field: &Field) -> impl Iterator<Item = &Part> {
     field.scene.parts.iter().filter(|p| p.tag.plant > 0)
 }
@@ -199,7 +203,7 @@ fn edits_do_what_their_names_say() {
     let ground: Vec<&Part> = flat.scene.parts.iter().filter(|p| is_ground(&flat, p)).collect();
     assert_eq!(ground.len(), 1, "clods");
     assert!(ground[0].mesh.positions.iter().all(|p| p.z == 0.0));
-    // The same plants, let down.
+    // The same plants, moved down to the flat ground.
     assert_eq!(flat.plants.len(), full.plants.len());
     for (is, was) in plant_parts(&flat).zip(plant_parts(&full)) {
         assert_eq!(is.tag, was.tag);
@@ -209,7 +213,7 @@ fn edits_do_what_their_names_say() {
         assert!(far < 1e-5, "plant {}: {far}", is.tag.plant);
     }
 
-    // Of a flat blade nearly all faces the same way: only where it leaves its stalk it turns.
+    // Almost all of a flat blade faces one way; it bends only where it leaves the petiole.
     let flat = named("flat-leaves");
     let blades = |f: &Field| -> Vec<Part> {
         let leaves = f.scene.parts.iter().filter(|p| p.tag.plant > 0 && p.mask.is_some());
@@ -233,7 +237,7 @@ fn edits_do_what_their_names_say() {
     let count = |f: &Field| blades(f).iter().map(|b| b.mesh.triangles.len()).max().unwrap();
     assert!(count(&coarse) == 16 && count(&full) > 64, "{} of {}", count(&coarse), count(&full));
 
-    // All plants of a species and a growth: here crops, and weeds; a beet stands by itself at another age.
+    // All plants of a species and an age share one mesh: here crops and weeds; one beet has an age of its own.
     let alike = named("one-mesh");
     let mut groups: BTreeMap<(&str, u32), Vec<_>> = BTreeMap::new();
     for plant in &alike.plants {
@@ -257,7 +261,7 @@ fn edits_do_what_their_names_say() {
     assert!(near("hard-ambient") < 1e-4 && near("point-light") < 1e-4 && near("no-sky") > 0.05);
 }
 
-/// Expected: with an edit as without one, threads change nothing.
+/// Expected: the number of threads changes nothing, with or without an edit.
 #[test]
 fn edited_fields_are_the_same_on_any_number_of_threads() {
     for name in ["flat-soil", "one-mesh", "smooth-labels"] {
@@ -269,7 +273,7 @@ fn edited_fields_are_the_same_on_any_number_of_threads() {
     }
 }
 
-/// `trace ablate` on the small page: two images of each dataset.
+/// Returns the command `trace ablate` on the small scene: two images in each dataset.
 fn ablate(out: &Path, more: &[&str]) -> std::process::Command {
     let mut command = trace(&["ablate", "--scene", SMALL, "--count", "2", "--width", "64", "--spp", "2", "--quiet"]);
     command.args(["--out", path(out)]).args(more);
@@ -304,7 +308,7 @@ fn a_dataset_of_each_edit_has_the_same_files_and_labels() {
         }
     }
     assert!(Set::open(&full).unwrap().recipe.rendering().unwrap().edit.is_none());
-    // It can be made again, alone, by its name; and its pictures say who they are.
+    // The dataset can be generated again on its own by the name of its edit, and its images record that name.
     let (_keep, alone) = scratch();
     succeed(trace(&[
         "dataset",
@@ -337,7 +341,7 @@ fn killed_it_ends_as_if_never_killed() {
     let begin = Instant::now();
     succeed(ablate(&whole, &more));
     let once = begin.elapsed();
-    // As a kill leaves it that falls into the first file of a dataset.
+    // The state after a kill during the first file of a dataset.
     std::fs::create_dir_all(data.join("full")).unwrap();
     std::fs::write(data.join("full/.furrow-half"), "half").unwrap();
     for part in [0.3, 0.5, 0.7] {
@@ -348,7 +352,7 @@ fn killed_it_ends_as_if_never_killed() {
     }
     succeed(ablate(&data, &more));
     same(&tree(&data), &tree(&whole));
-    // Nothing is made twice.
+    // No image is rendered twice.
     let before = made(&data.join("no-coat")).len();
     succeed(ablate(&data, &more));
     assert_eq!(made(&data.join("no-coat")).len(), before);
@@ -391,7 +395,7 @@ fn what_cannot_be_is_told_before_anything_is_written() {
     let page = ["--scene", SMALL, "--width", "64", "--out", path(&out)];
     let said = fail(trace(&[&page[..], &["--edit", "x"]].concat()), 2);
     assert!(said.contains("there is no edit `x`") && said.contains("edits are raster, direct-light"), "{said}");
-    // A dataset of one edit is none of another.
+    // A dataset with one edit cannot be continued with another edit.
     let dataset =
         |more: &[&'static str]| trace(&[&["dataset", "plan", "--count", "2", "--spp", "2"], &page[..], more].concat());
     succeed(dataset(&["--edit", "no-sky"]));

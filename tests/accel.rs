@@ -1,16 +1,18 @@
-//! Embree meets what trying every triangle meets.
+//! Embree finds the same hits as a test of every triangle.
 //!
-//! Rationale: colour and label rest on one question, what a ray hits first. A lost hit is a crack, a wrong one a wrong label, and
-//! both are too few to see. Expected: the same part at the same distance as the oracle in double precision, but where the ray runs
-//! so close to an edge of a triangle or of the mask's texels that single precision cannot tell; no ray through a shared edge is
-//! lost; the mask is asked; nothing depends on the number of threads.
-//! Source: `accel::brute`, Möller & Trumbore 1997 in double precision; the watertightness tests of pbrt.
+//! Rationale: colour and label depend on the first surface that a ray hits. A lost hit is a crack, a wrong hit is a
+//! wrong label, and both are too rare to notice by eye.
+//!
+//! Expected: the same part at the same distance as the double-precision oracle, except where the ray passes so close to
+//! an edge of a triangle or of a mask texel that single precision cannot decide; no ray through a shared edge is lost;
+//! the mask is applied; nothing depends on the number of threads. Source: `accel::brute`, Möller & Trumbore 1997 in
+//! double precision; the watertightness tests of pbrt.
 
 use crate::common::scenes::{point, sphere, square, unit};
-use furrow::accel::{Brute, EmbreeAccel, Surface};
-use furrow::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray};
-use furrow::math::{Mat3, Vec3, vec2, vec3};
-use furrow::sampling::{Purpose, Stream};
+use furrow_base::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray};
+use furrow_base::math::{Mat3, Vec3, vec2, vec3};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_render::accel::{Brute, EmbreeAccel, Surface};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -18,7 +20,7 @@ fn stream(index: u64) -> Stream {
     Stream::of(17, 0, Purpose::Test, index)
 }
 
-/// A lobed leaf, 61 × 83 texels.
+/// Mask of a lobed leaf, 61 × 83 texels.
 fn leaf_mask() -> Arc<AlphaMask> {
     Arc::new(AlphaMask::new(61, 83, |x, y| {
         let (x, y) = ((x as f32 + 0.5) / 61.0 - 0.5, (y as f32 + 0.5) / 83.0);
@@ -27,7 +29,7 @@ fn leaf_mask() -> Arc<AlphaMask> {
     }))
 }
 
-/// A bent, waved sheet of 2·n² triangles over the whole of a mask.
+/// Builds a bent, wavy sheet of 2·n² triangles that covers a whole mask.
 fn blade(n: u32, bend: f32) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=n {
@@ -46,7 +48,7 @@ fn blade(n: u32, bend: f32) -> Mesh {
     mesh
 }
 
-/// `n` triangles that share nothing, with texture coordinates that leave the mask here and there.
+/// Builds `n` triangles that share no vertices; some of their texture coordinates are outside the mask.
 fn confetti(n: u32, s: &mut Stream) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..n {
@@ -61,7 +63,7 @@ fn confetti(n: u32, s: &mut Stream) -> Mesh {
     mesh
 }
 
-/// A few hundred triangles, masked and not.
+/// Builds a few hundred triangles, some with masks.
 fn thicket() -> Vec<(Mesh, Option<Arc<AlphaMask>>)> {
     let mut s = stream(0);
     let mask = leaf_mask();
@@ -78,9 +80,10 @@ fn surfaces(of: &[(Mesh, Option<Arc<AlphaMask>>)]) -> Vec<Surface<'_>> {
     of.iter().map(|(mesh, mask)| Surface { mesh, mask: mask.as_ref(), instance: None }).collect()
 }
 
-/// Whether another answer is excusable: a ray moved by `by` metres, at most what single precision loses, gets it from the oracle.
+/// Returns whether a deviating hit is excusable: the oracle finds it for a ray moved sideways by `by` metres, the
+/// largest error of single precision.
 fn on_the_edge(brute: &Brute<'_>, ray: &Ray, part: Option<u32>, by: f32) -> bool {
-    let frame = furrow::math::Frame::about(ray.direction);
+    let frame = furrow_base::math::Frame::about(ray.direction);
     [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7)].iter().any(
         |(x, y)| {
             let moved = Ray { origin: ray.origin + (frame.x * *x + frame.y * *y) * by, ..*ray };
@@ -115,18 +118,18 @@ fn embree_meets_what_trying_every_triangle_meets() {
             _ => {
                 assert!(
                     on_the_edge(&brute, &ray, got.map(|h| h.part), 2e-6),
-                    "{ray:?}: Embree {got:?}, every triangle {expected:?}"
+                    "{ray:?}: Embree {got:?}, oracle {expected:?}"
                 );
                 close += 1;
             }
         }
     }
-    assert!(met > 20_000 && masked > 8_000, "{met} hits, {masked} of them masked: that tests little");
-    eprintln!("{met} hits, {masked} of them masked, {close} too close to an edge to tell");
-    assert!(close <= 20, "{close} rays too close to an edge: single precision is not that bad");
+    assert!(met > 20_000 && masked > 8_000, "{met} hits, {masked} of them masked: too few to test anything");
+    eprintln!("{met} hits, {masked} of them masked, {close} too close to an edge");
+    assert!(close <= 20, "{close} rays too close to an edge: more than single precision explains");
 }
 
-/// A closed ball: poles and seam are where they should be to the last bit.
+/// Builds a closed ball: the vertices at the poles and along the seam are bitwise equal.
 fn ball(n: u32) -> Mesh {
     let mut mesh = sphere(Vec3::ZERO, 1.0, n);
     let row = 2 * n as usize + 1;
@@ -138,15 +141,16 @@ fn ball(n: u32) -> Mesh {
     mesh
 }
 
-/// Rationale: hits on shared edges and corners belong to several triangles, or, in a careless kernel, to none. Expected: of rays
-/// aimed at edges none is lost. Of rays aimed exactly at corners Embree may lose a few in a thousand: in single precision the
-/// edges that meet there can disagree about the side on which the ray passes; no other ray comes close enough to a corner.
+/// Rationale: hits on shared edges and corners belong to several triangles or, in a careless kernel, to none. Expected:
+/// no ray aimed at an edge is lost. Embree may lose a few in a thousand of the rays aimed exactly at corners: in single
+/// precision, the edges that meet there can disagree about the side on which the ray passes. No other ray comes close
+/// enough to a corner.
 #[test]
 fn no_ray_through_a_shared_edge_is_lost() {
     let ball = ball(24);
     let lobe = Arc::new(AlphaMask::new(8, 8, |_, _| true));
     let mut inner = ball.clone();
-    // A mask ends at uv 0 and 1; here nothing shall end.
+    // A mask ends at texture coordinates 0 and 1; here the surface must not end anywhere.
     inner.uvs.iter_mut().for_each(|uv| *uv = *uv * 0.9 + 0.05);
     let shapes = [(ball, None), (inner, Some(lobe)), (blade(24, 0.5), None), (blade(24, 0.5), Some(leaf_mask()))];
     for (k, shape) in shapes.iter().enumerate() {
@@ -162,7 +166,7 @@ fn no_ray_through_a_shared_edge_is_lost() {
                 let (i, w) = (s.index(3), if round % 3 == 0 { 0.0 } else { s.uniform32() });
                 let ((p, uv), (q, vw)) = (corner(i), corner((i + 1) % 3));
                 let (target, at) = (p + (q - p) * w, uv + (vw - uv) * w);
-                // Inside the sheet and well inside the mask, so that the surface goes on all around.
+                // Inside the sheet and well inside the mask, so that the surface continues on all sides.
                 let sheet = k >= 2;
                 let around = [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)];
                 let inside = |x: i32, y: i32| vec2(at.x + x as f32 * 0.03, at.y + y as f32 * 0.03);
@@ -176,14 +180,14 @@ fn no_ray_through_a_shared_edge_is_lost() {
                 {
                     continue;
                 }
-                // Toward the ball from outside, anywhere on it; toward the sheet from above or below, not along it.
+                // Rays reach the ball from anywhere outside, and the sheet from above or below, not along it.
                 let origin = if sheet {
                     target + vec3(s.range32(-0.5, 0.5), s.range32(-0.5, 0.5), if s.chance(0.5) { 1.5 } else { -1.5 })
                 } else {
                     unit(&mut s) * 3.0
                 };
                 let ray = Ray::new(origin, (target - origin).normalize());
-                // Not along the ball's outline, where a ray may well miss.
+                // Skip rays along the ball's outline, which may miss it.
                 if !sheet && ray.direction.dot(target) > -0.1 {
                     continue;
                 }
@@ -228,7 +232,8 @@ fn a_ray_ends_where_it_is_told() {
     }
 }
 
-/// Rationale: a part's index is its label; a part without triangles, or with none that its mask leaves, must not shift the rest.
+/// Rationale: a part's index is its label. A part without triangles, or whose mask hides all its triangles, must not
+/// shift the others.
 #[test]
 fn parts_keep_their_index_next_to_empty_ones() {
     let at = |z: f32| square(vec3(0.0, 0.0, z), 1.0);
@@ -244,11 +249,11 @@ fn parts_keep_their_index_next_to_empty_ones() {
     let surfaces = surfaces(&all);
     let embree = EmbreeAccel::build(&surfaces, 1).unwrap();
     let down = |z: f32| embree.closest(&Ray::new(vec3(0.01, 0.02, z), -Vec3::Z));
-    assert_eq!(down(5.0).map(|h| h.part), Some(1), "the clear sheet above is not there");
+    assert_eq!(down(5.0).map(|h| h.part), Some(1), "the transparent sheet above must not be hit");
     assert_eq!(down(-0.5).map(|h| h.part), Some(4));
     assert_eq!(down(-1.5).map(|h| h.part), Some(5));
     assert_eq!(down(-2.5), None);
-    // The degenerate stand-in of an empty part lies at the origin and is never met.
+    // The degenerate placeholder of an empty part is at the origin and is never hit.
     let mut s = stream(4);
     let alone = EmbreeAccel::build(&surfaces[..1], 1).unwrap();
     for _ in 0..1000 {
@@ -279,9 +284,9 @@ fn hits_are_the_same_bits_however_many_threads_build() {
     }
 }
 
-/// Rationale: leaves lie on the soil and on each other. A start that is lifted off the surface by a fixed step jumps over what
-/// touches it, and contact shadows vanish. Expected: between two sheets a hundredth of a millimetre apart a ray that leaves one
-/// meets the other, in any direction, and never the sheet that it leaves.
+/// Rationale: leaves rest on the soil and on each other. If the origin of a ray is moved off the surface by a fixed
+/// step, it skips surfaces that touch, and contact shadows vanish. Expected: between two sheets 0.01 mm apart, a ray
+/// that leaves one hits the other in any direction, and never hits the sheet it leaves.
 #[test]
 fn sheets_that_nearly_touch_are_both_met() {
     const GAP: f32 = 1e-5;
@@ -310,19 +315,20 @@ fn sheets_that_nearly_touch_are_both_met() {
             };
             let down = upper.ray(steep(&mut s, -1.0), f32::INFINITY);
             let below = embree.closest(&down).unwrap_or_else(|| panic!("turn {k}: the contact at {target} is lost"));
-            assert_eq!(below.part, 0, "turn {k}: {down:?} meets the sheet that it leaves");
+            assert_eq!(below.part, 0, "turn {k}: {down:?} hits the sheet that it leaves");
             let lower = Interaction::new(&all[0].0, &below, 0.0);
             let back = embree.closest(&lower.ray(steep(&mut s, 1.0), f32::INFINITY));
             assert_eq!(back.map(|h| h.part), Some(1), "turn {k}: the contact above {target} is lost");
             for away in [upper.ray(steep(&mut s, 1.0), f32::INFINITY), lower.ray(steep(&mut s, -1.0), f32::INFINITY)] {
-                assert!(!embree.occluded(&away), "turn {k}: {away:?} meets the sheet that it leaves");
+                assert!(!embree.occluded(&away), "turn {k}: {away:?} hits the sheet that it leaves");
             }
         }
     }
 }
 
-/// Rationale: camera rays and rays to the sun are asked in packets, which Embree traverses otherwise than single rays. Expected:
-/// the same part and distance, the same shadow, whatever lanes are empty and however the rays of a packet differ.
+/// Rationale: camera rays and sun shadow rays are traced in packets, which Embree traverses differently from single
+/// rays. Expected: the same part, distance and shadow, whichever lanes are empty and however the rays of a packet
+/// differ.
 #[test]
 fn packets_meet_what_single_rays_meet() {
     let thicket = thicket();
@@ -330,7 +336,8 @@ fn packets_meet_what_single_rays_meet() {
     let mut s = stream(7);
     let (mut met, mut dark) = (0, 0);
     for i in 0..20_000 {
-        // From one eye into a narrow cone, and, in every third packet, from and to anywhere; now and then a lane is empty.
+        // Most packets form a narrow cone from one origin; every third has arbitrary origins and directions. Some lanes
+        // are empty.
         let (eye, ahead) = (point(&mut s, 1.5), unit(&mut s));
         let rays: [Option<Ray>; PACKET] = std::array::from_fn(|_| {
             let apart = if i % 3 == 0 { (point(&mut s, 1.5), unit(&mut s)) } else { (eye, ahead) };
@@ -349,11 +356,12 @@ fn packets_meet_what_single_rays_meet() {
             dark += usize::from(shadow);
         }
     }
-    assert!(met > 10_000 && dark > 10_000, "{met} met, {dark} dark");
+    assert!(met > 10_000 && dark > 10_000, "{met} hits, {dark} shadowed");
 }
 
-/// Rationale: ten million triangles for a preview that nobody waits for any more block the one that is waited for. Expected: a build whose
-/// flag is raised ends as an interruption, and one whose flag stays down is built. Source: Embree's progress monitor.
+/// Rationale: building ten million triangles for an outdated preview would delay the preview that the user waits for.
+/// Expected: a build whose stop flag is set ends with an interruption, and one whose flag is not set completes. Source:
+/// Embree's progress monitor.
 #[test]
 fn a_build_that_is_not_wanted_is_given_up() {
     const SIDE: u32 = 500;
@@ -367,7 +375,7 @@ fn a_build_that_is_not_wanted_is_given_up() {
     let mesh = Mesh::smooth(positions, uvs, (0..SIDE * SIDE).flat_map(cell).collect());
     let surfaces = [Surface { mesh: &mesh, mask: None, instance: None }];
     let build = |raised: bool| EmbreeAccel::build_until(&surfaces, 2, Some(&AtomicBool::new(raised)), None);
-    assert_eq!(build(true).err().map(|e| e.kind()), Some(furrow::error::Kind::Interrupted));
+    assert_eq!(build(true).err().map(|e| e.kind()), Some(furrow_base::error::Kind::Interrupted));
     let down = Ray::new(vec3(3.3, 4.4, 10.0), vec3(0.0, 0.0, -1.0));
     assert!(build(false).unwrap().closest(&down).is_some());
 }

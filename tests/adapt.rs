@@ -1,14 +1,17 @@
-//! Self-training: photographs without labels make a network better on them.
+//! Self-training: photographs without labels improve a network on photographs like them.
 //!
-//! Rationale: a network that comes to believe itself gets worse without a word, and one that reads the labels of what it is tested on is
-//! no result. Expected: on pictures in another light than those it was trained on, better overlap after self-training on others of that
-//! light; the same weights whatever labels lie beside them, stopped or not; one clear error for what cannot be begun. Source: the
-//! pictures' construction, and what `train adapt --help` says.
+//! Rationale: a network that reinforces its own errors gets worse unnoticed, and one that reads the labels of its test
+//! images proves nothing.
+//!
+//! Expected: for images under another light than the training images, a higher IoU after self-training on other images
+//! of that light; the same weights whatever labels are stored beside the photographs, and whether the run is
+//! interrupted or not; one clear error for invalid arguments. Source: the construction of the images, and the output of
+//! `train adapt --help`.
 
-use furrow::output::{Picture, write_png};
-use furrow::sampling::{Purpose, Stream};
-use furrow::train::measure::Report;
-use furrow::train::run::{self, Results};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_output::{Picture, write_png};
+use furrow_train::measure::Report;
+use furrow_train::run::{self, Results};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -17,11 +20,12 @@ use std::time::Duration;
 
 const SIZE: (u32, u32) = (64, 48);
 
-/// Colours of soil, large plants and small ones: a field in daylight, and the same under a warm lamp through haze.
+/// Colours of soil, large plants and small plants: a field in daylight, and the same under a warm lamp through haze.
 const DAY: [[u8; 3]; 3] = [[120, 95, 70], [70, 150, 50], [80, 150, 45]];
 const LAMP: [[u8; 3]; 3] = [[150, 135, 95], [112, 145, 72], [122, 148, 70]];
 
-/// A set of ground with large discs, the crop, and small ones, the weeds. Without labels every pixel is 255.
+/// Builds a set of images of soil with large discs (crop) and small discs (weeds). Without labels, every pixel of the
+/// masks is 255.
 fn set(folder: &Path, colors: [[u8; 3]; 3], first: u64, labelled: bool) -> PathBuf {
     let (photos, masks, out) = (folder.join("images"), folder.join("masks"), folder.join("set"));
     let (w, h) = SIZE;
@@ -60,7 +64,7 @@ fn succeed(arguments: &str) {
     assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A network trained on eight images of the first light; their set lies in `day` beside it. Stays until the next time.
+/// A network trained on eight daylight images, whose dataset is in `day` beside it. Kept until the next run.
 static TRAINED: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("adapt");
     if folder.exists() {
@@ -72,7 +76,7 @@ static TRAINED: LazyLock<PathBuf> = LazyLock::new(|| {
     out
 });
 
-/// Mean I/U of the classes.
+/// Evaluates a run on a set and returns the mean IoU of the classes.
 fn score(run: &Path, set: &Path) -> f64 {
     succeed(&format!("eval {} --set {}@all", run.display(), set.display()));
     let report: Report = run::read_json(&run.join("eval/set/report.json")).unwrap();
@@ -101,7 +105,7 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
     let after = score(&adapted, &test);
     assert!(after > before + 0.05, "{before:.3} before, {after:.3} after");
 
-    // Labels that lie beside the photographs are not read; neither does it matter where these are.
+    // Labels stored beside the photographs are not read, and the folder of the photographs does not matter.
     let sources = [images.clone(), labelled.display().to_string(), folder.join("photos/images").display().to_string()];
     let few = sources.iter().enumerate().map(|(k, from)| {
         let out = folder.join(format!("few-{k}"));
@@ -109,9 +113,9 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
         weights(&out)
     });
     let few: Vec<Vec<u8>> = few.collect();
-    assert!(few.iter().all(|bytes| *bytes == few[0]), "labels or folders were looked at");
+    assert!(few.iter().all(|bytes| *bytes == few[0]), "the weights depend on labels or folders");
 
-    // Stopped, the same command goes on and ends the same.
+    // After interruptions, the same command resumes and ends with the same weights.
     let (whole, stopped) = (folder.join("whole"), folder.join("stopped"));
     succeed(&adapt(&images, &whole, 10));
     let mut stops = 0;
@@ -121,20 +125,20 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
         let _ = Command::new("sh").arg("-c").arg(format!("kill -TERM {}", child.id())).status();
         stops += usize::from(!child.wait().unwrap().success());
     }
-    assert!(stops > 0, "it was always done before it was stopped");
+    assert!(stops > 0, "every run finished before it could be stopped");
     succeed(&adapt(&images, &stopped, 10));
     assert_eq!(weights(&stopped), weights(&whole));
 
-    // The report and the plan say what it was.
+    // The report and the plan record that photographs were used.
     let page = fs::read_to_string(adapted.join("report.html")).unwrap();
-    assert!(page.contains("8 photographs without labels"), "the report does not tell of photographs");
+    assert!(page.contains("8 photographs without labels"), "the report does not mention the photographs");
     let plan = fs::read_to_string(adapted.join(run::PLAN)).unwrap();
     assert!(plan.contains("photos_sha256"), "{plan}");
 
-    // Another folder of photographs is another training.
+    // Another folder of photographs is a different training run.
     let others = set(&folder.join("others"), LAMP, 300, false);
     let refused = refuse(&adapt(&others.display().to_string(), &adapted, 40));
-    assert!(refused.contains("another training lies in this folder"), "{refused}");
+    assert!(refused.contains("this folder contains another training"), "{refused}");
 }
 
 fn refuse(arguments: &str) -> String {
@@ -166,7 +170,7 @@ fn what_cannot_be_adapted_is_told() {
         assert!(said.contains(words), "{more}: {said}");
         assert!(!out.exists(), "{more} has left a folder");
     }
-    // Weights alone, without a plan: what they were trained on must be named.
+    // Weights without a plan: the user must name the training set.
     let alone = folder.join("alone");
     fs::create_dir(&alone).unwrap();
     for file in [run::WEIGHTS, run::MODEL] {
@@ -179,8 +183,9 @@ fn what_cannot_be_adapted_is_told() {
     succeed(&format!("adapt {alone} --images {images} --set {set}@all --out {out} --steps 2"));
 }
 
-/// Rationale: who has labels of some photographs wants to see whether self-training helps while it goes on. Expected: with a validation set the log
-/// has its loss and I/U and the event file its pictures; its images decide which weights are kept and nothing of how they are learnt.
+/// Rationale: users who have labels for some photographs want to see whether self-training helps while it runs.
+/// Expected: with a validation set, the log has its loss and IoU and the event file has its images; the validation
+/// images decide which weights are kept, and do not affect the training.
 #[test]
 fn a_validation_set_is_logged_and_not_learnt_from() {
     let scratch = tempfile::tempdir().unwrap();
@@ -200,13 +205,13 @@ fn a_validation_set_is_logged_and_not_learnt_from() {
     assert!(pass.step == 5 && pass.iou.len() == 3 && pass.miou > 0.0 && pass.loss.is_some(), "{pass:?}");
     assert_eq!(with.best_step, Some(5));
     assert_eq!(with.history.losses, without.history.losses);
-    // Behind the head, which names the plan: eight bytes of its length, and it.
+    // The arrays follow the header, which contains the plan: eight bytes of header length, then the header.
     let arrays = |name: &str| {
         let bytes = weights(&folder.join(name));
         let head = usize::try_from(u64::from_le_bytes(bytes[..8].try_into().unwrap())).unwrap();
         bytes[8 + head..].to_vec()
     };
-    assert!(arrays("with") == arrays("without"), "a validation set moves weights");
+    assert!(arrays("with") == arrays("without"), "a validation set changes the weights");
     let log = fs::read_to_string(folder.join("with/log.csv")).unwrap();
     let cells: Vec<&str> = log.lines().last().unwrap().split(',').collect();
     assert!(cells.len() == 8 && cells[0] == "5" && cells.iter().all(|cell| !cell.is_empty()), "{log}");

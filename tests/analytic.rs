@@ -1,17 +1,18 @@
-//! Rationale: scenes whose radiance is known in closed form leave an integrator no excuse. Every technique of the path tracer is
-//! switched on and off on each: the mean must not move.
-//! Expected: the mean over all pixels lies within five and a half standard errors of the closed form, which all comparisons of the
-//! file together exceed once in 10⁴ draws, and its error is small enough to mean something (below 2 %).
-//! Source: radiometry, each formula stands at its scene.
+//! Scenes whose radiance is known in closed form, rendered with every technique of the path tracer switched on and off.
+//!
+//! Rationale: a closed form exposes any bias of an integrator, and no technique may change the mean. Expected: the mean
+//! over all pixels is within `limit` standard errors of the closed form, a bound that all comparisons in this file
+//! together exceed once in 10⁴ runs with other seeds; the standard error is at most 2 %, so that the comparison is
+//! meaningful. Source: radiometry; each test states its formula.
 
 use crate::common::scenes::{camera, scene, shoot, sphere, square};
 use crate::common::stats::{p_value, sidak};
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
-use furrow::film::Film;
-use furrow::integrator::{PathTracer, Technique};
-use furrow::light::{Constant, Lamp, Light, Outline, Sun};
-use furrow::math::{Frame, Spectrum, Vec3, vec3};
-use furrow::scene::Scene;
+use furrow_base::math::{Frame, Spectrum, Vec3, vec3};
+use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar};
+use furrow_optics::light::{Constant, Lamp, Light, Outline, Sun};
+use furrow_render::film::Film;
+use furrow_render::integrator::{PathTracer, Technique};
+use furrow_render::scene::Scene;
 
 const RHO: Spectrum = Spectrum::new(0.6, 0.3, 0.1, 0.8);
 
@@ -23,7 +24,8 @@ fn sky(radiance: f32) -> Light {
     Light::Constant(Constant::new(Spectrum::splat(radiance)))
 }
 
-/// All combinations of techniques under which a scene's light can be found.
+/// Returns all combinations of techniques that can find the light of a scene. `by_chance`: whether BSDF sampling alone
+/// can hit the light.
 fn techniques(by_chance: bool) -> Vec<PathTracer> {
     let mut all = Vec::new();
     for roulette in [false, true] {
@@ -44,8 +46,8 @@ fn mean(film: &Film) -> (Spectrum, Spectrum) {
     (sum / n, variance.map(f32::sqrt) / n)
 }
 
-/// Standard errors that none of the file's comparisons exceeds without a fault, but once in 10⁴ runs of other seeds: two thousand
-/// pixels, bands and means are compared.
+/// Bound in standard errors that a correct program exceeds in any comparison of this file only once in 10⁴ runs with
+/// other seeds. Up to 2000 pixels, bands and means are compared.
 fn limit() -> f32 {
     let level = sidak(1e-4, 2000);
     (0..100).map(|i| 4.0 + 0.05 * i as f32).find(|z| p_value(f64::from(*z)) < level).expect("a limit below 9")
@@ -56,18 +58,22 @@ fn expect(name: &str, scene: &Scene, by_chance: bool, spp: u32, expected: Spectr
         let (got, error) = mean(&shoot(scene, path, spp, 40 + k as u64));
         for band in 0..4 {
             let (g, e, x) = (got.to_array()[band], error.to_array()[band], expected.to_array()[band]);
-            // Rounding of a long sum in single precision: 1e-4 of the value.
+            // Tolerance for rounding of a long sum in single precision: 2e-4 of the value.
             assert!(
                 (g - x).abs() <= limit() * e + 2e-4 * x + 1e-7,
                 "{name}, {:?}, band {band}: {g} ± {e}, not {x}",
                 path.technique
             );
-            assert!(e <= 0.02 * x.max(1e-3), "{name}, {:?}: error {e} of {x} says nothing", path.technique);
+            assert!(
+                e <= 0.02 * x.max(1e-3),
+                "{name}, {:?}: error {e} of {x} is too large to test anything",
+                path.technique
+            );
         }
     }
 }
 
-/// A convex Lambert body sees only the sky: L = ρ L_sky everywhere on it.
+/// Convex Lambertian body under a constant sky: L = ρ L_sky everywhere on it.
 #[test]
 fn a_sphere_under_a_constant_sky_shows_rho_times_the_sky() {
     let eye = camera((16, 16), vec3(0.0, -4.0, 0.0), Vec3::ZERO, 12.0);
@@ -75,7 +81,7 @@ fn a_sphere_under_a_constant_sky_shows_rho_times_the_sky() {
     expect("sphere", &s, true, 64, RHO * 1.5);
 }
 
-/// L = ρ E cos θ / π.
+/// Lambertian plane under the sun: L = ρ E cos θ / π.
 #[test]
 fn a_plane_under_the_sun_shows_rho_e_cos_theta_over_pi() {
     let eye = camera((8, 8), vec3(0.0, 0.0, 1.0), Vec3::ZERO, 20.0);
@@ -95,7 +101,8 @@ fn a_leaf_from_below_shows_its_transmittance() {
     expect("leaf", &s, false, 64, t * (0.8 / std::f32::consts::PI));
 }
 
-/// Two parallel diffusers, the sheet so wide that its edge does not count: R + T² ρ / (1 − R ρ) of a constant sky.
+/// Two parallel diffusers under a constant sky, the sheet so wide that its edge is negligible: L / L_sky = R + T² ρ /
+/// (1 − R ρ).
 #[test]
 fn a_leaf_sheet_over_soil_follows_the_adding_formula() {
     let (r, t) = (Spectrum::new(0.06, 0.1, 0.05, 0.45), Spectrum::new(0.05, 0.12, 0.02, 0.5));
@@ -109,13 +116,13 @@ fn a_leaf_sheet_over_soil_follows_the_adding_formula() {
     expect("sheet", &s, true, 4096, r + t * t * RHO / (one - r * RHO));
 }
 
-/// R + T = 1 and no coat: whatever enters leaves, every pixel shows the sky.
+/// R + T = 1 and no coat: all light that enters leaves again, so every pixel shows the sky.
 #[test]
 fn a_white_leaf_vanishes_in_a_furnace() {
     let eye = camera((16, 16), vec3(0.0, -3.0, 1.0), Vec3::ZERO, 40.0);
     let leaf = Bsdf::Leaf(Leaf::bare(Spectrum::splat(0.4), Spectrum::splat(0.6)));
     let mut crossed = square(vec3(0.2, 0.0, 0.1), 1.0);
-    crossed.transform(furrow::math::Mat3::from_rotation_x(1.1), Vec3::ZERO);
+    crossed.transform(furrow_base::math::Mat3::from_rotation_x(1.1), Vec3::ZERO);
     let s = scene(vec![(square(Vec3::ZERO, 1.5), leaf), (crossed, leaf)], vec![sky(1.0)], eye);
     let path = PathTracer {
         max_depth: 200,
@@ -134,7 +141,7 @@ fn a_white_leaf_vanishes_in_a_furnace() {
     assert!((got.mean() - 1.0).abs() < limit() * error.max() + 1e-4, "{got:?} ± {error:?}");
 }
 
-/// Below the middle of a disc lamp of radius r at height h: E = π L r² / (r² + h²).
+/// Below the centre of a disc lamp with radius r at height h: E = π L r² / (r² + h²).
 #[test]
 fn a_disc_lamp_lights_what_lies_below_it() {
     let (r, h) = (0.2_f32, 0.5_f32);
@@ -145,8 +152,8 @@ fn a_disc_lamp_lights_what_lies_below_it() {
     expect("lamp", &s, true, 4096, RHO * radiance * (r * r / (r * r + h * h)));
 }
 
-/// An integrating sphere: what a lamp of flux Φ does not light itself sees the rest evenly, L = ρ² Φ / (π A (1 − ρ)). The lamp turns
-/// its back on the world's origin, so that nothing there tells what light is usual.
+/// Integrating sphere: the part of the wall that a lamp of flux Φ does not light directly has uniform radiance L = ρ² Φ
+/// / (π A (1 − ρ)). The lamp faces away from the world's origin, so that the origin is not representative of the light.
 #[test]
 fn an_integrating_sphere_glows_evenly_where_its_lamp_does_not_shine() {
     let (radius, r, radiance) = (1.0_f32, 0.1_f32, Spectrum::splat(100.0));
@@ -166,7 +173,7 @@ fn an_integrating_sphere_glows_evenly_where_its_lamp_does_not_shine() {
     );
 }
 
-/// Oren–Nayar never returns more than Lambert, nor does a wet film; a closed view of both stays below the furnace.
+/// Oren–Nayar never reflects more than Lambert, nor does a wet film; in a furnace, both stay below the sky's radiance.
 #[test]
 fn no_example_surface_shines_brighter_than_the_sky() {
     for (name, bsdf) in Bsdf::examples() {

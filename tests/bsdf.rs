@@ -1,23 +1,25 @@
-//! Every scattering keeps its contract.
+//! Contracts of every BSDF.
 //!
-//! Rationale: the path tracer trusts three functions to be one thing: `sample` draws by `pdf`, and its weight is `eval / pdf`. If
-//! they drift apart, or a surface returns more than it gets, images are wrong and look right.
-//! Expected: χ² tests pass from above and below; weights, densities and integrals agree; no surface gains energy; light paths
-//! may be walked either way; a leaf returns the R and T it was given.
-//! Source: the χ² and energy tests of pbrt, Mitsuba and nori; Helmholtz reciprocity; quadrature of Fresnel's equations.
+//! Rationale: the path tracer assumes that `sample` draws directions with density `pdf`, and that the weight is
+//! `eval / pdf`. If the three functions disagree, or a surface reflects more light than it receives, images are wrong
+//! but look plausible.
+//!
+//! Expected: χ² tests pass from above and below; weights, densities and integrals agree; no surface gains energy;
+//! scattering is reciprocal; a leaf has the R and T it was given. Source: the χ² and energy tests of pbrt, Mitsuba and
+//! nori; Helmholtz reciprocity; quadrature of Fresnel's equations.
 
 use crate::common::chi2::check_sphere;
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, SurfaceLayer, Wet, fresnel};
-use furrow::math::{Spectrum, Vec3, direction, vec3};
-use furrow::sampling::{Purpose, Sampler, Stream};
+use furrow_base::math::{Spectrum, Vec3, direction, vec3};
+use furrow_base::sampling::{Purpose, Sampler, Stream};
+use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar, Scatter, Side, SurfaceLayer, Wet, fresnel};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Directions to the eye: (zenith, azimuth) in degrees; at the top, oblique, and close to the horizon.
+/// Outgoing directions as (zenith, azimuth) in degrees: vertical, oblique, and near the horizon.
 const EYES: [(f32, f32); 5] = [(0.0, 0.0), (25.0, 40.0), (50.0, 130.0), (70.0, 250.0), (86.0, 340.0)];
 
-/// The five above and the same five below.
+/// Returns the five outgoing directions above the surface, and their mirror images below it.
 fn eyes() -> impl Iterator<Item = Vec3> {
     let above = EYES.map(|(zenith, azimuth)| direction(zenith.to_radians(), azimuth.to_radians()));
     above.into_iter().chain(above.map(|w| vec3(w.x, w.y, -w.z)))
@@ -27,7 +29,7 @@ fn stream() -> Stream {
     Stream::of(5, 0, Purpose::Test, 0)
 }
 
-/// Uniform on the sphere.
+/// Returns a random direction, uniform on the sphere.
 fn anywhere(s: &mut Stream) -> Vec3 {
     let z = s.range32(-1.0, 1.0);
     let phi = s.range32(0.0, std::f32::consts::TAU);
@@ -35,8 +37,8 @@ fn anywhere(s: &mut Stream) -> Vec3 {
     vec3(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// What a surface reflects and transmits of the light from a whole hemisphere of 1, as seen from `wo`, and its standard error.
-/// Sobol points; the error is that between scrambles, not that of independent draws.
+/// Directional-hemispherical reflectance and transmittance as seen from `wo`, each with its standard error. Uses Sobol
+/// points; the error is estimated between scrambles, not between independent samples.
 fn albedo(bsdf: &impl Scatter, wo: Vec3, samples: u32) -> [(Spectrum, f32); 2] {
     const SCRAMBLES: u32 = 8;
     let mut means = [[Spectrum::ZERO; SCRAMBLES as usize]; 2];
@@ -56,7 +58,7 @@ fn albedo(bsdf: &impl Scatter, wo: Vec3, samples: u32) -> [(Spectrum, f32); 2] {
     })
 }
 
-/// ∫ f dω over the hemisphere on the side of `side`, by the midpoint rule in zenith and azimuth.
+/// ∫ f dω over the hemisphere whose z has the sign of `side`, by the midpoint rule in zenith and azimuth.
 fn hemisphere(side: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     const RINGS: u32 = 400;
     const SECTORS: u32 = 400;
@@ -72,7 +74,7 @@ fn hemisphere(side: f32, f: impl Fn(Vec3) -> f64) -> f64 {
     sum * FRAC_PI_2 / f64::from(RINGS) * TAU / f64::from(SECTORS)
 }
 
-/// Method 1. The χ² test also compares what the density leaves of one with the share of absorbed draws.
+/// Method 1. The χ² test also compares 1 − ∫ pdf with the fraction of absorbed samples.
 #[test]
 fn every_scattering_draws_directions_by_its_density() {
     for (name, bsdf) in Bsdf::examples() {
@@ -87,7 +89,7 @@ fn every_scattering_draws_directions_by_its_density() {
     }
 }
 
-/// Method 2. Rationale: multiple importance sampling asks for the density of a direction that another strategy drew.
+/// Method 2. Rationale: multiple importance sampling needs the density of a direction that another strategy sampled.
 #[test]
 fn a_samples_weight_and_density_are_those_of_its_direction() {
     for (name, bsdf) in Bsdf::examples() {
@@ -97,7 +99,7 @@ fn a_samples_weight_and_density_are_those_of_its_direction() {
             for _ in 0..4000 {
                 let Some(sample) = bsdf.sample(wo, [s.uniform32(), s.uniform32(), s.uniform32()]) else { continue };
                 drawn += 1;
-                assert!((sample.wi.length() - 1.0).abs() < 1e-5, "{name}: {} is no unit vector", sample.wi);
+                assert!((sample.wi.length() - 1.0).abs() < 1e-5, "{name}: {} is not a unit vector", sample.wi);
                 let (f, pdf) = (bsdf.eval(wo, sample.wi), bsdf.pdf(wo, sample.wi));
                 assert!(pdf > 0.0 && (sample.pdf / pdf - 1.0).abs() < 1e-5, "{name}: {} for {pdf}", sample.pdf);
                 for (w, f) in sample.weight.to_array().into_iter().zip(f.to_array()) {
@@ -107,14 +109,15 @@ fn a_samples_weight_and_density_are_those_of_its_direction() {
                         sample.wi
                     );
                 }
-                assert!(bsdf.transmits() || sample.wi.z * wo.z > 0.0, "{name} lets light through");
+                assert!(bsdf.transmits() || sample.wi.z * wo.z > 0.0, "{name} transmits light");
             }
-            assert!(drawn > 2000, "{name} from {wo}: only {drawn} of 4000 draws scatter");
+            assert!(drawn > 2000, "{name} from {wo}: only {drawn} of 4000 samples scatter");
         }
     }
 }
 
-/// Method 2. Expected: 1 − ∫ pdf is the share of draws that are absorbed; ∫ eval by quadrature and by importance agree.
+/// Method 2. Expected: 1 − ∫ pdf is the fraction of absorbed samples; ∫ eval by quadrature agrees with the
+/// importance-sampled estimate.
 #[test]
 fn importance_and_uniform_estimates_agree() {
     for (name, bsdf) in Bsdf::examples() {
@@ -129,7 +132,7 @@ fn importance_and_uniform_estimates_agree() {
                 bsdf.sample(wo, [u[0], u[1], u[2]]).is_some()
             });
             let kept = drawn.count() as f64 / f64::from(draws);
-            assert!((mass - kept).abs() < 4e-3, "{name} from {wo}: ∫ pdf = {mass}, but {kept} of all draws scatter");
+            assert!((mass - kept).abs() < 4e-3, "{name} from {wo}: ∫ pdf = {mass}, but {kept} of all samples scatter");
             for (k, (got, error)) in albedo(&scatter, wo, 2048).into_iter().enumerate() {
                 let away = if k == 0 { side } else { -side };
                 for band in 0..4 {
@@ -141,7 +144,7 @@ fn importance_and_uniform_estimates_agree() {
                         "{name} from {wo}, side {k}: {importance} ± {error}, not {quadrature}"
                     );
                     if matches!(bsdf, Bsdf::OrenNayar(_)) && name == "lambert" {
-                        break; // Its bands are alike.
+                        break; // All its bands are equal.
                     }
                 }
             }
@@ -149,7 +152,7 @@ fn importance_and_uniform_estimates_agree() {
     }
 }
 
-/// A `Bsdf` as what it promises to be.
+/// Wraps a `Bsdf` so that only the `Scatter` trait is tested.
 struct Any(Bsdf);
 
 impl Scatter for Any {
@@ -157,13 +160,13 @@ impl Scatter for Any {
         self.0.eval_pdf(wo, wi)
     }
 
-    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<furrow::bsdf::BsdfSample> {
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<furrow_optics::bsdf::BsdfSample> {
         self.0.sample(wo, u)
     }
 }
 
-/// Method 5. `eval` holds |cos θi|, so f(a, b) = eval(a, b) / |cos b| must equal f(b, a). For a leaf this includes transmission:
-/// seen from above and lit from below, or the other way round.
+/// Method 5: reciprocity. `eval` includes |cos θi|, so f(a, b) = eval(a, b) / |cos b| must equal f(b, a). For a leaf
+/// this includes transmission: seen from above and lit from below, or the reverse.
 #[test]
 fn light_paths_may_be_walked_either_way() {
     for (name, bsdf) in Bsdf::examples() {
@@ -190,8 +193,9 @@ fn coated(alpha: [f32; 2], ior: f32, r: f32, t: f32) -> Leaf {
     Leaf::new(side, side, Spectrum::splat(t))
 }
 
-/// Rationale: leaf models and spectrometers give the reflectance and transmittance of a leaf lit from straight above, gloss and
-/// all; that is what the renderer must show. Expected: within 1 % from either side, smooth, rough and brushed.
+/// Rationale: leaf models and spectrometers give the reflectance and transmittance of a leaf at normal incidence, gloss
+/// included; the rendered leaf must have the same values. Expected: within 1 % from either side, for smooth, rough and
+/// anisotropic coats.
 #[test]
 fn a_leaf_returns_the_r_and_t_it_was_given_at_normal_incidence() {
     for alpha in [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [0.45, 0.45], [0.6, 0.6], [0.5, 0.2]] {
@@ -207,7 +211,7 @@ fn a_leaf_returns_the_r_and_t_it_was_given_at_normal_incidence() {
     }
 }
 
-/// Expected: R + T at normal incidence bounds R + T at every other, but for a thousandth, for all roughnesses of leaves.
+/// Expected: for all roughnesses of leaves, R + T at any incidence exceeds R + T at normal incidence by at most 0.001.
 #[test]
 fn a_leaf_never_returns_more_than_it_receives() {
     for alpha in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6] {
@@ -227,7 +231,7 @@ fn a_leaf_never_returns_more_than_it_receives() {
     }
 }
 
-/// White furnace: without a coat R + T = 1 means that every draw scatters and carries a weight of exactly one.
+/// White furnace: without a coat, R + T = 1 means that every sample scatters with a weight of exactly one.
 #[test]
 fn a_white_bare_leaf_passes_on_everything() {
     for r in [0.0, 0.25, 0.45, 1.0] {
@@ -247,9 +251,10 @@ fn a_white_bare_leaf_passes_on_everything() {
     }
 }
 
-/// Rationale: hairs and wax absorb nothing, so a white leaf stays white but for what goes to and fro between tissue and layer.
-/// Expected: never more than 1, and no less than 1 − 1.1 τ within 70° of the normal, 1 − 2.5 τ to 86°; over black, what single scattering gives along the normal,
-/// ½ ∫ μ (1 − e^{−τ(1 + 1/μ)}) / (1 + μ) dμ.
+/// Rationale: trichomes and wax absorb nothing, so a white leaf stays white except for light that is lost between
+/// tissue and layer. Expected: at most 1, and at least 1 − 1.1 τ within 70° of the normal and 1 − 2.5 τ up to 86°. Over
+/// black tissue, the reflectance along the normal is that of single scattering, ½ ∫ μ (1 − e^{−τ(1 + 1/μ)}) / (1 + μ)
+/// dμ.
 #[test]
 fn a_veil_hides_and_scatters_but_takes_nothing() {
     for hairs in [0.02_f32, 0.1, 0.3] {
@@ -277,7 +282,8 @@ fn a_veil_hides_and_scatters_but_takes_nothing() {
     }
 }
 
-/// Expected: a bloom makes a leaf bluer, hairs make it paler in all bands alike; both take gloss; none is no layer at all.
+/// Expected: a wax bloom makes a leaf bluer, and trichomes make it paler by the same amount in all bands; both reduce
+/// gloss; with neither, no layer is present.
 #[test]
 fn bloom_is_blue_and_hairs_are_white() {
     let black = |hairs, bloom| {
@@ -299,7 +305,7 @@ fn bloom_is_blue_and_hairs_are_white() {
     assert!(SurfaceLayer::new(0.0, 0.0).is_none());
 }
 
-/// Source: Oren & Nayar's qualitative model leaves out what facets pass to each other.
+/// Source: Oren & Nayar's qualitative model, which omits interreflection between facets.
 #[test]
 fn rough_soil_never_returns_more_than_a_lambert_surface() {
     for sigma in [0.05, 0.2, 0.35, 0.5, 0.7, 1.0] {
@@ -316,8 +322,9 @@ fn rough_soil_never_returns_more_than_a_lambert_surface() {
     assert!((f64::from(flat) - 0.4 * 0.8 / PI).abs() < 1e-6, "σ = 0 is Lambert's law");
 }
 
-/// Rationale: the film's constants are written out, not computed. Expected: what comes out of [`Wet`] agrees with Fresnel's
-/// equations: a black soil under a whole film reflects F₀ of water; straight through, twice (1 − F₀)² / ((1 − F₀)(1 − F̄)).
+/// Rationale: the constants of the water film are written as literals. Expected: [`Wet`] agrees with Fresnel's
+/// equations: a black soil under a complete film reflects F₀ of water; the transmission at normal incidence, both ways,
+/// is (1 − F₀)² / ((1 − F₀)(1 − F̄)).
 #[test]
 fn the_constants_of_wet_soil_are_those_of_water() {
     const WATER: f32 = 1.33;
@@ -326,7 +333,7 @@ fn the_constants_of_wet_soil_are_those_of_water() {
     let shown = film(0.0).albedo().max();
     assert!((shown - f0).abs() < 1e-5, "F₀ is {shown}, not {f0}");
     let wi = vec3(0.6, 0.0, 0.8);
-    // The difference of two soils under one film: the coat cancels.
+    // The coat cancels in the difference of two soils under the same film.
     let difference = film(0.7).eval(Vec3::Z, wi) - film(0.2).eval(Vec3::Z, wi);
     let through = difference.max() / 0.5 * std::f32::consts::PI / wi.z;
     let norm = (1.0 - f0) * (1.0 - fresnel::hemispherical(WATER));
@@ -338,7 +345,7 @@ fn fixed(cases: u32) -> ProptestConfig {
     ProptestConfig { cases, rng_seed: RngSeed::Fixed(20170927), failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// Method 4: the mean weight from `wo` is at most one, and finite.
+/// Method 4: the mean weight from `wo` is finite and at most one.
 fn keeps_energy(bsdf: &impl Scatter, wo: Vec3, slack: f32) -> Result<(), TestCaseError> {
     let [(r, e), (t, f)] = albedo(bsdf, wo, 512);
     let all = (r + t).max();
@@ -356,7 +363,8 @@ fn eye() -> impl Strategy<Value = Vec3> {
 proptest! {
     #![proptest_config(fixed(400))]
 
-    /// A leaf of any index, roughness and anisotropy, whose sides differ; R at least what the coat alone reflects.
+    /// A leaf with any refractive index, roughness and anisotropy, whose sides differ; R is at least the coat's
+    /// reflectance.
     #[test]
     fn no_leaf_gains_energy(
         ior in 1.3_f32..1.6, front in prop::array::uniform2(0.1_f32..0.6), back in prop::array::uniform2(0.1_f32..0.6),
@@ -369,13 +377,13 @@ proptest! {
         keeps_energy(&Leaf::new(side(front, r[0]), side(back, r[1]), Spectrum::splat(t)), wo, 2e-3)?;
     }
 
-    /// Oren–Nayar of any roughness.
+    /// Oren–Nayar with any roughness.
     #[test]
     fn no_soil_gains_energy(rho in 0.0_f32..1.0, sigma in 0.0_f32..1.0, wo in eye()) {
         keeps_energy(&OrenNayar::new(Spectrum::new(rho, 1.0, 0.0, rho), sigma), wo, 1e-4)?;
     }
 
-    /// Soil of any roughness under any share of a film of any roughness.
+    /// Soil of any roughness, covered to any fraction by a film of any roughness.
     #[test]
     fn no_wet_soil_gains_energy(
         rho in 0.03_f32..1.0, sigma in 0.0_f32..1.0, film in 0.0_f32..1.0, alpha in 0.02_f32..0.6, wo in eye(),
@@ -383,7 +391,7 @@ proptest! {
         keeps_energy(&Wet::new(Spectrum::new(rho, 1.0, 0.03, rho), sigma, film, alpha), wo, 2e-3)?;
     }
 
-    /// The extremes of roughness that a page may write: worse than a thousandth is allowed here, a hundredth is not.
+    /// The extreme roughnesses that a scene file may contain: here a gain of up to 0.01 is allowed instead of 0.001.
     #[test]
     fn even_extreme_coats_gain_little(
         ior in 1.3_f32..1.6, alpha in prop::array::uniform2(0.02_f32..1.0), r in 0.06_f32..1.0, wo in eye(),

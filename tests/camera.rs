@@ -1,34 +1,38 @@
-//! A driving camera, traced: trails and leaning rows, and labels that lean with them and are not blurred.
+//! A moving camera, path-traced: motion blur and rolling shutter, with labels that follow the rolling shutter but are
+//! not blurred.
 //!
-//! Rationale: a robot's pictures are taken while it drives; what moves in them must move in their labels, and nothing else. Expected: an edge
-//! on the ground becomes a ramp of speed × exposure × pixels a metre; with a rolling shutter it leans by speed × readout × pixels a metre
-//! over the image's height, in light and labels alike; any number of threads gives the same bits. Source: geometry.
+//! Rationale: a robot records images while it drives; objects that shift in the image must shift in the labels too.
+//! Expected: an edge on the ground becomes a ramp of width speed × exposure × pixels per metre; with a rolling shutter
+//! it shifts by speed × readout time × pixels per metre over the height of the image, in the image and the labels
+//! alike; any number of threads gives the same bits. Source: geometry.
 
 use crate::common::scenes::{camera, scene, shoot, square, with_world};
-use furrow::accel::EmbreeAccel;
-use furrow::bsdf::{Bsdf, OrenNayar};
-use furrow::film::Film;
-use furrow::geometry::Window;
-use furrow::integrator::PathTracer;
-use furrow::math::{Spectrum, Vec3, vec3};
-use furrow::render::label::NONE;
-use furrow::render::{self, Settings, label};
-use furrow::sampling::Points;
-use furrow::scene::Scene;
-use furrow::sensor::Motion;
+use furrow_base::geometry::Window;
+use furrow_base::math::{Spectrum, Vec3, vec3};
+use furrow_base::sampling::Points;
+use furrow_optics::bsdf::{Bsdf, OrenNayar};
+use furrow_optics::sensor::Motion;
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::Film;
+use furrow_render::integrator::PathTracer;
+use furrow_render::render::label::NONE;
+use furrow_render::render::{self, Settings, label};
+use furrow_render::scene::Scene;
 
 const SIZE: (u32, u32) = (64, 48);
 
-/// The ground ends at x = 0, in the image's middle; pixels a metre there.
+/// Builds a scene whose ground ends at x = 0, in the middle of the image; returns it with the number of pixels per
+/// metre there.
 fn edge(motion: Motion) -> (Scene, f64) {
     let eye = camera(SIZE, vec3(0.0, 0.0, 1.0), Vec3::ZERO, 60.0).with_motion(motion);
     let ground = (square(vec3(-4.0, 0.0, 0.0), 8.0), Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(0.5), 0.0)));
     (scene(vec![ground], Vec::new(), eye), eye.intrinsics()[0])
 }
 
-/// Share of the samples of each pixel that met the ground, row by row.
+/// Fraction of the samples of each pixel that hit the ground, row by row.
 fn shares(film: &Film) -> Vec<Vec<f64>> {
-    let share = |p: &furrow::film::Pixel| p.tally.iter().map(|(_, n)| f64::from(n)).sum::<f64>() / f64::from(p.samples);
+    let share =
+        |p: &furrow_render::film::Pixel| p.tally.iter().map(|(_, n)| f64::from(n)).sum::<f64>() / f64::from(p.samples);
     film.pixels.chunks(SIZE.0 as usize).map(|row| row.iter().map(share).collect()).collect()
 }
 
@@ -40,7 +44,7 @@ fn a_moving_edge_is_as_wide_as_the_way_driven() {
     let (scene, _) = edge(motion);
     for row in shares(&shoot(&scene, &PathTracer::default(), 256, 1)) {
         for (x, share) in row.iter().enumerate() {
-            // From 8 pixels before the edge's place in the middle of the exposure to 8 behind it.
+            // The ramp extends from 8 pixels before the edge's position at mid-exposure to 8 pixels after it.
             let expected = ((40.0 - (x as f64 + 0.5)) / 16.0).clamp(0.0, 1.0);
             assert!((share - expected).abs() < 0.03, "pixel {x}: {share} for {expected}");
         }

@@ -1,35 +1,36 @@
-//! Classes that a user asks for, what else formats leave out, and which maps images keep.
+//! User-defined classes, plants that formats leave out, and which maps an image keeps.
 //!
-//! Rationale: a class of a user's own must mean the same in every format, must be what the native maps say, and must cost no image that is
-//! there already. Expected: equality pixel by pixel with the native maps put together here in another way, list by list with the records,
-//! and byte by byte between datasets that got their classes early and late. Source: the native files; EPPO codes from the species files.
+//! Rationale: a user-defined class must have the same meaning in every format, must agree with the native maps, and
+//! must not force existing images to be rendered again. Expected: pixels equal the native maps combined independently
+//! here, lists equal the records, and datasets whose classes were set early or late are byte-identical. Source: the
+//! native files; EPPO codes from the species files.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, small_text, trace};
-use furrow::dataset::record::{Plant, Record};
-use furrow::dataset::sample::IGNORE;
-use furrow::dataset::{Sample, Set, native};
-use furrow::output;
+use furrow_dataset::model::record::{Plant, Record};
+use furrow_dataset::model::sample::IGNORE;
+use furrow_dataset::read::native;
+use furrow_dataset::{Sample, Set};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Beets by their code, petioles of all plants, no fat hen; blades of weeds that have no class of their own would be weed.
+/// Class list: beets by EPPO code, petioles of all plants, the remaining weeds, and fat hen ignored.
 const CLASSES: &str = "soil; beet=beavx; petiole; weed; ignore=fat hen";
 
-/// Numbers of `parts.png`.
+/// Class number in `parts.png`.
 const PETIOLE: u8 = 12;
 
-/// The command that makes `count` small images.
+/// Returns the command that generates `count` small images.
 fn make(folder: &Path, count: &str, more: &[&str]) -> Command {
     let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(folder), "--count", count]);
     command.args(["--width", "96", "--spp", "2", "--split", "2,1,1"]).args(more);
     command
 }
 
-/// All images of a dataset.
+/// Reads all images of a dataset.
 fn samples(folder: &Path) -> (Set, Vec<Sample>) {
     let set = Set::open(folder).unwrap();
     let samples = (0..set.recipe.count).map(|k| native::read(folder, &Set::name(k)).unwrap()).collect();
@@ -40,17 +41,17 @@ fn json(file: &Path) -> Value {
     serde_json::from_slice(&fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()))).unwrap()
 }
 
-/// The entries of a list in a JSON file.
+/// Returns the entries of a list in a JSON file.
 fn list(file: &Path, of: &str) -> Vec<Value> {
     json(file)[of].as_array().unwrap().clone()
 }
 
-/// The species of a plant by its EPPO code.
+/// Returns the EPPO code of a plant's species.
 fn eppo<'a>(set: &'a Set, plant: &Plant) -> &'a str {
     &set.recipe.species[usize::from(plant.kind) - 1].eppo
 }
 
-/// All annotations of COCO's instances, by image and number of category.
+/// Reads all COCO instance annotations as (image, category id, area in pixels).
 fn instances(folder: &Path) -> Vec<(u64, u64, u64)> {
     let mut all = Vec::new();
     for split in ["train", "val", "test"] {
@@ -63,7 +64,7 @@ fn instances(folder: &Path) -> Vec<(u64, u64, u64)> {
     all
 }
 
-/// Of each plant that is seen and passes: its image, number of category, pixels.
+/// Returns the expected annotation of each visible plant whose category is not `None`: (image, category id, pixels).
 fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64>) -> Vec<(u64, u64, u64)> {
     let of = |record: &Record| -> Vec<_> {
         let listed = record.plants.iter().filter(|plant| plant.seen.pixels > 0);
@@ -75,15 +76,16 @@ fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64
     all
 }
 
-/// Expected: networks learn the labels that formats hold.
+/// Expected: training examples have the same labels as the formats.
 #[cfg(feature = "train")]
 fn learnt_alike(set: &Set, samples: &[Sample]) {
-    use furrow::train::data::bands::Band;
-    use furrow::train::data::example::Example;
-    let map = furrow::dataset::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species, &[]).unwrap();
+    use furrow_train::data::bands::Band;
+    use furrow_train::data::example::Example;
+    let map = furrow_dataset::model::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species, &[]).unwrap();
     for sample in samples {
         let (split, name) = (sample.record.split.name(), &sample.record.name);
-        let written = output::read_gray(&set.folder.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2;
+        let written =
+            furrow_output::read_gray(&set.folder.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2;
         let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &[Band::Red], false).unwrap();
         assert_eq!(learnt.labels, written, "{name}");
     }
@@ -99,9 +101,10 @@ fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
     succeed(make(&data, "4", &["--classes", CLASSES, "--format", formats]));
     let (set, samples) = samples(&data);
     let seen = |code: &str| samples.iter().flat_map(|s| s.record.seen()).filter(|p| eppo(&set, p) == code).count();
-    assert!(seen("BEAVX") > 0 && seen("CHEAL") > 0, "both are to be seen, or nothing is tested");
+    assert!(seen("BEAVX") > 0 && seen("CHEAL") > 0, "both species must be visible");
 
-    // Pixels: organs before species before class; what is ignored has no label.
+    // Pixels: an organ class takes precedence over a species class, and that over crop or weed; ignored pixels have no
+    // label.
     let mut counted = BTreeMap::new();
     for sample in &samples {
         let plain = |i: usize| match (sample.parts[i], sample.species[i], sample.semantics[i]) {
@@ -119,20 +122,16 @@ fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
         let city = format!("cityscapes/gtFine/{split}/small/small_000000_{name}_gtFine_labelIds.png");
         let folder = format!("imagefolder/{split}/masks/{name}.png");
         for file in [city, folder] {
-            assert_eq!(output::read_gray(&data.join(&file)).unwrap().2, labels, "{file}");
+            assert_eq!(furrow_output::read_gray(&data.join(&file)).unwrap().2, labels, "{file}");
         }
         let native = fs::read(data.join(format!("images/{name}/parts.png"))).unwrap();
-        let format = output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
-        assert!(!native.is_empty() && format.is_ok_and(|map| map == sample.parts), "parts.png is the format's map");
+        let format = furrow_output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
+        assert!(!native.is_empty() && format.is_ok_and(|map| map == sample.parts), "the format's map equals parts.png");
     }
     learnt_alike(&set, &samples);
-    assert_eq!(
-        counted.keys().copied().collect::<Vec<_>>(),
-        [0, 1, 2, IGNORE],
-        "each of them is to be seen: {counted:?}"
-    );
+    assert_eq!(counted.keys().copied().collect::<Vec<_>>(), [0, 1, 2, IGNORE], "every class must occur: {counted:?}");
 
-    // Lists: beets alone, each as many pixels as its record says.
+    // Lists: beets only, each with the number of pixels in its record.
     assert_eq!(instances(&data), expected(&set, &samples, |code| (code == "BEAVX").then_some(1)));
     let categories = list(&data.join("coco/annotations/instances_train.json"), "categories");
     assert_eq!(categories.iter().map(|c| c["name"].as_str().unwrap()).collect::<Vec<_>>(), ["beet", "weed"]);
@@ -168,21 +167,21 @@ fn classes_and_limits_may_be_asked_for_later_and_are_counted() {
     let listed = instances(&late);
     let kept = |p: &Plant| p.seen.pixels >= 60 && p.seen.shown_fraction() >= 0.5;
     let left = samples.iter().flat_map(|s| s.record.seen()).filter(|p| !kept(p)).count();
-    assert!(left > 0 && listed.len() > 1, "the limits are to decide something");
+    assert!(left > 0 && listed.len() > 1, "the limits must exclude some plants and keep others");
     assert_eq!(listed.len(), all.len() - left);
     assert!(listed.iter().all(|row| all.contains(row) && row.2 >= 60));
     assert!(told.contains(&format!("{left} plants and ")), "{told}");
     let counted = &json(&late.join("manifest.json"))["left_out"];
     assert_eq!((counted["plants"].as_u64(), counted["ignored_plants"].as_u64()), (Some(left as u64), Some(0)));
 
-    // No image was made again, and all is as if the classes had been asked for at once.
+    // No image was rendered again, and all files are as if the classes had been given at the start.
     let images = |tree: &BTreeMap<String, Vec<u8>>| -> BTreeMap<String, Vec<u8>> {
         tree.iter().filter(|(name, _)| name.starts_with("images/")).map(|(n, b)| (n.clone(), b.clone())).collect()
     };
     same(&images(&tree(&late)), &images(&before));
     succeed(make(&early, "4", &[&formats[..], &labels].concat()));
     same(&tree(&late), &tree(&early));
-    // Who says nothing of labels leaves them as they are.
+    // Without options for labels, the labelling stays as it is.
     succeed(make(&late, "4", &formats));
     same(&tree(&late), &tree(&early));
 }
@@ -199,7 +198,7 @@ fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
     }
     let words = fail(make(&data, "1", &["--keep", "none", "--format", "ply"]), 2);
     assert!(words.contains("--format ply holds ") && words.contains("--keep"), "{words}");
-    assert!(!data.exists() || fs::read_dir(&data).unwrap().next().is_none(), "nothing was begun");
+    assert!(!data.exists() || fs::read_dir(&data).unwrap().next().is_none(), "files were written");
 
     succeed(make(&data, "1", &["--keep", "none", "--format", "coco"]));
     let before = tree(&data);
@@ -221,7 +220,7 @@ fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
         assert!(words.contains(part), "{more:?}: {words}");
         same(&tree(&data), &before);
     }
-    // Classes that only a forged recipe can have.
+    // Class lists that only a hand-edited recipe can contain.
     let recipe = data.join("dataset.json");
     let forged = fs::read_to_string(&recipe).unwrap();
     for classes in ["[]", r#"[{ "name": "a", "labels": ["crop"] }, { "name": "a", "labels": ["weed"] }]"#] {
@@ -263,30 +262,26 @@ fn maps_are_kept_as_asked() {
         assert!(String::from_utf8_lossy(&said).contains("2 rendered again and the same; 0 faults"));
     }
 
-    // The same field, to the precision that is promised.
+    // The same field, within the precision of the format.
     let read = |folder: &Path| native::read(folder, "000000").unwrap();
     let (half, single, both) = (read(&normals), read(&depth), read(&oldest));
-    assert_eq!(
-        (read(&usual).normals.len(), half.normals.len()),
-        (0, 96 * 72),
-        "normals are kept where they are asked for"
-    );
+    assert_eq!((read(&usual).normals.len(), half.normals.len()), (0, 96 * 72), "normals are kept if requested");
     assert_eq!(read(&usual).depth, half.depth);
     assert_eq!((single.depth.len(), single.normals.len()), (96 * 72, 0));
     assert_eq!(single.depth, both.depth);
     for (a, b) in half.depth.iter().zip(&single.depth) {
         assert!(a == b || (a / b - 1.0).abs() <= 1.0 / 2048.0, "{a} {b}");
     }
-    assert!(half.depth != single.depth, "halves are coarser");
+    assert!(half.depth != single.depth, "half precision must differ from single precision");
     for (a, b) in half.normals.iter().flatten().zip(both.normals.iter().flatten()) {
         assert!((a - b).abs() <= 0.5 / 128.0 + 1e-3, "{a} {b}");
     }
     assert_eq!((&half.rgb, &half.semantics, &half.record), (&both.rgb, &both.semantics, &both.record));
-    assert_eq!(read(&bare).record, both.record, "what is not kept is counted all the same");
+    assert_eq!(read(&bare).record, both.record, "maps that are not kept must still be counted in the record");
     let size = |folder: &Path| fs::metadata(folder.join("images/000000/geometry.exr")).unwrap().len();
     assert!(size(&usual) < size(&normals) && size(&normals) < size(&oldest));
 
-    // A dataset of before says nothing of maps, and goes on with those that it has.
+    // A dataset of an older version has no `keep` entry, and continues with the maps it has.
     let recipe = fs::read_to_string(oldest.join("dataset.json")).unwrap();
     assert!(!recipe.contains("keep"), "{recipe}");
     succeed(make(&oldest, "3", &[]));
@@ -296,9 +291,10 @@ fn maps_are_kept_as_asked() {
     assert!(words.contains("another dataset lies in this folder: maps of --keep "), "{words}");
 }
 
-/// Rationale: a robot in view is no soil to learn from. Expected: pixels of the model that the scene file names have no label, those of the others
-/// have the class of all models, by `parts.png`, whose numbers `parts/names.json` tells; a plant's name is its species; a name that no model has
-/// is refused with those that there are.
+/// Rationale: a robot in view must not be learnt as soil. Expected: pixels of the model named in the class list have no
+/// label, and pixels of the other models have the class of all models. `parts.png` has their numbers, which
+/// `parts/names.json` explains; a plant's name is its species. An unknown model name is refused with a list of the
+/// known ones.
 #[test]
 fn a_robot_in_view_is_ignored() {
     const ROBOT: u8 = 101;
@@ -350,13 +346,19 @@ fn a_robot_in_view_is_ignored() {
         _ => *semantic,
     };
     let expected: Vec<u8> = sample.parts.iter().zip(&sample.semantics).map(class).collect();
-    assert_eq!(output::read_gray(&data.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2, expected);
-    let of_format = output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
-    assert!(of_format.is_ok_and(|map| map == sample.parts), "parts.png is the format's map");
+    assert_eq!(
+        furrow_output::read_gray(&data.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2,
+        expected
+    );
+    let of_format = furrow_output::read_indexed(&data.join(format!("parts/{split}/{name}.png"))).map(|(.., map)| map);
+    assert!(of_format.is_ok_and(|map| map == sample.parts), "the format's map equals parts.png");
     for number in [ROBOT, MODEL] {
         let places: Vec<usize> = (0..sample.parts.len()).filter(|i| sample.parts[*i] == number).collect();
-        assert!(places.len() > 50, "{} pixels of {number}: nothing is tested", places.len());
-        assert!(places.iter().all(|i| (sample.semantics[*i], sample.plants[*i]) == (0, 0)), "{number} is no plant");
+        assert!(places.len() > 50, "{} pixels of {number} are too few to test", places.len());
+        assert!(
+            places.iter().all(|i| (sample.semantics[*i], sample.plants[*i]) == (0, 0)),
+            "{number} must not be a plant"
+        );
     }
     let said = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
     assert!(String::from_utf8_lossy(&said).contains("; 0 faults"), "{}", String::from_utf8_lossy(&said));

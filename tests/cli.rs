@@ -1,19 +1,19 @@
-//! The program as its user meets it: flags, streams, exit codes.
+//! The command-line program as users see it: flags, streams, exit codes.
 //!
-//! Rationale: the program is called by people who guess and by scripts that cannot. Expected: results on stdout, talk on
-//! stderr, exit code 2 with clear words for what the user can mend, and nothing written then.
+//! Rationale: the program is called by people, who guess, and by scripts, which cannot. Expected: results on stdout,
+//! messages on stderr, and for errors the user can fix exit code 2, a clear message and no output files.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// A scene that renders in a blink.
+/// Scene file that renders in a fraction of a second.
 const PAGE: &str = r"Field(
     camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
     lights: [Constant(radiance: (1, 1, 1, 1))],
     plants: [(species: SPECIES, growth: Bbch(14))],
 )";
 
-/// A folder with `page.ron`; files go below it.
+/// Creates a folder with `page.ron`; output goes into it.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/sugar_beet.ron");
@@ -30,7 +30,8 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// What a misuse is told; checks that it exits with 2, says nothing on stdout and writes nothing.
+/// Runs a misuse and returns its error message; checks that it exits with 2, prints nothing on stdout and writes
+/// nothing.
 fn refused(args: &[&str]) -> String {
     let folder = folder();
     let done = run(folder.path(), args);
@@ -53,8 +54,8 @@ fn help_teaches() {
     }
 }
 
-/// Rationale: a script and a scheduler see nothing but the code. Expected: 2 where the command, a file or the machine must change, 1
-/// where the disk failed or a dataset is damaged; `tests/signals.rs` has 75.
+/// Rationale: a script or scheduler sees only the exit code. Expected: 2 if the command, a file or the machine must
+/// change, 1 if the disk failed or a dataset is damaged; `tests/signals.rs` covers 75.
 #[test]
 fn the_exit_code_tells_the_kind_of_failure() {
     let small = ["--width", "16", "--spp", "1", "--quiet"];
@@ -73,7 +74,7 @@ fn the_exit_code_tells_the_kind_of_failure() {
     let folder = folder();
     let at = folder.path();
     let page = ["--scene", "page.ron", "--out", "out"];
-    of("misuse", at, &["--scene", "page.ron", "--pixel", "99,99"], 2, "lies outside the image");
+    of("misuse", at, &["--scene", "page.ron", "--pixel", "99,99"], 2, "is outside the image");
     std::fs::write(at.join("bad.ron"), "Field(").unwrap();
     of("input", at, &["--scene", "bad.ron"], 2, "bad.ron:1:");
     of("input that is not there", at, &["--scene", "none.ron"], 2, "there is no such");
@@ -96,7 +97,7 @@ fn without_arguments_the_help_is_shown() {
 #[test]
 fn the_version_is_told() {
     let done = run(folder().path(), &["--version"]);
-    let kernels = furrow::accel::version().unwrap();
+    let kernels = furrow_render::accel::version().unwrap();
     assert_eq!(text(&done.stdout), format!("trace {} ({kernels})\n", env!("CARGO_PKG_VERSION")));
 }
 
@@ -113,7 +114,7 @@ fn quiet_leaves_only_paths_on_stdout() {
     let mut there: Vec<_> =
         std::fs::read_dir(folder.path().join("out/page")).unwrap().map(|f| f.unwrap().file_name()).collect();
     there.sort();
-    assert_eq!(there.len(), all.len(), "something else was left behind: {there:?}");
+    assert_eq!(there.len(), all.len(), "unexpected files were left behind: {there:?}");
 }
 
 #[test]
@@ -130,7 +131,7 @@ fn talk_goes_to_stderr() {
 fn a_pixel_is_explained_in_words() {
     let folder = folder();
     assert!(run(folder.path(), &["--scene", "page.ron", "--spp", "1", "--out", "labels"]).status.success());
-    let (width, _, plants) = furrow::output::read_gray16(&folder.path().join("labels/plants.png")).unwrap();
+    let (width, _, plants) = furrow_output::read_gray16(&folder.path().join("labels/plants.png")).unwrap();
     let at = plants.iter().position(|p| *p == 1).unwrap() as u32;
     let pixel = format!("{},{}", at % width, at / width);
     let done = run(folder.path(), &["--scene", "page.ron", "--spp", "4", "--pixel", &pixel, "--quiet"]);
@@ -148,7 +149,7 @@ fn a_crop_is_the_same_pixels_of_a_smaller_image() {
     let render = |out: &str, more: &[&str]| {
         let args = [&["--scene", "page.ron", "--spp", "1", "--quiet", "--out", out], more].concat();
         assert!(run(folder.path(), &args).status.success());
-        furrow::output::read_gray16(&folder.path().join(out).join("plants.png")).unwrap()
+        furrow_output::read_gray16(&folder.path().join(out).join("plants.png")).unwrap()
     };
     let (w, _, whole) = render("whole", &[]);
     let (cw, ch, crop) = render("crop", &["--crop", "20,10,9,7"]);
@@ -191,7 +192,7 @@ fn misuse_is_answered_with_a_way_out() {
         (&["--scene", "page.ron", "--out", "page.ron"], "this is a file"),
         (&["--scene", "page.ron", "--out", "page.ron/deep"], "this is a file"),
         (&["--scene", "pages.ron"], "did you mean ./page.ron?"),
-        (&["--scene", "nowhere/field.ron"], "there is none in nowhere; `trace init DIR` begins one"),
+        (&["--scene", "nowhere/field.ron"], "there is none in nowhere; `trace init DIR` creates one"),
         (&["--scene", "."], "folder"),
         (&["texture"], "RECIPES"),
         (&["texture", "page.ron"], "Leaf, Soil"),
@@ -221,8 +222,8 @@ fn a_texture_is_drawn_beside_its_recipe() {
     assert_eq!(first, std::fs::read(folder.path().join("small.png")).unwrap());
 }
 
-/// Rationale: the relief of `x.ron` and the picture of `x.height.ron` have one name. Expected: recipes that would be drawn to one file, or of which
-/// one cannot be, are refused before the first is drawn.
+/// Rationale: the relief of `x.ron` and the image of `x.height.ron` have the same file name. Expected: recipes with the
+/// same output file, and recipes that are invalid, are refused before any texture is generated.
 #[test]
 fn all_that_textures_are_drawn_to_is_looked_at_first() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,8 +232,8 @@ fn all_that_textures_are_drawn_to_is_looked_at_first() {
         std::fs::write(at.join(name), "Soil(seed: 1, size: 32, period_mm: 60, ground: Dirt)").unwrap();
     }
     for (recipes, words) in [
-        (["x.ron", "x.height.ron"], "x.height.png: what x.ron draws and what x.height.ron draws would both go here"),
-        (["x.ron", "./x.ron"], "would both go here"),
+        (["x.ron", "x.height.ron"], "x.height.png: x.ron and x.height.ron would both be written here"),
+        (["x.ron", "./x.ron"], "would both be written here"),
         (["x.ron", "y.png"], "y.png: the name of a texture recipe must end in .ron"),
     ] {
         let done = run(at, &["texture", recipes[0], recipes[1]]);
@@ -241,7 +242,8 @@ fn all_that_textures_are_drawn_to_is_looked_at_first() {
     }
 }
 
-/// Expected: a sheet and a page that needs nothing beside it; asked again, the sheet is kept; a species that is not there is refused.
+/// Expected: a sheet, and a page that loads no other files. Repeating the command keeps the sheet; an unknown species
+/// is refused.
 #[test]
 fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     let folder = tempfile::tempdir().unwrap();
@@ -257,7 +259,7 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     for words in ["ECHCG", "BBCH 22", "data:image/jpeg"] {
         assert!(page.contains(words), "no {words}");
     }
-    assert!(!page.contains("http"), "the page asks for something");
+    assert!(!page.contains("http"), "the page loads external resources");
     let sheet = || std::fs::read(folder.path().join("out/catalogue/echinochloa.png")).unwrap();
     let before = sheet();
     assert!(text(&catalogue("echinochloa").stderr).contains("kept"));
@@ -267,8 +269,9 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     assert!(text(&missing.stderr).contains("did you mean"), "{}", text(&missing.stderr));
 }
 
-/// Rationale: a photograph that could not be read cost the drawing of all sheets, and a pipe was waited for. Expected: it is refused by its name,
-/// with 2, before anything is drawn; so is a `--beside` that is no folder, and a stage that is no number.
+/// Rationale: an unreadable photograph was reported only after all sheets were rendered, and a pipe blocked the
+/// program. Expected: it is refused by name with exit code 2 before rendering; so are a `--beside` that is not a folder
+/// and a stage that is not a number.
 #[test]
 fn photographs_are_read_before_a_catalogue_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
@@ -279,9 +282,9 @@ fn photographs_are_read_before_a_catalogue_is_drawn() {
         let done = run(at, &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
         let said = text(&done.stderr);
         assert!(done.status.code() == Some(2) && said.contains(words), "{beside}, {words}: {said}");
-        assert!(!at.join("out").exists(), "{words}: something was drawn");
+        assert!(!at.join("out").exists(), "{words}: output was written");
     };
-    let jpeg = furrow::output::encode_jpeg(64, 48, &[[90, 120, 30]; 64 * 48], 90).unwrap();
+    let jpeg = furrow_output::encode_jpeg(64, 48, &[[90, 120, 30]; 64 * 48], 90).unwrap();
     for (file, bytes, words) in [
         ("echinochloa.png", &b"\x89PNG\r\n\x1a\n"[..], "echinochloa.png: the image"),
         ("echinochloa-2.jpg", &jpeg[..jpeg.len() / 2], "echinochloa-2.jpg: this JPEG is cut short"),
@@ -298,20 +301,21 @@ fn photographs_are_read_before_a_catalogue_is_drawn() {
     assert!(Command::new("mkfifo").arg(at.join("echinochloa.png")).status().unwrap().success());
     refused(".", "echinochloa.png: this is a pipe");
     std::fs::remove_file(at.join("echinochloa.png")).unwrap();
-    // A sheet has the name of its species.
-    let photograph = furrow::output::encode_jpeg(8, 8, &[[90, 120, 30]; 64], 90).unwrap();
+    // A photograph has the file name that the species' sheet would get.
+    let photograph = furrow_output::encode_jpeg(8, 8, &[[90, 120, 30]; 64], 90).unwrap();
     std::fs::write(at.join("echinochloa.png"), &photograph).unwrap();
     for into in [".", "./no-folder/.."] {
         let rest = ["--out", into, "--beside", ".", "--species-dir", species.to_str().unwrap()];
         let done = run(at, &[&["catalogue", "--species", "echinochloa"], rest.as_slice()].concat());
         let said = text(&done.stderr);
-        assert!(done.status.code() == Some(2) && said.contains("take the place"), "{into}: {said}");
+        assert!(done.status.code() == Some(2) && said.contains("overwrite a photograph"), "{into}: {said}");
         assert_eq!(std::fs::read(at.join("echinochloa.png")).unwrap(), photograph);
     }
 }
 
-/// Rationale: cut-outs of one stage had all stages measured. Expected: of a cut-out whose name tells a stage, in colour or in gray, that stage's
-/// rendered plants are measured and no others; the columns are explained; a photograph of a stage that the species lacks is told of.
+/// Rationale: cut-outs of one stage caused all stages to be measured. Expected: for a cut-out whose name gives a stage,
+/// in colour or grayscale, only the rendered plants of that stage are measured; the columns are explained; a photograph
+/// of a stage that the species lacks is reported.
 #[test]
 fn a_catalogue_measures_the_stages_of_its_photographs() {
     let folder = tempfile::tempdir().unwrap();
@@ -334,7 +338,8 @@ fn a_catalogue_measures_the_stages_of_its_photographs() {
     assert_eq!(rendered, ["BBCH 11"]);
 }
 
-/// Rationale: hours of work want a place to go. Expected: what is no folder and what nothing can be written into is told before anything grows.
+/// Rationale: an unusable output folder must not be discovered after hours of work. Expected: paths that are not
+/// folders or not writable are reported before the scene is built.
 #[test]
 fn a_folder_that_cannot_be_is_told_first() {
     let folder = folder();
@@ -351,7 +356,7 @@ fn a_folder_that_cannot_be_is_told_first() {
         let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", out]);
         assert!(done.status.code() == Some(2) && text(&done.stderr).contains(words), "{out}: {}", text(&done.stderr));
     }
-    // Pictures that are made of these are told the same.
+    // Commands that write a single image report the same errors.
     let long = format!("{}.png", "a".repeat(252));
     for verb in [&["preview", "page.ron", "--spp", "65536"][..], &["leaf", "page.ron"]] {
         let done = run(at, &[verb, &["--out", long.as_str()]].concat());
@@ -371,7 +376,7 @@ fn full() -> Stdio {
     std::fs::File::create("/dev/full").expect("Linux").into()
 }
 
-/// Runs a program that answers on stdout: into a full disk, and for nobody.
+/// Runs a program that prints results on stdout, with stdout on a full disk and with stdout closed.
 fn its_answer_is_not_lost_unseen(program: &str, folder: &Path, args: &[&str]) {
     let command = |out: Stdio| Command::new(program).current_dir(folder).args(args).stdout(out).output().unwrap();
     let lost = command(full());
@@ -384,8 +389,9 @@ fn its_answer_is_not_lost_unseen(program: &str, folder: &Path, args: &[&str]) {
     assert!(unread.status.code() == Some(0) && !said.contains("stdout"), "{args:?}: {said}");
 }
 
-/// Rationale: logs fill disks, and readers die. Expected: what cannot be said ends no work and changes no exit code; paths and answers that
-/// are lost are a failure, told on stderr, with the files there; a reader that wants no more is none.
+/// Rationale: log disks fill up, and readers of pipes exit. Expected: messages that cannot be written neither end a run
+/// nor change its exit code. Lost paths and results are a failure reported on stderr, with the output files present. A
+/// reader that closes the pipe is not a failure.
 #[test]
 fn full_and_closed_streams_end_no_work() {
     let folder = folder();
@@ -431,7 +437,7 @@ fn full_and_closed_streams_end_no_work() {
     }
 }
 
-/// All that a command says on a terminal, where it must succeed; `None` where no `script` makes one.
+/// Returns the terminal output of a command that must succeed; `None` if the program `script` is not available.
 #[cfg(target_os = "linux")]
 fn said_on_a_terminal(command: &str) -> Option<String> {
     let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
@@ -446,9 +452,10 @@ fn said_on_a_terminal(command: &str) -> Option<String> {
     Some(said)
 }
 
-/// Rationale: a large field takes a minute to grow, and a program that says nothing seems to hang. Expected: a terminal shows what is under way, of an
-/// image and of a dataset, but not with `--quiet`; a bar counts images, and never none of none. Source: `script`, which makes a terminal; where there
-/// is none, the test says so.
+/// Rationale: building a large field takes a minute, and a program that prints nothing seems to hang. Expected: a
+/// terminal shows the current step, for an image and for a dataset, but not with `--quiet`; a progress bar counts
+/// images, and is not shown if there are none. Source: `script`, which provides a terminal; without it the test is
+/// skipped with a note.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_shows_what_grows() {
@@ -457,7 +464,7 @@ fn a_terminal_shows_what_grows() {
     let image = format!("--scene scenes/field.ron --width 81 --spp 1 --out {out}/image");
     let dataset = format!("dataset --scene scenes/field.ron --width 81 --spp 1 --count 1 --out {out}/data");
     let quiet = format!("{image} --quiet");
-    // The second time all images are there.
+    // In the second dataset run all images already exist.
     let commands = [(&image, true, false), (&quiet, false, false), (&dataset, true, true), (&dataset, true, false)];
     for (command, shown, counted) in commands {
         let Some(said) = said_on_a_terminal(command) else { return };
@@ -467,7 +474,8 @@ fn a_terminal_shows_what_grows() {
     }
 }
 
-/// Expected: so it is where a bill grows fields, of a dataset and of days; the line says which image is drawn, and is gone before the table is there.
+/// Expected: progress is also shown while a cost estimate builds fields, of a dataset and of a sequence of days; the
+/// line names the image being rendered, and is erased before the table is printed.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_shows_what_grows_for_a_bill() {
@@ -486,14 +494,14 @@ fn a_terminal_shows_what_grows_for_a_bill() {
     ];
     for (command, shown) in commands {
         let Some(said) = said_on_a_terminal(&command) else { return };
-        assert_eq!(said.contains("growing: ") && said.contains("drawing images, 1 of 1"), shown, "{command}: {said}");
+        assert_eq!(said.contains("growing: ") && said.contains("rendering images, 1 of 1"), shown, "{command}: {said}");
         let table = said.rsplit_once("\u{1b}[2K").map_or(said.as_str(), |(_, after)| after);
-        assert!(table.contains("core hours") && !table.contains(" gone"), "{command}: {said:?}");
+        assert!(table.contains("core hours") && !table.contains(" elapsed"), "{command}: {said:?}");
     }
 }
 
-/// Rationale: the driver's library prints an error that is none where there is no window system, as on servers and in containers. Expected: without
-/// that variable the program says no more than with it, whatever renders.
+/// Rationale: without a window system, as on servers and in containers, the driver's library prints a spurious error.
+/// Expected: the program prints the same with and without `XDG_RUNTIME_DIR`, for every engine.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_window_system_is_no_error() {

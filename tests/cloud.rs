@@ -1,20 +1,21 @@
-//! Clouds of points on a field's surfaces.
+//! Point clouds on the surfaces of a field.
 //!
-//! Rationale: who measures a plant by its points must find the area that it has. Expected: as many points as area times density, on the mean of
-//! every part and every triangle; none where a mask is open; every point on its part, with its label. Bounds are 5 standard errors.
+//! Rationale: users who measure a plant by its points must find its true area. Expected: on average, the number of
+//! points of every part and every triangle is its area times the density; there are none where a mask is transparent;
+//! every point is on its part and has its label. Bounds are 5 standard errors.
 
 use crate::common::program::{SMALL, field, scratch, small_text, trace};
-use furrow::geometry::Mesh;
-use furrow::math::{Vec3, vec3};
-use furrow::output::cloud::{self, Cloud};
-use furrow::scene::Field;
-use furrow::scene::assemble::Options;
+use furrow_base::geometry::Mesh;
+use furrow_base::math::{Vec3, vec3};
+use furrow_field::Field;
+use furrow_field::assemble::Options;
+use furrow_output::cloud::{self, Cloud};
 use std::collections::BTreeMap;
 
-/// Bytes of a point, and of its place.
+/// Size of a point in bytes: position, normal and labels.
 const POINT: usize = 36;
 
-/// Places, normals and labels (plant, leaf) of a cloud's points.
+/// Positions, normals and labels (plant, leaf) of a cloud's points.
 fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u32, u16))> {
     let count = cloud.points();
     let file = cloud.file("test");
@@ -41,8 +42,8 @@ fn plants(text: &str) -> Field {
     field(&text, &Options::default())
 }
 
-/// Area of a mesh that its mask leaves, m²: each triangle's by a raster of places.
-fn left(mesh: &Mesh, mask: Option<&furrow::geometry::AlphaMask>) -> f64 {
+/// Area of a mesh inside its mask, m²; each triangle is sampled on a grid.
+fn left(mesh: &Mesh, mask: Option<&furrow_base::geometry::AlphaMask>) -> f64 {
     let places: Vec<(f32, f32)> = (0..64).map(|i| ((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5)).collect();
     let one = |i: u32| {
         let [a, b, c] = mesh.corners(i);
@@ -78,21 +79,22 @@ fn leaves_bear_points_by_their_area_and_none_in_their_holes() {
     assert!(areas.len() > 4);
     for (label, area) in &areas {
         let (expected, count) = (area * density, counts.get(label).copied().unwrap_or(0) as f64);
-        // Masks are counted on a raster: 1 % beside chance.
+        // The area inside a mask is measured on a grid: 1 % in addition to the sampling error.
         assert!(
             (count - expected).abs() < 5.0 * expected.sqrt() + 0.01 * expected,
             "{label:?}: {count}, not {expected}"
         );
     }
-    assert!((found.len() as f64) < 0.98 * whole * density, "masks and holes cut something");
+    assert!((found.len() as f64) < 0.98 * whole * density, "masks and holes must remove some area");
 }
 
-/// Expected: the two halves of each triangle, parted by its median, bear equally many points; all lie in it. The stem has no mask.
+/// Expected: the two halves of each triangle, separated by a median, have equal numbers of points, and all points are
+/// inside a triangle. The stem has no mask.
 #[test]
 fn points_are_uniform_on_their_triangles() {
     let field = plants("(species: \"scenes/species/sugar_beet.ron\", growth: Bbch(16), position_m: (0, 0))");
     let found = points(cloud::sample(&field, 1.2e7).unwrap());
-    // The stem: what belongs to no leaf.
+    // The stem: the parts that belong to no leaf.
     let stem: Vec<&Mesh> = field.scene.parts.iter().filter(|part| part.tag.leaf == 0).map(|part| &*part.mesh).collect();
     assert!(!stem.is_empty() && field.scene.parts.iter().all(|part| part.tag.leaf > 0 || part.mask.is_none()));
     let own: Vec<Vec3> = found.iter().filter(|(_, _, (_, leaf))| *leaf == 0).map(|(at, ..)| *at).collect();
@@ -135,7 +137,7 @@ fn the_same_field_has_the_same_points_and_too_many_are_refused() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let file = std::fs::read(folder.join("points.ply")).unwrap();
     assert!(file.starts_with(b"ply\nformat binary_little_endian"));
-    // The last line tells how many there are, how many of them are of the ground, and how large the file is.
+    // The last line of the output gives the number of points, the number on the soil, and the file size.
     let said = String::from_utf8_lossy(&done.stderr);
     let told = said.lines().last().unwrap().split_whitespace();
     let numbers: Vec<f64> = told.filter_map(|word| word.parse().ok()).collect();

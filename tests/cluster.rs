@@ -1,8 +1,10 @@
-//! Job files of clusters, run for real: Slurm with a power cut, GNU parallel, xargs; Kubernetes against its schema.
+//! Job files for clusters, executed for real: Slurm with a power cut, GNU parallel and xargs; Kubernetes files are
+//! checked against their schema.
 //!
-//! Rationale: what a scheduler does to jobs (cuts, stops, starts twice) is not what its manual makes one think. Expected: however a
-//! dataset was cut up, stopped and gone on with, its bytes are those of one run on one machine; the exit code tells a scheduler what
-//! to do. Source: none needed, equality is exact; the Kubernetes schema is that of PyPI's kubernetes-validate.
+//! Rationale: schedulers interrupt, stop and restart jobs in ways that their manuals do not document. Expected: however
+//! a dataset is split, stopped and resumed, its bytes equal those of one run on one machine, and the exit code gives
+//! the scheduler the correct signal. Source: none needed, equality is exact; the Kubernetes schema is that of PyPI's
+//! kubernetes-validate.
 
 use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, trace};
@@ -15,15 +17,15 @@ use std::time::{Duration, Instant};
 
 mod scratch;
 
-/// Samples a pixel.
+/// Samples per pixel.
 const SPP: &str = "12";
 
-/// Begins a dataset of `count` images, each of which takes most of a second.
+/// Plans a dataset of `count` images, each taking most of a second.
 fn plan(folder: &Path, count: u64) {
     plan_with(folder, count, &[]);
 }
 
-/// The same with further arguments.
+/// Plans a dataset of `count` images with further arguments.
 fn plan_with(folder: &Path, count: u64, more: &[&str]) {
     let count = count.to_string();
     let order = ["dataset", "plan", "--scene", SMALL, "--width", "96", "--count", &count, "--out", path(folder)];
@@ -31,7 +33,7 @@ fn plan_with(folder: &Path, count: u64, more: &[&str]) {
     succeed(trace(&[&order[..], spp, more].concat()));
 }
 
-/// Job files of a dataset.
+/// Writes the job files of a dataset and returns their folder.
 fn emit(folder: &Path, engine: &str, shards: u64, more: &[&str]) -> PathBuf {
     succeed(verb(
         "emit",
@@ -41,17 +43,17 @@ fn emit(folder: &Path, engine: &str, shards: u64, more: &[&str]) -> PathBuf {
     folder.join("jobs")
 }
 
-/// The files of a dataset, its job files and what tells which were pushed left out.
+/// Reads the files of a dataset, except its job files and the records of pushed files.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     tree(folder).into_iter().filter(|(name, _)| !name.starts_with("jobs/") && !name.starts_with("pushed/")).collect()
 }
 
-/// The same dataset made by one run.
+/// Returns the files of the same dataset made by a single run.
 fn whole(count: u64) -> BTreeMap<String, Vec<u8>> {
     whole_with(count, &[])
 }
 
-/// The same with further arguments.
+/// Returns the files of the dataset made by a single run with further arguments.
 fn whole_with(count: u64, more: &[&str]) -> BTreeMap<String, Vec<u8>> {
     let (_keep, folder) = scratch();
     plan_with(&folder, count, more);
@@ -60,7 +62,7 @@ fn whole_with(count: u64, more: &[&str]) -> BTreeMap<String, Vec<u8>> {
     files(&folder)
 }
 
-/// Whether programs are installed. With `FURROW_REQUIRE_PEERS=1` their absence is a failure, else a message.
+/// Returns whether programs are installed. Prints a note if not; with `FURROW_REQUIRE_PEERS=1` it panics instead.
 fn installed(programs: &[&str], package: &str) -> bool {
     let there = |p: &&str| {
         Command::new("sh").arg("-c").arg(format!("command -v {p}")).output().is_ok_and(|o| o.status.success())
@@ -80,11 +82,11 @@ fn send(signal: &str, child: &Child) {
     assert!(sent.success());
 }
 
-/// Waits until something holds; five minutes at most, for machines may be busy.
+/// Waits up to five minutes until a condition holds; machines may be busy.
 fn until(what: &str, mut holds: impl FnMut() -> bool) {
     let begin = Instant::now();
     while !holds() {
-        assert!(begin.elapsed() < Duration::from_secs(300), "in five minutes: not {what}");
+        assert!(begin.elapsed() < Duration::from_secs(300), "not {what} within five minutes");
         std::thread::sleep(Duration::from_millis(20));
     }
 }
@@ -135,8 +137,8 @@ fn job_files_are_complete_and_can_be_read_by_bash() {
     }
 }
 
-/// Rationale: folders have any names, also those of a template's places. Expected: the script's words are the folder's name, letter by
-/// letter, wherever they stand.
+/// Rationale: the name of a folder may contain a placeholder of the template. Expected: the script uses the folder's
+/// name literally wherever it occurs.
 #[test]
 fn a_folder_named_as_a_place_of_the_template_stays_a_name() {
     let (_keep, folder) = scratch();
@@ -162,7 +164,7 @@ fn edited_job_files_are_never_overwritten() {
     let (_keep, folder) = scratch();
     plan(&folder, 4);
     let jobs = emit(&folder, "slurm", 2, &[]);
-    // The same again changes nothing.
+    // Repeating the command changes nothing.
     emit(&folder, "slurm", 2, &[]);
     let file = jobs.join("finish.sbatch");
     let edited = std::fs::read_to_string(&file).unwrap().replace("##SBATCH --partition=…", "#SBATCH --partition=night");
@@ -231,7 +233,7 @@ sys.exit('the schema refuses nothing')
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 }
 
-/// Runs a shard's job script as Slurm would, with an `scontrol` that notes what it was asked in the file `asked`.
+/// Runs a shard's job script as Slurm would, with a fake `scontrol` that logs its arguments to the file `asked`.
 fn task(jobs: &Path, number: u64) -> Command {
     let tools = jobs.join("tools");
     std::fs::create_dir_all(&tools).unwrap();
@@ -255,7 +257,7 @@ fn a_slurm_task_tells_its_scheduler_what_to_do() {
     plan(&folder, 40);
     let jobs = emit(&folder, "slurm", 2, &[]);
     let asked = || std::fs::read_to_string(jobs.join("tools/asked")).unwrap_or_default();
-    // Out of time: the image under way is finished, and the task alone is queued again.
+    // Time limit: the image in progress is finished, and only this task is requeued.
     let mut child = task(&jobs, 1).spawn().unwrap();
     until("sealed", || sealed(&folder) > 0);
     send("USR1", &child);
@@ -263,33 +265,34 @@ fn a_slurm_task_tells_its_scheduler_what_to_do() {
     assert_eq!(asked(), "requeue 7_1\n");
     let so_far = sealed(&folder);
     assert!((1..20).contains(&so_far), "{so_far}");
-    // Cancelled: not queued again. Sent twice in a row, as a scheduler does that signals script and program.
+    // Cancelled: not requeued. The signal is sent twice, as by a scheduler that signals both script and program.
     let mut child = task(&jobs, 1).spawn().unwrap();
     until("sealed", || sealed(&folder) > so_far);
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(asked(), "requeue 7_1\n");
-    // Told to hurry while it finishes: time is up, so it is queued again.
+    // A second signal while it finishes: the time limit counts, so the task is requeued.
     let mut child = task(&jobs, 0).spawn().unwrap();
     until("sealed", || sealed(&folder) > so_far + 1);
     send("USR1", &child);
-    // A shell that is sent two signals within one breath may see the later alone; a scheduler leaves half a minute between.
+    // A shell that receives two signals at almost the same time may handle only the later one; schedulers leave half a
+    // minute between them.
     until("told USR1", || std::fs::read_to_string(jobs.join("tools/log")).unwrap().contains("told USR1"));
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(asked(), "requeue 7_1\nrequeue 7_0\n");
-    // What gets nowhere is not started for ever.
+    // A task without progress is not restarted forever.
     let mut child = task(&jobs, 0).env("SLURM_RESTART_COUNT", "100").spawn().unwrap();
     let before = sealed(&folder);
     until("sealed", || sealed(&folder) > before);
     send("USR1", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(asked().lines().count(), 2);
-    // Left alone it ends well, and only its own images are there.
+    // Uninterrupted, the task succeeds and renders only its own images.
     assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(0));
     let odd = (0..20).all(|k| folder.join(format!("seals/{:06}.json", 2 * k + 1)).is_file());
     assert!(odd && made(&folder).len() >= 20);
-    // Wrong input is never tried again.
+    // Invalid input is never retried.
     std::fs::remove_file(folder.join("dataset.json")).unwrap();
     assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(2));
     assert_eq!(asked().lines().count(), 2);
@@ -323,7 +326,7 @@ fn the_kubernetes_script_finishes_when_the_shards_have_ended_and_tells_how() {
     plan(&folder, 4);
     let jobs = emit(&folder, "kubernetes", 2, &[]);
     let kubectl = jobs.join("kubectl");
-    // Says of each job what the test wants it to say, and notes what it was asked.
+    // Prints the job states chosen by the test, and logs its arguments.
     let script = "#!/bin/sh\necho \"$1 $2 $3\" >> asked\ncase \"$1 $3\" in\n'get '*-finish) echo \"$FINISH\" ;;\nget*) echo Failed ;;\nesac\n";
     std::fs::write(&kubectl, script).unwrap();
     std::fs::set_permissions(&kubectl, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
@@ -340,7 +343,7 @@ fn the_kubernetes_script_finishes_when_the_shards_have_ended_and_tells_how() {
     }
 }
 
-/// A Slurm of two nodes on this machine; down when it is dropped.
+/// A Slurm cluster of two nodes on this machine; it shuts down when dropped.
 struct Slurm(PathBuf);
 
 impl Slurm {
@@ -352,7 +355,7 @@ impl Slurm {
     }
 
     fn script(&self, verb: &str, more: &[&str]) -> Output {
-        // Runs beside each other have ports of their own, below those that the system hands out.
+        // Concurrent runs use separate port ranges, below the ephemeral ports of the system.
         let port = 20000 + std::process::id() % 60 * 200;
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cluster/mini-slurm.sh");
         let mut command = Command::new("bash");
@@ -360,21 +363,21 @@ impl Slurm {
         command.stdin(Stdio::null()).output().unwrap()
     }
 
-    /// A command that speaks to this cluster.
+    /// Returns a command configured for this cluster.
     fn command(&self, program: &str, arguments: &[&str]) -> Command {
         let mut command = Command::new(program);
         command.args(arguments).env("SLURM_CONF", self.0.join("slurm.conf")).stdin(Stdio::null());
         command
     }
 
-    /// What it says.
+    /// Runs a command that must succeed, and returns its standard output.
     fn say(&self, program: &str, arguments: &[&str]) -> String {
         let done = self.command(program, arguments).output().unwrap();
         assert!(done.status.success(), "{program} {arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
         String::from_utf8(done.stdout).unwrap()
     }
 
-    /// Waits until no job is left. Slurm takes half a minute to believe that a node is gone.
+    /// Waits until no job is left. Slurm takes half a minute to declare a node lost.
     fn idle(&self) {
         until("without jobs", || self.say("squeue", &["--noheader"]).is_empty());
     }
@@ -386,7 +389,7 @@ impl Drop for Slurm {
     }
 }
 
-/// All logs of a dataset's jobs.
+/// Reads all logs of a dataset's jobs.
 fn logs(jobs: &Path) -> String {
     let mut paths: Vec<_> = std::fs::read_dir(jobs.join("logs")).unwrap().map(|e| e.unwrap().path()).collect();
     paths.sort();
@@ -394,7 +397,7 @@ fn logs(jobs: &Path) -> String {
     paths.iter().map(text).collect()
 }
 
-/// Images in archives of three: seven for training, one for each other split.
+/// Archives of three images: seven for training, one for each other split.
 const PACKS: [&str; 2] = ["--pack", "3"];
 
 #[test]
@@ -405,7 +408,7 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     }
     let (_keep, folder) = scratch();
     let folder = folder.join("a set");
-    // Images that take longer: those of a task must not be done before it is told that its time is up.
+    // Longer renders, so that a task's images are not finished before the time-limit signal.
     let order = [&PACKS[..], &["--spp", "32"]].concat();
     plan_with(&folder, COUNT, &order);
     let elsewhere = folder.with_file_name("it's elsewhere");
@@ -417,7 +420,7 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     let jobs = emit(&folder, "slurm", 4, &[&hours[..], &pushing].concat());
     let slurm = Slurm::up(folder.parent().unwrap());
     slurm.say("bash", &[path(&jobs.join("submit.sh"))]);
-    // Both nodes are at work.
+    // Wait until both nodes are at work.
     let running = |node: &str| {
         slurm
             .say("squeue", &["--noheader", "--states=R", "--array", "--format=%i %N"])
@@ -426,16 +429,16 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     };
     until("at work", || running("node1").is_some() && running("node2").is_some() && sealed(&folder) > 1);
     let hasty = running("node1").unwrap();
-    // One node loses its power; the other's task is told that its time is nearly up. scancel asks again until the task is gone, and
-    // then says that there is none.
+    // One node loses power; the other node's task receives the time-limit signal. scancel repeats the signal until
+    // the task has ended, and then reports that there is none.
     let lost = slurm.script("node-kill", &["node2"]);
     assert!(lost.status.success(), "{}", String::from_utf8_lossy(&lost.stderr));
     let mut told = slurm.command("scancel", &["--signal=USR1", "--batch", &hasty]).spawn().unwrap();
     slurm.idle();
     told.wait().unwrap();
     let logs = logs(&jobs) + &String::from_utf8_lossy(&lost.stdout);
-    assert!(logs.contains("ended with 75"), "no task was stopped:\n{logs}");
-    assert!(logs.matches("start 2").count() >= 2, "two tasks must have been started again:\n{logs}");
+    assert!(logs.contains("ended with 75"), "no task was interrupted:\n{logs}");
+    assert!(logs.matches("start 2").count() >= 2, "two tasks must have been restarted:\n{logs}");
     assert!(logs.contains("24 of 24 images checked, 1 rendered again and the same; 0 faults"), "{logs}");
     let expected = whole_with(COUNT, &order);
     assert!(expected.keys().filter(|name| name.starts_with("packs/")).count() == 9);
@@ -444,7 +447,7 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     succeed(verb("verify", &elsewhere, &["--quiet"]));
 }
 
-/// A folder with the programs that the script needs, GNU parallel not among them.
+/// Returns a folder with the programs that the script needs, without GNU parallel.
 fn without_parallel(folder: &Path) -> PathBuf {
     let tools = folder.join("tools");
     std::fs::create_dir_all(&tools).unwrap();
@@ -456,7 +459,7 @@ fn without_parallel(folder: &Path) -> PathBuf {
     tools
 }
 
-/// Stops the script with a signal while it renders, starts it again, compares.
+/// Stops the script with a signal while it renders, restarts it, and compares the dataset.
 fn stop_and_go(search: Option<&Path>) {
     const COUNT: u64 = 10;
     let expected = whole(COUNT);
@@ -483,9 +486,9 @@ fn stop_and_go(search: Option<&Path>) {
         send(signal, &child);
         let status = end(&mut child);
         assert_eq!((status.code(), status.signal()), (Some(75), None), "{signal}");
-        // Nothing of it is left running.
+        // No process of it continues to run.
         let so_far = sealed(&folder);
-        assert!(so_far < COUNT as usize, "{signal}: all was done before it stopped");
+        assert!(so_far < COUNT as usize, "{signal}: all images were finished before it stopped");
         std::thread::sleep(Duration::from_secs(1));
         assert_eq!(sealed(&folder), so_far, "{signal}");
         let done = script().output().unwrap();
@@ -493,7 +496,7 @@ fn stop_and_go(search: Option<&Path>) {
         assert_eq!(done.status.code(), Some(0), "{signal}: {words}");
         assert!(words.contains("10 of 10 images checked, 1 rendered again and the same; 0 faults"), "{words}");
         same(&files(&folder), &expected);
-        // Wrong input is an error, not a stop.
+        // Invalid input is an error, not an interruption.
         std::fs::write(folder.join("dataset.json"), "{}").unwrap();
         let code = script().output().unwrap().status.code();
         assert!(code.is_some_and(|c| c != 0 && c != 75), "{code:?}");
@@ -517,7 +520,7 @@ fn xargs_does_the_same_where_gnu_parallel_is_not_installed() {
 
 #[test]
 fn a_dataset_made_in_one_go_has_the_same_bytes() {
-    // What `whole` compares with is what `trace dataset` makes, so the tests above say something about it too.
+    // `whole` equals the output of `trace dataset`, so the tests above hold for that command too.
     let (_keep, folder) = scratch();
     let mut command = trace(&["dataset", "--scene", SMALL, "--width", "96", "--spp", SPP, "--count", "4", "--quiet"]);
     command.args(["--out", path(&folder)]);

@@ -1,24 +1,25 @@
-//! `trace compare`: what it measures is what others measure, and what it is given wrong it says.
+//! `trace compare`: its metrics equal those of other programs, and invalid input is reported.
 //!
-//! Rationale: differences of pictures are judged by these numbers, by people who know them from other programs. Expected: published and
-//! independent values; the same numbers in every file; one clear error and nothing written where pictures cannot be compared.
-//! Source: Sharma et al. 2005 for CIEDE2000; scikit-image and FLIP's own Python package for the rest (`tests/compare/reference.py`).
+//! Rationale: users judge image differences by these metrics and know them from other programs. Expected: published and
+//! independently computed values; the same numbers in every output file; one clear error and no output if images cannot
+//! be compared. Source: Sharma et al. 2005 for CIEDE2000; scikit-image and FLIP's own Python package for the rest
+//! (`tests/compare/reference.py`).
 
 use crate::common::browser::{browser, probe};
 use crate::common::program::{names, trace};
-use furrow::compare::{
+use furrow_compare::{
     Band, FILES, Figures, Options, PIXELS_PER_DEGREE, Pairs, Picture, Region, ciede2000, folders, maps, pair,
 };
-use furrow::output::{Picture as Png, encode_jpeg, write_png};
+use furrow_output::{Picture as Png, encode_jpeg, write_png};
 use proptest::prelude::*;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
 
-/// Size of the made-up pictures.
+/// Size of the synthetic images.
 const SIZE: (u32, u32) = (64, 48);
 
-/// The pictures of `tests/compare/reference.py`, the first without the second's `error`.
+/// Builds the images of `tests/compare/reference.py`: the first without, the second with `error`.
 fn made_up(error: bool) -> Picture {
     let (width, height) = SIZE;
     let value = |x: u32, y: u32, c: u32| {
@@ -30,7 +31,7 @@ fn made_up(error: bool) -> Picture {
     Picture { width, height, rgb: pixels.collect(), nir: Vec::new() }
 }
 
-/// Their labels: classes in blocks, the first column without any.
+/// Labels of the images: classes in blocks, with an unlabelled first column.
 fn blocks() -> Vec<u8> {
     let label = |x: u32, y: u32| if x == 0 { 255 } else { ((x / 10 + y / 12) % 3) as u8 };
     (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| label(x, y))).collect()
@@ -48,7 +49,7 @@ fn save(path: &Path, picture: &Picture) {
     write_png(path, picture.width, picture.height, &Png::Rgb(&picture.rgb), "").unwrap();
 }
 
-/// A folder as `trace` leaves it: colours, near infrared (their green), labels.
+/// Writes a folder like an output folder of `trace`: colour, near infrared (the green channel), labels.
 fn rendered(folder: &Path, picture: &Picture) {
     let (w, h) = (picture.width, picture.height);
     save(&folder.join("rgb.png"), picture);
@@ -92,7 +93,7 @@ fn equal_pictures_differ_in_nothing() {
     }
 }
 
-/// A quarter of the pixels wrong by 51 of 255 in one of three channels: MSE = (51/255)² / 12, PSNR = 10 log₁₀ 300.
+/// A quarter of the pixels differ by 51 of 255 in one of three channels: MSE = (51/255)² / 12, PSNR = 10 log₁₀ 300.
 #[test]
 fn mse_and_psnr_are_those_of_a_calculation_by_hand() {
     let a = flat(20, 20, [100, 100, 100]);
@@ -103,7 +104,7 @@ fn mse_and_psnr_are_those_of_a_calculation_by_hand() {
     near("PSNR", all.psnr_db().unwrap(), 24.771_212_547, 1e-8);
 }
 
-/// The 34 pairs of the paper's table 1, which find what implementations get wrong about hues.
+/// The 34 pairs in the paper's table 1, which expose typical errors with hues.
 #[test]
 fn ciede2000_is_that_of_the_paper() {
     let pairs: [([f64; 3], [f64; 3], f64); 34] = [
@@ -148,7 +149,7 @@ fn ciede2000_is_that_of_the_paper() {
     }
 }
 
-/// Pixels, MSE, SSIM, FLIP at 67 and at 30 pixels a degree, ΔE₀₀: what `tests/compare/reference.py` prints.
+/// Pixels, MSE, SSIM, FLIP at 67 and at 30 pixels per degree, ΔE₀₀, as printed by `tests/compare/reference.py`.
 #[test]
 fn measures_are_those_of_other_programs_in_every_class() {
     let expected = [
@@ -179,7 +180,7 @@ fn what_is_black_instead_of_white_is_as_wrong_as_can_be() {
     near("MSE", row.mse, 1.0, 1e-12);
     near("PSNR", row.psnr_db().unwrap(), 0.0, 1e-12);
     near("ΔE", row.ciede2000.unwrap(), 100.0, 1e-3);
-    // Large differences of colour are pressed together between 0.95 and 1.
+    // FLIP compresses large colour differences into 0.95–1.
     assert!((0.95..=1.0).contains(&row.flip.unwrap()), "{row:?}");
     assert!(row.ssim.unwrap() < 1e-3, "{row:?}");
 }
@@ -270,7 +271,7 @@ fn a_render_is_measured_by_class_and_in_near_infrared() {
         assert_eq!(row["ciede2000"].as_f64(), figure.ciede2000);
     }
     assert!(rows[5]["flip"].is_null() && rows[5]["ssim"].is_f64());
-    // A single pair has no interval; its means are it.
+    // A single pair has no confidence interval; the means are its values.
     assert_eq!(json["means"][0]["flip"]["mean"], rows[0]["flip"]);
     assert!(json["means"][0]["flip"]["low"].is_null());
 
@@ -279,7 +280,7 @@ fn a_render_is_measured_by_class_and_in_near_infrared() {
     assert_eq!(csv.lines().count(), 11);
     assert!(csv.lines().nth(1).unwrap().starts_with(&format!("rgb,rgb,all,3072,{},", figures.all().mse)));
 
-    // The files themselves may be named, and labels of another folder.
+    // Files may be named directly, with labels from another folder.
     let (_, again) = done(at, &["fine/rgb.png", "noisy/rgb.png"]);
     assert_eq!(again["pairs"], json["pairs"]);
     assert_eq!(again["reference"], "fine/rgb.png");
@@ -306,7 +307,7 @@ fn folders_are_paired_by_name() {
     let kept = tempfile::tempdir().unwrap();
     let at = kept.path();
     let (a, b) = (made_up(false), made_up(true));
-    // Plain folders: below each other, a JPEG against a PNG, some alone, notes left out.
+    // Plain folders: subfolders, a JPEG compared with a PNG, some files without a partner, text files ignored.
     for name in ["x.png", "deep/y.png", "only.png"] {
         save(&at.join("a").join(name), &a);
     }
@@ -322,18 +323,18 @@ fn folders_are_paired_by_name() {
     assert_eq!(names, ["deep/y", "x"]);
     assert_eq!(json["only_reference"], serde_json::json!(["only"]));
     assert_eq!(json["only_test"].as_array().unwrap().len(), 5);
-    assert!(words.contains("warning: 1 of a is a picture without a partner in b: only\n"), "{words}");
-    assert!(words.contains("5 of b are pictures without partners in a: more0, more1, more2 and 2 more\n"), "{words}");
+    assert!(words.contains("warning: 1 of a is an image without a partner in b: only\n"), "{words}");
+    assert!(words.contains("5 of b are images without partners in a: more0, more1, more2 and 2 more\n"), "{words}");
     let interval = &json["means"][0]["mse"];
     assert!(
         interval["low"].as_f64() < interval["mean"].as_f64() && interval["mean"].as_f64() < interval["high"].as_f64()
     );
 
-    // Labels of some, given.
+    // Labels given for some images only.
     let numbers = Png::Gray(&blocks()[..]);
     write_png(&at.join("labels/x.png"), SIZE.0, SIZE.1, &numbers, "").unwrap();
     let (words, json) = done(at, &["a", "b", "--labels", "labels"]);
-    assert!(words.contains("classes leave out 1 without labels: deep/y\n"), "{words}");
+    assert!(words.contains("pairs excluded from class means because they have no labels: 1 (deep/y)\n"), "{words}");
     assert_eq!(json["means"].as_array().unwrap().len(), 5);
     assert_eq!((&json["means"][0]["pairs"], &json["means"][1]["pairs"]), (&2.into(), &1.into()));
     let markdown = std::fs::read_to_string(at.join("out/compare.md")).unwrap();
@@ -347,7 +348,7 @@ fn datasets_and_real_sets_are_paired_with_their_labels() {
     for name in ["000000", "000001"] {
         rendered(&at.join("a/images").join(name), &made_up(false));
         rendered(&at.join("b/images").join(name), &made_up(true));
-        // As other formats beside it have them.
+        // With the file layout of other formats beside it.
         save(&at.join(format!("a/phenobench/train/images/{name}.png")), &made_up(false));
         save(&at.join(format!("real/images/{name}.png")), &made_up(true));
         let numbers = Png::Gray(&blocks()[..]);
@@ -359,7 +360,7 @@ fn datasets_and_real_sets_are_paired_with_their_labels() {
     assert_eq!(json["means"].as_array().unwrap().len(), 10);
     let (_, real) = done(at, &["real", "a"]);
     assert_eq!(real["means"].as_array().unwrap().len(), 5);
-    // The same from the library, where no page is wanted.
+    // The same comparison through the library, without a page.
     let options = Options { shown: 0, ..Options::default() };
     let comparison = folders(&at.join("a"), &at.join("b"), &options).unwrap();
     assert_eq!(comparison.pairs.len(), 2);
@@ -389,14 +390,14 @@ fn what_cannot_be_compared_is_refused_and_nothing_is_written() {
         (&["render", "gone"], "there is no such file or folder"),
         (&["render", "render", "--labels", "gone.png"], "there is no such file or folder"),
         (&["render", "large.png"], "has 64 × 48 pixels in render, 80 × 48 in large.png"),
-        (&["render", "many"], "render is one picture, many a folder of many"),
-        (&["many", "others"], "no picture of many has a partner in others"),
+        (&["render", "many"], "render is a single image, many is a folder of images"),
+        (&["many", "others"], "no image of many has a partner in others"),
         (&["many", "empty"], "there is no PNG or JPEG in this folder"),
         (&["twice", "many"], "are both called x"),
         (&["large.png", "cut.png"], "cut.png"),
         (&["large.png", "text.png"], "this image cannot be read"),
         (&["render", "render", "--labels", "seven.png"], "no class has the number 7"),
-        (&["render", "render", "--labels", "small.png"], "it has 2 × 2 pixels, its picture 64 × 48"),
+        (&["render", "render", "--labels", "small.png"], "it has 2 × 2 pixels, its image 64 × 48"),
         (&["render", "render", "--labels", "large.png"], "it has 80 × 48 pixels"),
         (&["many", "many", "--labels", "others"], "there are no labels of x in it"),
         (&["render", "render", "--ppd", "0"], "write a number from 1 to 500"),
@@ -427,7 +428,7 @@ fn a_comparison_has_the_same_bytes_on_one_thread_and_on_three() {
     assert!(files("1") == files("3"));
 }
 
-/// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
+/// Script that reads the page's state in the browser and stores it in the document; not part of the shipped page.
 const PROBE: &str = r#"<script>addEventListener("load", () => {
   const pair = document.querySelector(".pair"), stage = pair.querySelector(".stage"), seen = [];
   const shown = image => getComputedStyle(image).opacity === "1";
@@ -459,7 +460,7 @@ fn the_page_needs_nothing_and_flips() {
     for word in ["http:", "https:", "url(", "@import", "<script src", "<iframe"] {
         assert!(!page.contains(word), "the page has {word}");
     }
-    // The worst first, as many as were asked for.
+    // The requested number of pairs, worst first.
     let order: Vec<&str> = page.split("<figcaption><b>").skip(1).map(|p| p.split("</b>").next().unwrap()).collect();
     assert_eq!(order, ["&lt;2&gt;", "&lt;1&gt;"]);
     assert_eq!(page.matches("src=\"data:image/jpeg;base64,").count(), 10);

@@ -1,33 +1,34 @@
-//! Leaves in a condition: what is eaten is gone for everyone who asks, and nothing else moves.
+//! Leaf condition: eaten areas are missing for every user of the leaf, and nothing else changes.
 //!
-//! Rationale: labels, rays, both renderers and exports must see one leaf, and a page without a condition must stay the field that
-//! it was. Expected: the label map loses exactly the pixels whose leaf was cut there; Embree and brute force agree on a field
-//! of eaten leaves; a condition of zeros gives the same bits as none; a condition given to one plant leaves the others alone.
-//! Source: none, these are identities.
+//! Rationale: labels, rays, both renderers and exports must see the same leaf, and a scene file without a condition
+//! must give the same field as before. Expected: the label map loses exactly the pixels whose leaf was cut there;
+//! Embree and brute force agree on a field of eaten leaves; a condition of zeros gives the same bits as none; the
+//! condition of one plant leaves the others unchanged. Source: none, these are identities.
 
 use crate::common::program::{bits, field, shoot};
-use furrow::accel::{Brute, EmbreeAccel};
-use furrow::dataset::damage::damage;
-use furrow::geometry::{Hit, Interaction, Intersect, Mesh, Ray, Window};
-use furrow::material::{ConditionOptics, Damage, LeafDesc, LeafMaterial, Material, Tones};
-use furrow::math::{Vec2, Vec3, smoothstep, vec2};
-use furrow::optics::soil::LOESS;
-use furrow::plant::condition::{Bearer, Marks};
-use furrow::plant::{Condition, ConditionDesc, OrganKind};
-use furrow::render::label;
-use furrow::render::label::NONE;
-use furrow::ron_file::Vary;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::PartKind;
-use furrow::scene::assemble::Options;
-use furrow::scene::{Field, Part};
+use furrow_base::geometry::{Hit, Interaction, Intersect, Mesh, Ray, Window};
+use furrow_base::math::{Vec2, Vec3, smoothstep, vec2};
+use furrow_base::ron_file::Vary;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::make::damage::damage;
+use furrow_field::Field;
+use furrow_field::PartKind;
+use furrow_field::assemble::Options;
+use furrow_grow::plant::condition::{Bearer, Marks};
+use furrow_grow::plant::{Condition, ConditionDesc, OrganKind};
+use furrow_optics::optics::soil::LOESS;
+use furrow_render::accel::{Brute, EmbreeAccel};
+use furrow_render::material::{ConditionOptics, Damage, LeafDesc, LeafMaterial, Material, Tones};
+use furrow_render::render::label;
+use furrow_render::render::label::NONE;
+use furrow_render::scene::Part;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// Everything that can be eaten, eaten.
+/// A condition with every kind of feeding damage.
 const EATEN: &str = "(holes: 6, shot_holes: 10, bites: 2, tears: 1, wilt: 0)";
 
-/// Plants of species at places, each with what stands behind it on the page, on no ground.
+/// Builds a field of plants in a row without ground; each entry is a species, a BBCH stage and further scene file text.
 fn plants(size: (u32, u32), entries: &[(&str, u32, &str)]) -> Field {
     let (w, h) = size;
     let entry = |(i, (species, bbch, more)): (usize, &(&str, u32, &str))| {
@@ -50,7 +51,7 @@ fn condition(of: &str) -> String {
     format!(", condition: {of}")
 }
 
-/// The same parts, as they were before anything was eaten.
+/// Returns the eaten field's parts with the masks of the flawless field.
 fn whole(eaten: &Field, flawless: &Field) -> Vec<Part> {
     let mut parts = eaten.scene.parts.clone();
     for (part, model) in parts.iter_mut().zip(&flawless.scene.parts) {
@@ -62,7 +63,7 @@ fn whole(eaten: &Field, flawless: &Field) -> Vec<Part> {
 
 #[test]
 fn a_condition_of_zeros_is_no_condition() {
-    let flawless = ron::to_string(&ConditionDesc::flawless()).expect("words");
+    let flawless = ron::to_string(&ConditionDesc::flawless()).expect("RON text");
     let without = plants((96, 48), &[("sugar_beet", 14, ""), ("peanut", 14, "")]);
     let with = plants((96, 48), &[("sugar_beet", 14, &condition(&flawless)), ("peanut", 14, "")]);
     assert_eq!(with.scene.materials.len(), without.scene.materials.len());
@@ -79,9 +80,9 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     let camera = &eaten.scene.camera;
     let window = Window::full(camera.width(), camera.height());
     let before = {
-        // Posture and width are drawn by an ordinary condition too: the meshes are those of the eaten plant.
+        // A normal condition also draws posture and width, so the meshes are those of the eaten plant.
         let parts = whole(&eaten, &flawless);
-        let scene = furrow::scene::Scene {
+        let scene = furrow_render::scene::Scene {
             parts,
             materials: Vec::new(),
             lights: Vec::new(),
@@ -95,19 +96,19 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     let after = label(&geometry, &eaten.scene.parts, camera, window);
     let (mut lost, mut shown) = (0, 0);
     let surfaces = eaten.scene.surfaces();
-    let unmasked: Vec<furrow::accel::Surface<'_>> =
-        surfaces.iter().map(|s| furrow::accel::Surface { mask: None, ..*s }).collect();
+    let unmasked: Vec<furrow_render::accel::Surface<'_>> =
+        surfaces.iter().map(|s| furrow_render::accel::Surface { mask: None, ..*s }).collect();
     let brute = Brute::new(&unmasked);
     for y in 0..camera.height() {
         for x in 0..camera.width() {
             let i = (y * camera.width() + x) as usize;
             let part = before.parts[i];
             if part == NONE {
-                assert_eq!(after.parts[i], NONE, "something appeared at {x} {y}");
+                assert_eq!(after.parts[i], NONE, "a part appeared at {x} {y}");
                 continue;
             }
             shown += 1;
-            // Where on the part the pixel's centre lies, and what its mask says there.
+            // Position of the pixel's centre on the part, and the mask's value there.
             let (origin, direction) = camera.centre_ray(x, y);
             let ray = Ray::until(origin, direction, f32::INFINITY);
             let mesh = &eaten.scene.parts[part as usize].mesh;
@@ -120,7 +121,7 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
         }
     }
     assert!(lost > 200 && lost < shown / 3, "{lost} of {shown}");
-    // As much of the picture as of the masks: blades are seen at all angles, and overlap.
+    // The lost fractions of image and masks are similar: blades are seen at all angles, and overlap.
     let share = |parts: &[Part], of: &[Part]| {
         let count =
             |parts: &[Part]| parts.iter().filter_map(|p| p.mask.as_ref()).map(|m| m.count()).sum::<u64>() as f64;
@@ -153,7 +154,7 @@ fn a_condition_is_its_plants_own_and_the_same_every_time() {
         let own = f.scene.parts.iter().filter(|p| p.tag.plant == 2);
         own.map(|p| (p.mesh.clone(), p.mask.as_deref().cloned())).collect::<Vec<_>>()
     };
-    assert!(second(&a) == second(&b), "the first plant's condition moved the second");
+    assert!(second(&a) == second(&b), "the first plant's condition changed the second");
     assert_eq!(a.plants[1], b.plants[1]);
     let ((film, _), (again, _)) = (shoot(&b, 4, 1), shoot(&c, 4, 2));
     assert_eq!(bits(&film), bits(&again));
@@ -167,18 +168,18 @@ fn leaflets_are_eaten_one_by_one() {
     let masks: Vec<_> = blades.iter().filter_map(|p| p.mask.as_deref()).collect();
     let differ = (1..masks.len()).any(|i| masks[i] != masks[0]);
     assert!(differ, "all leaflets have the same holes");
-    // A leaf's leaflets are one leaf to the labels.
+    // All leaflets of a leaf have the same label.
     assert!(blades.iter().all(|p| p.tag == blades[0].tag));
 }
 
-/// Expected: under a sky of one radiance no pixel is brighter than the sky by more than 5 of its standard errors, and the mean of
-/// the blades is what leaves absorb below it.
+/// Expected: under a sky of uniform radiance, no pixel is brighter than the sky by more than 5 standard errors, and the
+/// mean over the blades is lower because leaves absorb light.
 #[test]
 fn sick_leaves_return_no_more_than_they_receive() {
     let ill = "(chlorosis: 1, spots: 20, scorched: 1, scorch: 0.2, dust: 0.5, splash: 15, reddening: 8)";
     let field = plants((120, 60), &[("sugar_beet", 16, &condition(ill))]);
     let (film, labels) = shoot(&field, 64, 2);
-    let least = |p: &furrow::film::Pixel| (p.mean.0 - 5.0 * p.variance.map(f32::sqrt).0).max_element();
+    let least = |p: &furrow_render::film::Pixel| (p.mean.0 - 5.0 * p.variance.map(f32::sqrt).0).max_element();
     let brightest = film.pixels.iter().map(least).fold(0.0, f32::max);
     assert!(brightest < 1.005, "{brightest}");
     let leaves = film.pixels.iter().zip(&labels.parts).filter(|(_, part)| **part != NONE).map(|(p, _)| p.mean.max());
@@ -186,7 +187,7 @@ fn sick_leaves_return_no_more_than_they_receive() {
     assert!(count > 200 && sum / (count as f32) < 0.97, "{}", sum / count as f32);
 }
 
-/// Expected: a wilted plant is lower, and its leaves reach the ground without going through it.
+/// Expected: a wilted plant is lower, and its leaves reach the ground without penetrating it.
 #[test]
 fn wilted_plants_are_lower_and_stay_above_the_ground() {
     let height = |wilt: f32| {
@@ -200,8 +201,9 @@ fn wilted_plants_are_lower_and_stay_above_the_ground() {
     assert!(all[1] < 0.95 * all[0] && all[2] < 0.9 * all[1], "{all:?}");
 }
 
-/// Expected: a page with the keyword of the last version reads, has its rims, and is told the new one; a page with the new one is not.
-/// No leaf of the synthetic sets has a rim, for no frame that they stand for has any.
+/// Expected: a scene file with the keyword of the previous version is accepted, has scorched rims, and causes a warning
+/// that names the new keyword; a file with the new keyword causes none. No leaf of the synthetic datasets has a rim,
+/// because none of the photographs that they represent has any.
 #[test]
 fn the_old_keyword_of_rims_is_read_and_told() {
     let field = plants((24, 12), &[("sugar_beet", 16, &condition("(scorch_mm: 2)"))]);
@@ -212,9 +214,10 @@ fn the_old_keyword_of_rims_is_read_and_told() {
     assert_eq!(field.warnings, Vec::<String>::new());
     for set in ["a", "b", "c", "d"] {
         let page = std::path::PathBuf::from(format!("scenes/synthetic-{set}.ron"));
-        let desc: furrow::scene::desc::FieldDesc = furrow::ron_file::RonFile::read(&page).unwrap().parse().unwrap();
-        let none =
-            |c: &Option<ConditionDesc>| c.as_ref().is_none_or(|c| c.scorched == furrow::ron_file::Vary::fixed(0.0));
+        let desc: furrow_field::desc::FieldDesc = furrow_base::ron_file::RonFile::read(&page).unwrap().parse().unwrap();
+        let none = |c: &Option<ConditionDesc>| {
+            c.as_ref().is_none_or(|c| c.scorched == furrow_base::ron_file::Vary::fixed(0.0))
+        };
         assert!(
             desc.crops.iter().all(|c| none(&c.condition)) && desc.weeds.iter().all(|w| none(&w.condition)),
             "{set}"
@@ -222,10 +225,10 @@ fn the_old_keyword_of_rims_is_read_and_told() {
     }
 }
 
-/// Of the blade that has no picture, mm.
+/// Size of a blade without an image texture, mm.
 const IMAGE: Vec2 = vec2(60.0, 100.0);
 
-/// The oldest leaf of leaf `k`'s plant, at the soil, and its marks.
+/// The oldest leaf of plant `k`, at ground level, and its marks.
 fn leaf(desc: &ConditionDesc, condition: &Condition, k: u64) -> (Material, Marks) {
     let bearer = Bearer {
         age: 1.0,
@@ -244,10 +247,10 @@ fn leaf(desc: &ConditionDesc, condition: &Condition, k: u64) -> (Material, Marks
     (Material::Leaf(LeafMaterial::new(&leaf, None).worn(optics, 1.0)), marks)
 }
 
-/// The damage of places of a leaf `step` mm apart, seen along `direction`; none where it is cut.
+/// Damage at sample points of a leaf `step` mm apart, seen along `direction`; points that are cut away are left out.
 fn places(of: &(Material, Marks), step: f32, direction: Vec3) -> Vec<Damage> {
     let corners = [Vec2::ZERO, 2.0 * Vec2::X, 2.0 * Vec2::Y];
-    // Texture rows run downwards: the upper side is up.
+    // Texture rows run downwards, so the upper side faces up.
     let positions = corners.map(|p| Vec3::new(p.x, -p.y, 0.0)).to_vec();
     let mesh = Mesh::smooth(positions, corners.to_vec(), vec![[0, 2, 1]]);
     let mask = of.1.cuts().then(|| of.1.cut(None));
@@ -255,14 +258,14 @@ fn places(of: &(Material, Marks), step: f32, direction: Vec3) -> Vec<Damage> {
     let at = |i: usize| {
         let uv = (vec2((i % columns) as f32, (i / columns) as f32) + 0.5) / vec2(columns as f32, rows as f32);
         let there = mask.as_ref().is_none_or(|mask| mask.opaque_at(uv));
-        // Barycentrics of the second and the third corner.
+        // Barycentric coordinates of the second and the third vertex.
         let hit = Hit { part: 0, triangle: 0, u: 0.5 * uv.y, v: 0.5 * uv.x, t: 1.0 };
         there.then(|| of.0.damage(&Interaction::new(&mesh, &hit, 0.0), direction))
     };
     (0..columns * rows).filter_map(at).collect()
 }
 
-/// The mean over `count` leaves of what a place has.
+/// Mean of `of` over the sample points of `count` leaves.
 fn mean(desc: &ConditionDesc, condition: &Condition, count: u64, of: impl Fn(&Damage) -> f32) -> f32 {
     let one = |k: u64| {
         let all = places(&leaf(desc, condition, k), 1.5, -Vec3::Z);
@@ -271,9 +274,9 @@ fn mean(desc: &ConditionDesc, condition: &Condition, count: u64, of: impl Fn(&Da
     (0..count).map(one).sum::<f32>() / count as f32
 }
 
-/// Rationale: the maps must hold what a condition says. Expected: yellowness and dust are the condition's on the mean of leaves, times the
-/// mean of their lognormal spread (σ 0.4, 1.083), within 4 standard errors of 200 leaves (0.43 / √200), and a place of the lower
-/// side has no dust; a healthy leaf has nothing.
+/// Rationale: the damage maps must agree with the condition. Expected: over the mean of leaves, yellowing and dust
+/// equal the condition's value times the mean of its lognormal spread (σ 0.4, 1.083), within 4 standard errors of 200
+/// leaves (0.43 / √200). The lower side has no dust, and a healthy leaf has no damage.
 #[test]
 fn damage_is_what_the_condition_says() {
     let flawless = ConditionDesc::flawless();
@@ -282,13 +285,17 @@ fn damage_is_what_the_condition_says() {
     let dusty = Condition { dust: 0.2, ..Condition::default() };
     let dust = mean(&flawless, &dusty, 200, |d| d.soil);
     assert!((dust / (0.2 * 1.083) - 1.0).abs() < 0.13, "{dust}");
-    assert!(places(&leaf(&flawless, &dusty, 1), 5.0, Vec3::Z).iter().all(|d| d.soil == 0.0), "no soil lies below");
+    assert!(
+        places(&leaf(&flawless, &dusty, 1), 5.0, Vec3::Z).iter().all(|d| d.soil == 0.0),
+        "the lower side must have no soil"
+    );
     let healthy = leaf(&flawless, &Condition::default(), 1);
     assert!(places(&healthy, 2.0, -Vec3::Z).iter().all(|d| *d == Damage::default()));
 }
 
-/// Expected: a spot of radius r is dead over r² ∫ (1 − (1 − r(d)) (1 − b(d))) 2πd dd, less what lies beyond the leaf: a disc of radius R in a
-/// width W loses 4R / 3πW. 300 leaves of 4 spots on the mean: 4 standard errors are 12 %.
+/// Expected: a spot of radius r is necrotic over r² ∫ (1 − (1 − r(d)) (1 − b(d))) 2πd dd, minus the area outside the
+/// leaf: a disc of radius R in a width W loses the fraction 4R / 3πW. For 300 leaves with 4 spots on average, 4
+/// standard errors are 12 %.
 #[test]
 fn spots_are_dead_over_the_area_of_their_radius() {
     let radius = 3.0;
@@ -308,8 +315,8 @@ fn spots_are_dead_over_the_area_of_their_radius() {
     assert!(yellow > mean(&desc, &condition, 20, |d| d.necrosis), "spots have a yellow border");
 }
 
-/// Expected: the rim of a hole of radius r is a ring of 0.35 mm, π ((r + 0.35)² − r²), within 10 % over 60 leaves; a torn leaf has an
-/// edge, too.
+/// Expected: the rim of a hole of radius r is a ring 0.35 mm wide with area π ((r + 0.35)² − r²), within 10 % over 60
+/// leaves; a torn leaf has a rim, too.
 #[test]
 fn edges_are_rings_round_holes() {
     let desc = ConditionDesc { hole_mm: Vary::fixed(3.0), ..ConditionDesc::flawless() };
@@ -327,8 +334,8 @@ fn edges_are_rings_round_holes() {
     assert!(places(&leaf(&desc, &torn, 2), 0.25, -Vec3::Z).iter().any(|d| d.edge));
 }
 
-/// Rationale: the maps are asked by rays of their own, which must be those of the labels. Expected: a flawless plant has none of it; of a
-/// sick one, blades and seed leaves alone have any, and all kinds occur.
+/// Rationale: damage maps are traced with separate rays, which must equal those of the labels. Expected: a flawless
+/// plant has no damage; on a sick plant, damage occurs only on blades and cotyledons, and every kind occurs.
 #[test]
 fn damage_lies_where_labels_show_blades() {
     let seen = |field: &Field| {

@@ -1,25 +1,27 @@
-//! What share of each pixel a class covers.
+//! Coverage: the fraction of each pixel that a class covers.
 //!
-//! Rationale: a label tells one class a pixel, an edge pixel shows two. Shares must be those of the picture's own samples: the
-//! same footprint, the same lens, the same masks, so that whoever leaves out edges leaves out what is mixed in the picture.
-//! Expected: for a quadrilateral each pixel's share is the area of their intersection, within the error of that many samples;
-//! shares sum to one; parts of one class count together. Any way of rendering counts the same samples.
-//! Source: area of a clipped polygon (Sutherland & Hodgman 1974); variance of a share, p (1 − p) / n.
+//! Rationale: a label gives each pixel one class, but an edge pixel shows two. Fractions must come from the samples of
+//! the image itself, with the same footprint, lens and masks, so that users who mask out edges remove exactly the
+//! pixels that are mixed in the image.
+//!
+//! Expected: for a quadrilateral, the fraction of each pixel is the area of their intersection, within the sampling
+//! error; fractions sum to one; parts of one class count together. All rendering modes count the same samples. Source:
+//! area of a clipped polygon (Sutherland & Hodgman 1974); variance of a fraction, p (1 − p) / n.
 
 use crate::common::program;
 use crate::common::scenes::{camera, scene, shoot, square, with_world};
-use furrow::bsdf::Bsdf;
-use furrow::film::Film;
-use furrow::geometry::Window;
-use furrow::integrator::{FalseColor, PathTracer};
-use furrow::math::{Mat3, Vec3, vec3};
-use furrow::render::{self, Settings, coverage};
-use furrow::sampling::Points;
-use furrow::scene::Scene;
-use furrow::scene::assemble::Options;
-use furrow::scene::tag::{Class, Tag};
+use furrow_base::geometry::Window;
+use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::sampling::Points;
+use furrow_field::assemble::Options;
+use furrow_optics::bsdf::Bsdf;
+use furrow_render::film::Film;
+use furrow_render::integrator::{FalseColor, PathTracer};
+use furrow_render::render::{self, Settings, coverage};
+use furrow_render::scene::Scene;
+use furrow_render::scene::tag::{Class, Tag};
 
-/// The share of the pixel at (x, y) that lies in a convex polygon, pixels.
+/// Fraction of the pixel (x, y) inside a convex polygon; coordinates are in pixels.
 fn area(polygon: &[[f64; 2]], x: u32, y: u32) -> f64 {
     let mut left: Vec<[f64; 2]> = polygon.to_vec();
     let (x, y) = (f64::from(x), f64::from(y));
@@ -44,12 +46,12 @@ fn area(polygon: &[[f64; 2]], x: u32, y: u32) -> f64 {
     0.5 * twice.abs()
 }
 
-/// A tilted square, half of it crop, half of it weed in two leaves, over nothing.
+/// Builds a tilted square without background: half is crop, the other half is weed, split into two leaves.
 fn flag() -> Scene {
     let bsdf = Bsdf::examples()[0].1;
     let mut whole = square(Vec3::ZERO, 0.4);
     whole.transform(Mat3::from_rotation_z(0.4) * Mat3::from_rotation_x(0.3), vec3(0.01, 0.02, 0.0));
-    // The two triangles of the square, and the second once more cut in two.
+    // The two triangles of the square; the second is cut in two again.
     let [first, second] = [0, 1].map(|t| {
         let mut mesh = whole.clone();
         mesh.triangles = vec![whole.triangles[t]];
@@ -89,7 +91,7 @@ fn a_quadrilateral_covers_of_each_pixel_the_area_that_geometry_says() {
         let (crop, weed) = (area(&outline(0), x, y), area(&outline(1), x, y) + area(&outline(2), x, y));
         for (class, expected) in Class::ALL.into_iter().zip([1.0 - crop - weed, crop, weed]) {
             let is = f64::from(share[class as usize]);
-            // Five standard deviations of independent samples, and a sample that rounding may put across.
+            // Five standard deviations of independent samples, plus one sample that rounding may move across an edge.
             let deviation = (expected * (1.0 - expected)).max(0.0).sqrt() / f64::from(SPP).sqrt();
             assert!(
                 (is - expected).abs() <= 5.0 * deviation + 1.5 / f64::from(SPP),
@@ -103,11 +105,12 @@ fn a_quadrilateral_covers_of_each_pixel_the_area_that_geometry_says() {
         assert!((share.iter().sum::<f32>() - 1.0).abs() <= f32::EPSILON, "{share:?}");
     }
     assert!(edges > 60, "{edges} shares of edges");
-    // Stratified samples do better than independent ones, on the mean too.
+    // Stratified samples have less variance than independent ones, also on average.
     assert!(chi2 < f64::from(edges), "{chi2} over {edges}");
 }
 
-/// Expected: another integrator has the same camera samples, so it counts the same; so do passes, a deadline and a crop.
+/// Expected: another integrator uses the same camera samples and so counts the same, as do passes, a deadline and a
+/// crop.
 #[test]
 fn every_way_of_rendering_counts_the_same_samples() {
     let field = program::field(&program::small_text(), &Options { width: Some(40), ..Options::default() });
@@ -119,7 +122,7 @@ fn every_way_of_rendering_counts_the_same_samples() {
         let path = PathTracer::default();
         let whole = render::render(world, &path, &settings, watch).unwrap();
         assert!(whole.pixels.iter().all(|p| p.tally.iter().map(|(_, n)| n).sum::<u32>() <= p.samples));
-        assert!(whole.pixels.iter().any(|p| p.tally.iter().count() > 2), "no pixel of several parts");
+        assert!(whole.pixels.iter().any(|p| p.tally.iter().count() > 2), "no pixel contains more than two parts");
         let ids = render::render(world, &FalseColor::Ids, &settings, watch).unwrap();
         assert_eq!(tallies(&ids), tallies(&whole));
         let mut passes = render::Progressive::new(world, &path, &settings);
@@ -134,11 +137,11 @@ fn every_way_of_rendering_counts_the_same_samples() {
                 assert_eq!(part.at(x - crop.x0, y - crop.y0).tally, whole.at(x, y).tally, "{x},{y}");
             }
         }
-        // Where samples differ from pixel to pixel, shares still sum to one.
+        // If the number of samples varies between pixels, the fractions still sum to one.
         let open = Settings { spp: 256, ..settings };
         let adaptive = render::adaptive(world, &path, &open, 0.1, None, watch).unwrap();
         let (least, _, most) = adaptive.samples();
-        assert!(least < most, "every tile has {least} samples");
+        assert!(least < most, "all tiles have {least} samples");
         for share in coverage(&adaptive, &scene.tags()) {
             assert!(
                 (share.iter().sum::<f32>() - 1.0).abs() <= f32::EPSILON
@@ -148,8 +151,8 @@ fn every_way_of_rendering_counts_the_same_samples() {
     });
 }
 
-/// Rationale: coverage is worth having where it says what a label cannot. Expected: where all shares but one are zero the label is
-/// that class, and edges are few beside the rest.
+/// Rationale: coverage must be consistent with labels. Expected: if all fractions but one are zero, the label is that
+/// class, and edge pixels are a minority.
 #[test]
 fn a_pixel_of_one_class_has_its_label() {
     let field = program::field(&program::small_text(), &Options::default());

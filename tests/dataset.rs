@@ -1,15 +1,19 @@
-//! Datasets: image k is field k and nothing else, whatever makes it, in whatever order and however often it is interrupted.
+//! Datasets: image k is field k, whichever command, machine and order of work renders it, and however often it is
+//! interrupted.
 //!
-//! Rationale: what is rendered over a night on many machines must be one dataset, and must be what it says. Expected: equality
-//! byte for byte, with the single field and between shards, threads and repairs; every damage found, every broken rule told;
-//! bad input refused with nothing changed. Source: none needed, equality is exact.
+//! Rationale: images rendered overnight on many machines must form one consistent, correctly labelled dataset.
+//! Expected: byte equality with the single field and between shards, threads and repairs; every damage is found and
+//! every violated invariant reported; invalid input is refused and changes nothing. Source: none needed, equality is
+//! exact.
 
 use crate::common::dataset::{fail, made, make, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, run, scratch, trace};
-use furrow::dataset::checksum::Checksum;
-use furrow::dataset::checksum_record::ChecksumRecord;
-use furrow::dataset::record::PointState;
-use furrow::dataset::{Sample, Set, invariants, native};
+use furrow_dataset::model::invariants;
+use furrow_dataset::model::record::PointState;
+use furrow_dataset::read::checksum::Checksum;
+use furrow_dataset::read::checksum_record::ChecksumRecord;
+use furrow_dataset::read::native;
+use furrow_dataset::{Sample, Set};
 use std::fs;
 use std::path::Path;
 
@@ -23,7 +27,7 @@ fn an_image_of_a_dataset_is_the_single_field() {
     for name in ["semantics.png", "plants.png", "leaves.png"] {
         assert_eq!(fs::read(image.join(name)).unwrap(), fs::read(one.join(name)).unwrap(), "{name}");
     }
-    // Photographs of a dataset have no comment, so that they are the files of its formats.
+    // Colour and near-infrared images of a dataset contain no comment, so that the formats can use the same files.
     for name in ["rgb.png", "nir.png"] {
         let pixels = |folder: &Path| image::open(folder.join(name)).unwrap().into_bytes();
         assert_eq!(pixels(&image), pixels(&one), "{name}");
@@ -58,11 +62,12 @@ fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
     };
     succeed(bare("2"));
     succeed(bare("4"));
-    assert_eq!(made(&grown).len(), 4, "the first two are not made again");
+    assert_eq!(made(&grown).len(), 4, "the first two must not be rendered again");
     succeed(verb("finish", &grown, &["--format", "imagefolder", "--quiet"]));
     succeed(make(&fresh, 4, &[]));
     same(&tree(&grown), &tree(&fresh));
-    // A format that was planned and not yet made is missing, not forgotten; and the order of asking makes no other dataset.
+    // A planned format that is not written yet counts as missing, and the order of requests does not change the
+    // dataset.
     let page = ["dataset", "plan", "--scene", SMALL, "--count", "4", "--out", path(&grown)];
     succeed(trace(&[&page[..], &crate::common::dataset::SIZE[..4], &["--format", "coco"]].concat()));
     let said = fail(verb("finish", &grown, &[]), 1);
@@ -113,8 +118,9 @@ fn what_is_damaged_is_found_and_made_again_and_nothing_else() {
     succeed(verb("verify", &data, &[]));
 }
 
-/// Rationale: a folder that was copied in part may have other faults. Expected: with an image missing, the scene's copy and the tables are held against the
-/// manifest all the same, and the image's files are not told one by one; what no manifest tells yet is said not to have been checked, and is no fault.
+/// Rationale: a partially copied folder may have further faults. Expected: with an image missing, the copy of the scene
+/// and the tables are still compared with the manifest, and the missing image's files are not listed one by one; files
+/// that no manifest covers yet are reported as unchecked, not as faults.
 #[test]
 fn what_is_of_all_images_is_checked_though_one_is_missing() {
     let (_keep, data) = scratch();
@@ -139,20 +145,21 @@ fn what_is_of_all_images_is_checked_though_one_is_missing() {
         fs::write(data.join(name), &whole[name]).unwrap();
     }
     assert!(said.contains("; 2 faults"), "{said}");
-    // One that is made longer: the manifest is of before.
+    // A dataset that was extended: the manifest is older.
     let page = ["dataset", "plan", "--scene", SMALL, "--out", path(&data), "--count", "4"];
     succeed(trace(&[&page[..], &crate::common::dataset::SIZE].concat()));
     let said = told();
     assert!(said.contains("2 of 4 images are missing: 1,3") && said.contains("; 0 faults"), "{said}");
     assert!(said.contains("not checked: dataset.json and images by manifest.json"), "{said}");
-    // One that was never finished.
+    // A dataset that was never finished.
     fs::remove_file(data.join("manifest.json")).unwrap();
     let said = told();
     assert!(said.contains("; 0 faults") && !said.contains("manifest.json is missing"), "{said}");
     assert!(said.contains("not checked: scene, lists and tables, for manifest.json is written when"), "{said}");
 }
 
-/// Rationale: tables and lists repeat what records say. Expected: a record of which a number was changed ends `finish` with its name, and no table is written anew.
+/// Rationale: tables and lists repeat the contents of records. Expected: `finish` fails and names the record in which a
+/// number was changed, and writes no table.
 #[test]
 fn finish_takes_no_record_that_was_changed() {
     let (_keep, data) = scratch();
@@ -170,8 +177,9 @@ fn finish_takes_no_record_that_was_changed() {
     assert_eq!(fs::read_to_string(&record).unwrap(), text);
 }
 
-/// Rationale: the share of doubtful pixels that is allowed is less than one pixel in a tiny image, which was then refused for a blade beside its centre.
-/// Expected: eight images of one pixel, and of two by two, are made and hold.
+/// Rationale: the tolerated fraction of inconsistent pixels is less than one pixel of a tiny image, which was therefore
+/// refused because of a leaf beside the pixel's centre. Expected: eight images of 1 × 1 and of 2 × 2 pixels are
+/// rendered and pass the checks.
 #[test]
 fn an_image_of_one_pixel_is_an_image() {
     let (_keep, data) = scratch();
@@ -206,10 +214,10 @@ fn a_lying_label_is_found_though_its_hash_is_right() {
     assert!(said.contains("rendered again, these come out otherwise"), "{said}");
 }
 
-/// Rationale: a dataset that was rendered with one version of Embree is checked where there is another, whose hits differ in the last bits.
-/// Expected: both are named and the difference is bounded instead of the bytes compared; a photograph that is further away than kernels
-/// explain is a fault; nothing is rendered into the dataset with the others. Source: a recipe that names kernels that are nowhere, with all
-/// checksums made again.
+/// Rationale: a dataset rendered with one version of Embree is verified with another, whose hits differ in the last
+/// bits. Expected: both versions are named, and the difference is bounded instead of comparing bytes; an image that
+/// differs by more than the kernels explain is a fault; no new images are rendered into the dataset. Source: a recipe
+/// that names a fictitious kernel version, with all checksums updated.
 #[test]
 fn other_kernels_are_named_and_their_difference_is_bounded() {
     let (_keep, data) = scratch();
@@ -235,13 +243,13 @@ fn other_kernels_are_named_and_their_difference_is_bounded() {
     let said = fail(verb("render", &data, &[]), 2);
     assert!(said.contains("begun with the ray tracing kernels Embree 9.9.9 avx2"), "{said}");
 
-    // Every value of one photograph one level aside: an exposure, not a hit.
+    // Every value of one image is changed by one level: more than a changed hit explains.
     let mut sample = native::read(&data, "000001").unwrap();
     sample.rgb.as_flattened_mut().iter_mut().for_each(|value| *value ^= 1);
     let recipe = Set::open(&data).unwrap().recipe;
     let file =
         native::files(&recipe, &sample, "").unwrap().into_iter().find(|file| file.path.ends_with("rgb.png")).unwrap();
-    // A new file: the old one is the format's as well.
+    // A new file, because the old one is hard-linked to the format's file.
     fs::remove_file(data.join(&file.path)).unwrap();
     fs::write(data.join(&file.path), &file.bytes).unwrap();
     seal(1, &|seal| drop(seal.files.insert(file.path.clone(), Checksum::of(&file.bytes))));
@@ -253,8 +261,9 @@ fn other_kernels_are_named_and_their_difference_is_bounded() {
     assert!(said.contains(&fault) && said.contains("1 rendered again by"), "{said}");
 }
 
-/// Rationale: datasets come from other people. Expected: a record, a list of checksums or a recipe that names a path elsewhere is a fault
-/// to `verify` and an error to what would read or write there, though all checksums are right; nothing appears beside the folder.
+/// Rationale: datasets come from other people. Expected: a record, a list of checksums or a recipe with a path outside
+/// the dataset is a fault for `verify` and an error for commands that would read or write there, even with correct
+/// checksums; no file appears beside the folder.
 #[test]
 fn a_forged_dataset_leads_nowhere_else() {
     let (_keep, around) = scratch();
@@ -274,7 +283,7 @@ fn a_forged_dataset_leads_nowhere_else() {
             fs::write(data.join(name), bytes).unwrap();
         }
     };
-    // Its name.
+    // The name of an image.
     let record = data.join("images/000001/record.json");
     for name in ["../../x", "/tmp/x", "000000"] {
         let forged = fs::read_to_string(&record).unwrap().replacen("\"000001\"", &format!("\"{name}\""), 1);
@@ -287,7 +296,7 @@ fn a_forged_dataset_leads_nowhere_else() {
         assert_eq!(beside(), 2, "{name}");
         restore();
     }
-    // Another file among its checksums.
+    // A foreign file among the checksums.
     seal("../secret.ron", b"a secret of this machine");
     let said = fail(verb("verify", &data, &[]), 1);
     assert!(said.contains("../secret.ron does not lie in the dataset's folder"), "{said}");
@@ -299,7 +308,7 @@ fn a_forged_dataset_leads_nowhere_else() {
     for other in [secret.to_str().unwrap(), "../secret.ron"] {
         fs::write(&recipe, text.replace(&format!("\"scene\": \"{scene}\""), &format!("\"scene\": \"{other}\"")))
             .unwrap();
-        // With all hashes made again.
+        // With all hashes updated.
         let recipe = Set::open(&data).unwrap().recipe.fingerprint().unwrap();
         for index in 0..2 {
             let path = data.join(format!("seals/{index:06}.json"));
@@ -317,8 +326,9 @@ fn a_forged_dataset_leads_nowhere_else() {
     }
 }
 
-/// Rationale: the scene of a dataset from elsewhere is read when it is rendered again. Expected: neither the scene nor a species file nor a
-/// model nor a link in it leads out of the dataset's folder, and nothing that lies there is told; a scene that stays inside by `..` is fine.
+/// Rationale: the scene of a foreign dataset is read when images are rendered again. Expected: no path in the scene, a
+/// species file or a model, and no link, leads out of the dataset's folder, and no file content from outside is shown;
+/// a scene whose paths contain `..` but stay inside is accepted.
 #[test]
 fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
     let (_keep, around) = scratch();
@@ -374,8 +384,9 @@ fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
     succeed(verb("verify", &data, &["--rerender", "1"]));
 }
 
-/// Rationale: a model of one's own may name pictures elsewhere. Expected: the dataset takes them in and is rendered again where they
-/// are gone; a path that cannot be rewritten, in a file that is no RON file, is refused at once.
+/// Rationale: a user's model may name images in other folders. Expected: the dataset copies them, and can be rendered
+/// again after the originals are deleted; a path that cannot be rewritten, because it is not in a RON file, is refused
+/// at once.
 #[test]
 fn a_model_that_may_name_files_outside_is_taken_into_the_dataset() {
     let (_keep, around) = scratch();
@@ -402,7 +413,7 @@ fn a_model_that_may_name_files_outside_is_taken_into_the_dataset() {
     assert!(data.join("scene/materials/leaf.mtl").is_file());
     fs::remove_dir_all(around.join("materials")).unwrap();
     succeed(verb("verify", &data, &["--rerender", "1"]));
-    // By an absolute path.
+    // With an absolute path.
     write("elsewhere/leaf.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
     write("models/plant.obj", &format!("mtllib {}\n{square}", path(&around.join("elsewhere/leaf.mtl"))));
     let other = around.join("other");
@@ -411,7 +422,8 @@ fn a_model_that_may_name_files_outside_is_taken_into_the_dataset() {
     assert!(!other.exists(), "{said}");
 }
 
-/// Rationale: a file that all fields need is missing for all of them. Expected: one error, and no image is tried after it.
+/// Rationale: a file needed by every field is missing for all of them. Expected: one error, and no further image is
+/// tried.
 #[test]
 fn a_file_that_is_gone_ends_a_dataset_at_once() {
     let (_keep, data) = scratch();
@@ -453,7 +465,7 @@ fn samples_come_back_from_their_files() {
     assert!(native::read(&copy, "000000").unwrap() == sample);
 }
 
-/// A sample whose plants and leaves are many enough to break.
+/// Generates a sample with enough plants and leaves for the tests below.
 fn sample(data: &Path) -> (Set, Sample) {
     succeed(make(data, 1, &["--keep", "nir,coverage,depth,normals"]));
     let set = Set::open(data).unwrap();
@@ -462,10 +474,10 @@ fn sample(data: &Path) -> (Set, Sample) {
     (set, sample)
 }
 
-/// What must be said, and what is broken.
+/// Expected words of the fault, and the change that breaks the sample.
 type Break<'a> = (&'a str, Box<dyn Fn(&mut Sample) + 'a>);
 
-/// Each break is one that a bug, a disk or a hand could make; each must be told in words of its own.
+/// Each change could come from a bug, a disk or manual editing; each must be reported with its own message.
 #[test]
 fn every_broken_invariant_is_told() {
     let (_keep, data) = scratch();
@@ -482,7 +494,7 @@ fn every_broken_invariant_is_told() {
         ("another class or species", Box::new(|s| s.semantics[plant] = 3 - s.semantics[plant])),
         ("or are soil", Box::new(|s| s.semantics[plant] = 0)),
         ("is not among the", Box::new(|s| s.species.iter_mut().filter(|k| **k > 0).for_each(|k| *k = 200))),
-        ("it is in the split", Box::new(|s| s.record.split = furrow::dataset::split::Split::Test)),
+        ("it is in the split", Box::new(|s| s.record.split = furrow_dataset::model::split::Split::Test)),
         ("a keypoint is not a number", Box::new(|s| s.record.plants[0].stem.as_mut().unwrap().x = f32::NAN)),
         ("the identity", Box::new(|s| s.record.plants[1].id = s.record.plants[0].id)),
         ("the identity 0", Box::new(|s| s.record.plants[0].id = Some(0))),
@@ -523,8 +535,9 @@ fn every_broken_invariant_is_told() {
     }
 }
 
-/// Rationale: an image of feathery leaves alone, each finer than a pixel, ended a dataset. Expected: of labels in stripes of one pixel, where
-/// samples miss every thirtieth, none is told; maps that lie one pixel apart are, in stripes of two.
+/// Rationale: an image of feathery leaves, each narrower than a pixel, aborted a dataset. Expected: labels in stripes
+/// one pixel wide, whose samples miss every thirtieth, are accepted; maps shifted by one pixel are reported for stripes
+/// two pixels wide.
 #[test]
 fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
     let (_keep, data) = scratch();
@@ -545,14 +558,14 @@ fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
         shifted.coverage[at] = share(((at % width).div_ceil(2) % 2) as u8);
     }
     assert!(told(&shifted));
-    // A scene file that ships, of leaves much finer than so few pixels.
+    // A shipped scene file whose leaves are much narrower than a pixel at this size.
     let coarse = path(&data).to_owned() + "-coarse";
     let mut command = trace(&["dataset", "--scene", "scenes/any-field.ron", "--count", "3", "--spp", "1", "--quiet"]);
     command.args(["--width", "64", "--height", "48", "--out", &coarse]);
     succeed(command);
 }
 
-/// Expected: a stem and leaf ends lie where the label maps say that their plant is, within a pixel, wherever they are told to be visible.
+/// Expected: wherever stems and leaf tips are marked visible, the label maps show their plant within one pixel.
 #[test]
 fn keypoints_lie_on_what_they_belong_to() {
     let (_keep, data) = scratch();
@@ -578,7 +591,7 @@ fn keypoints_lie_on_what_they_belong_to() {
             }
         }
     }
-    assert!(visible > 10 && other > 0, "{visible} visible, {other} not");
+    assert!(visible > 10 && other > 0, "{visible} visible, {other} not visible");
 }
 
 #[test]
@@ -599,14 +612,14 @@ fn bad_input_is_refused_and_changes_nothing() {
     let said = fail(verb("render", &data, &["--shard", "3/3"]), 2);
     assert!(said.contains("k from 0 to N - 1"), "{said}");
     same(&tree(&data), &before);
-    // A folder with other things in it.
+    // A folder with foreign files in it.
     let (_keep, full) = scratch();
     fs::create_dir_all(&full).unwrap();
     fs::write(full.join("thesis.tex"), b"three years").unwrap();
     let said = fail(make(&full, 1, &[]), 2);
     assert!(said.contains("thesis.tex among them"), "{said}");
     assert_eq!(tree(&full).len(), 1);
-    // A page that was changed under the dataset.
+    // A scene file that was changed after the dataset was started.
     let page = fs::read_to_string(data.join("scene/tests/ref/small.ron")).unwrap();
     fs::write(data.join("scene/tests/ref/small.ron"), page.replace("elevation_deg: 45", "elevation_deg: 50")).unwrap();
     fs::remove_file(data.join("images/000001/rgb.png")).unwrap();
@@ -614,8 +627,8 @@ fn bad_input_is_refused_and_changes_nothing() {
     assert!(said.contains("was changed since the dataset was begun"), "{said}");
 }
 
-/// A file lies where an image's folder must be: a cause that lasts. Expected: the run ends at once with exit code 1, the images
-/// before are kept, those after are not begun; without it the same command makes the rest.
+/// A file blocks the path of an image folder, a permanent fault. Expected: the run ends at once with exit code 1;
+/// earlier images are kept and later ones not started; after the file is removed, the same command renders the rest.
 #[test]
 fn a_cause_that_lasts_ends_a_dataset_and_keeps_what_is_made() {
     let (_keep, data) = scratch();
@@ -640,7 +653,7 @@ fn a_cause_that_lasts_ends_a_dataset_and_keeps_what_is_made() {
     same(&tree(&data), &tree(&whole));
 }
 
-/// A sun that has set in some fields and not in others: a fault of single images, told when all others are made.
+/// The sun is below the horizon in some fields only: a fault of single images, reported after all others are rendered.
 #[test]
 fn fields_that_cannot_be_do_not_keep_others_from_being() {
     let (_keep, data) = scratch();
@@ -656,7 +669,7 @@ fn fields_that_cannot_be_do_not_keep_others_from_being() {
         let plan = ["dataset", "plan", "--scene", path(&page), "--count", "12", "--spp", "2", "--out", path(&data)];
         trace(&plan).output().unwrap().status.success()
     });
-    assert!(begun, "twenty times the sun had set in the first field");
+    assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
     let said = fail(verb("render", &data, &["--quiet"]), 2);
     let faults = said.matches("image 0000").count();
     let sealed = fs::read_dir(data.join("seals")).unwrap().count();
@@ -664,8 +677,9 @@ fn fields_that_cannot_be_do_not_keep_others_from_being() {
     assert!(said.contains("below the horizon"), "{said}");
 }
 
-/// Rationale: users name textures and species by absolute paths; such a dataset must go on, and on other machines too. Expected: it is
-/// made, continued and rendered again after it moved and everything that the scene named is gone; no path of the machine is in it.
+/// Rationale: users name textures and species by absolute paths, and such a dataset must also continue on other
+/// machines. Expected: it can be generated, continued and rendered again after it was moved and every file named by the
+/// scene was deleted; it contains no path of the original machine.
 #[test]
 fn absolute_paths_are_taken_into_the_dataset() {
     let (_keep, here) = scratch();
@@ -680,7 +694,8 @@ fn absolute_paths_are_taken_into_the_dataset() {
     let texture = there.join("textures/earth.png");
     fs::create_dir_all(texture.parent().unwrap()).unwrap();
     fs::copy(from.join("earth.png"), &texture).unwrap();
-    // The species lies elsewhere and names its picture by a relative path; the soil's picture is named by an absolute one.
+    // The species file is in another folder and names its image by a relative path; the soil's image has an absolute
+    // path.
     let stalk = "\"stalk\": Leaf(";
     let grass = fs::read_to_string(from.join("grass.ron")).unwrap();
     assert!(grass.contains(stalk));
@@ -702,7 +717,7 @@ fn absolute_paths_are_taken_into_the_dataset() {
     };
     succeed(make("1"));
     succeed(make("2"));
-    assert_eq!(made(&data).len(), 2, "the second run goes on with the first one's dataset");
+    assert_eq!(made(&data).len(), 2, "the second run must continue the first one's dataset");
     let moved = elsewhere.join("data");
     fs::rename(&data, &moved).unwrap();
     for gone in [&here, &there] {

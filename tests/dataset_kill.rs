@@ -1,8 +1,9 @@
-//! No image is lost: a dataset that is killed at any moment, or whose disk is full, is gone on with and ends as if nothing had been.
+//! No image is lost: a dataset whose generation is killed at any moment, or whose disk is full, can be resumed and ends
+//! like an undisturbed run.
 //!
-//! Rationale: a night's rendering meets power cuts, preemption and full disks. Expected: after any number of kills the same command
-//! ends with the bytes of an uninterrupted run and no file beside them; a full disk is one clear error and no half file; TERM and USR1 are
-//! exit code 75. Source: none needed, equality is exact.
+//! Rationale: overnight rendering meets power cuts, preemption and full disks. Expected: after any number of kills, the
+//! same command ends with the bytes of an uninterrupted run and no extra file; a full disk gives one clear error and no
+//! partial file; TERM and USR1 give exit code 75. Source: none needed, equality is exact.
 
 use crate::common::dataset::{made, make, path, same, succeed, tree};
 use crate::common::program::{SMALL, scratch, trace};
@@ -11,7 +12,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A small generator: the moments must differ, and be the same in every run of the test.
+/// Xorshift generator: the moments must differ from each other, but be the same in every run of the test.
 fn moments() -> impl FnMut() -> u64 {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     move || {
@@ -35,20 +36,20 @@ fn killed_twenty_times_it_ends_as_if_never_killed() {
     for _ in 0..20 {
         let mut child =
             make(&data, COUNT, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
-        // Within the first quarter of a whole run: so that many kills hit work.
+        // Within the first quarter of a full run, so that many kills hit a working program.
         std::thread::sleep(once.mul_f64(0.25 * (next() % 1000) as f64 / 1000.0));
         alive += u32::from(child.try_wait().expect("a child").is_none());
         child.kill().expect("a kill");
         child.wait().expect("an end");
     }
-    assert!(alive > 10, "{alive} of 20 kills hit a running program");
+    assert!(alive > 10, "{alive} of 20 kills hit a running program: too few");
     succeed(make(&data, COUNT, &[]));
     same(&tree(&data), &tree(&whole));
     assert!(made(&data).len() as u64 >= COUNT);
 }
 
-/// Rationale: the same command is started twice, by hand or by a scheduler that lost sight of the first. Expected: both end well,
-/// whatever the second finds of the first, and what is there is what one alone makes.
+/// Rationale: the same command is started twice, by hand or by a scheduler that lost track of the first. Expected: both
+/// succeed, whatever the second finds of the first, and the dataset equals that of a single run.
 #[test]
 fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     const COUNT: u64 = 3;
@@ -68,7 +69,7 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
         let (_keep, data) = scratch();
         let start = || make(&data).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program");
         let first = start();
-        // Also at the same moment: two that begin one dataset.
+        // Every fourth pair starts at the same moment, so that two runs start one dataset.
         if pair % 4 > 0 {
             std::thread::sleep(once.mul_f64((next() % 1000) as f64 / 1000.0));
         }
@@ -82,7 +83,8 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     }
 }
 
-/// A file system of its own, so small that it gets full: tmpfs, in a mount namespace of its own where this user may not mount.
+/// Runs a script on a separate tmpfs so small that it fills up; uses a private mount namespace if this user may not
+/// mount. Returns `None` if neither is allowed.
 fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<std::process::Output> {
     std::fs::create_dir_all(folder).expect("a folder");
     let mount = format!("mount -t tmpfs -o size={kilobytes}k tmpfs '{}' && {{ {script}; }}", path(folder));
@@ -95,7 +97,7 @@ fn on_a_small_disk(folder: &Path, kilobytes: u32, script: &str) -> Option<std::p
             }
         }
     }
-    // A right that a machine may withhold, not a program that could be installed.
+    // A permission that a machine may deny, not a program that could be installed.
     eprintln!("skipped: this user can mount no small disk");
     None
 }
@@ -106,7 +108,7 @@ fn a_full_disk_is_one_clear_error_and_no_half_file() {
     let (_keep, whole) = scratch();
     succeed(make(&whole, 8, &[]));
     let size: usize = tree(&whole).values().map(Vec::len).sum();
-    // Half of it fits. Then room is made, and the same command ends as if nothing had been.
+    // Half of the dataset fits. Then the disk is enlarged, and the same command ends like an undisturbed run.
     let data = disk.join("data");
     let command = format!("{:?}", make(&data, 8, &[]));
     let copy = disk.with_extension("copy");
@@ -121,16 +123,16 @@ fn a_full_disk_is_one_clear_error_and_no_half_file() {
     let Some(output) = on_a_small_disk(&disk, (size / 2048) as u32, &script) else { return };
     let said = String::from_utf8_lossy(&output.stderr);
     let lines: Vec<&str> = said.lines().collect();
-    let [error, help, code] = lines[..] else { panic!("one error with a help, and its code, but: {said}") };
+    let [error, help, code] = lines[..] else { panic!("expected one error, its help and the exit code, got: {said}") };
     assert!(error.starts_with("error: ") && error.contains("No space left on device"), "{error}");
     assert!(help.contains("make room on the disk"), "{help}");
     assert_eq!(code, "code 1");
     assert!(output.status.success(), "{said}");
     same(&tree(&copy), &tree(&whole));
-    std::fs::remove_dir_all(copy).expect("the copy goes");
+    std::fs::remove_dir_all(copy).expect("the copy is removed");
 }
 
-/// Expected: USR1 lets the images under way be finished, TERM does not wait for them; both are 75, and what is there stays.
+/// Expected: USR1 lets the images in progress finish, TERM does not; both exit with 75, and finished images are kept.
 #[test]
 fn signals_stop_a_dataset_cleanly() {
     for signal in ["-USR1", "-TERM"] {
@@ -160,7 +162,7 @@ fn signals_stop_a_dataset_cleanly() {
             format!("{}: stopped: {sealed} of 500 images are there\n help: the same command goes on", path(&data));
         assert!(said.contains(&told) && !said.contains("nothing was written"), "{signal}: {said}");
         if signal == "-USR1" {
-            assert_eq!(sealed, images, "images under way are finished");
+            assert_eq!(sealed, images, "images in progress must be finished");
         }
     }
 }

@@ -1,16 +1,19 @@
-//! Symbolic links in the folder of a dataset: nothing is written or removed where they lead.
+//! Symbolic links inside a dataset's folder: nothing is written or removed at their targets.
 //!
-//! Rationale: datasets come from other people, and a folder in one may be a link to a folder of the user's. Expected: each such link is
-//! refused with exit code 2 by whatever reads or writes the dataset, one that appears later is an error at the place of writing, and the
-//! folder to which it leads keeps every byte. Links to the dataset's own folder, and those that are the user's, change nothing.
+//! Rationale: datasets come from other people, and a folder in one may be a link to one of the user's own folders.
+//! Expected: each such link is refused with exit code 2 by every command that reads or writes the dataset; a link that
+//! appears later is an error at the moment of writing; the target folder keeps every byte. Links to the dataset's own
+//! folder, and links that the user made on purpose, change nothing.
 
 use crate::common::dataset::{fail, make, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, trace};
-use furrow::Result;
-use furrow::dataset::generate::generate;
-use furrow::dataset::verify::Again;
-use furrow::dataset::{Callbacks, Set, Work, finish, verify};
-use furrow::job::Threads;
+use furrow_base::Result;
+use furrow_dataset::check::verify;
+use furrow_dataset::check::verify::Again;
+use furrow_dataset::make::finish;
+use furrow_dataset::make::generate::generate;
+use furrow_dataset::{Callbacks, Set, Work};
+use furrow_job::Threads;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -18,17 +21,17 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A folder of the user's, and a link to it in a dataset.
+/// A folder of the user, and a link to it inside a dataset.
 struct Linked<'a> {
     victim: &'a Path,
     link: PathBuf,
-    /// Whether the victim is what lay where the link is.
+    /// Whether the victim is the dataset's own folder, moved away from the link's path.
     moved: bool,
 }
 
 impl<'a> Linked<'a> {
-    /// Puts a link where a folder of the dataset is, which becomes the victim: so nothing but the link is wrong. Where there is none, the
-    /// victim is a folder with one file.
+    /// Replaces a folder of the dataset by a link to that folder, which becomes the victim, so that nothing but the
+    /// link is wrong. If the folder does not exist, the victim is a new folder with one file.
     fn at(data: &Path, name: &str, victim: &'a Path) -> Self {
         let link = data.join(name);
         let moved = link.is_dir();
@@ -42,7 +45,7 @@ impl<'a> Linked<'a> {
         Self { victim, link, moved }
     }
 
-    /// Does something that must leave the victim as it is.
+    /// Runs an action that must leave the victim unchanged.
     fn keeps(&self, what: impl FnOnce()) {
         let before = tree(self.victim);
         what();
@@ -50,7 +53,7 @@ impl<'a> Linked<'a> {
         assert!(self.link.is_symlink(), "{}", self.link.display());
     }
 
-    /// Makes the dataset what it was.
+    /// Restores the dataset.
     fn undo(self) {
         fs::remove_file(&self.link).unwrap();
         fs::remove_file(self.victim.join("mine.txt")).unwrap();
@@ -87,7 +90,7 @@ fn a_folder_of_a_dataset_that_is_a_link_is_refused() {
         linked.undo();
         same(&tree(&data), &whole);
     }
-    // Folders in which the dataset has nothing yet.
+    // Folders that the dataset has not created yet.
     let linked = Linked::at(&data, "phenobench", &victim);
     linked.keeps(|| refused(verb("finish", &data, &["--format", "phenobench"]), "phenobench"));
     linked.undo();
@@ -120,7 +123,7 @@ fn links_to_a_dataset_and_the_users_own_change_nothing() {
     same(&tree(&data), &whole);
 }
 
-/// Makes what is missing of an open dataset.
+/// Renders the missing images of an open dataset.
 fn render(set: &Set) -> Result<()> {
     let never = Arc::default();
     generate(
@@ -135,7 +138,8 @@ fn fails<T: std::fmt::Debug>(done: Result<T>, name: &str) {
     assert!(said.contains("symbolic link"), "{name}: {said}");
 }
 
-/// Expected: a link that appears once the dataset is open is an error where something would be written or removed behind it.
+/// Expected: a link that appears after the dataset was opened is an error if anything would be written or removed
+/// behind it.
 #[test]
 fn a_link_that_appears_later_is_not_followed() {
     let (_keep, around) = scratch();
@@ -163,7 +167,7 @@ fn a_link_that_appears_later_is_not_followed() {
     linked.undo();
 }
 
-/// Expected: the folders of images that an archive holds are cleared away in the dataset alone.
+/// Expected: image folders whose contents are in an archive are removed only inside the dataset.
 #[test]
 fn nothing_is_cleared_away_behind_a_link() {
     let (_keep, around) = scratch();
@@ -178,7 +182,7 @@ fn nothing_is_cleared_away_behind_a_link() {
     let whole = tree(&around.join("own"));
     symlink(around.join("own"), data.join("images")).unwrap();
     fails(render(&set), "images");
-    // Its records cannot be read any longer.
+    // The records are no longer readable.
     assert!(finish::finish(&set, None).is_err());
     for remove in [None, Some("seals/train-000000.json"), Some("packs/train-000000.tar")] {
         if let Some(name) = remove {

@@ -1,35 +1,36 @@
-//! Denoising: what is asked of the denoiser, and what comes of it.
+//! Denoising: the calls to the denoiser, and the use of its results.
 //!
-//! Rationale: a denoiser that is not there, fails or mixes up bands must not cost the picture. Expected: one clear error before
-//! anything is rendered where it is missing; the noisy files in any case; each band back where it came from. Stand-ins that
-//! copy their input play the denoiser, a script its program and `denoise/stand_in.c` its library, so this runs anywhere.
-//! With Open Image Denoise itself: `cargo test --release --test all denoise:: -- --ignored --nocapture`.
+//! Rationale: a denoiser that is missing, fails or mixes up bands must not cost the image. Expected: one clear error
+//! before rendering if it is missing; the noisy files in any case; each band written back to its own channel. Stand-ins
+//! that copy their input replace the denoiser, so these tests run anywhere: a script for its program, and
+//! `denoise/stand_in.c` for its library. With Open Image Denoise itself:
+//! `cargo test --release --test all denoise:: -- --ignored --nocapture`.
 
-#![allow(clippy::print_stdout, reason = "the long test tells what it measured")]
+#![allow(clippy::print_stdout, reason = "the long test prints its measurements")]
 
 use crate::common::dataset::{make, path, succeed};
 use crate::common::layers::read_layers;
 use crate::common::program::{FILES, SMALL, names, scratch, trace};
 use crate::common::scenes::with_world;
-use furrow::film::Film;
-use furrow::geometry::Window;
-use furrow::integrator::PathTracer;
-use furrow::math::Spectrum;
-use furrow::output::Denoiser;
-use furrow::render::{self, Settings};
-use furrow::sampling::Points;
-use furrow::scene::assemble::{self, Options};
+use furrow_base::geometry::Window;
+use furrow_base::math::Spectrum;
+use furrow_base::sampling::Points;
+use furrow_field::assemble::{self, Options};
+use furrow_output::Denoiser;
+use furrow_render::film::Film;
+use furrow_render::integrator::PathTracer;
+use furrow_render::render::{self, Settings};
 use std::path::Path;
 use std::process::{Command, Output};
 
 const DENOISED: [&str; 3] = ["denoised.exr", "nir_denoised.png", "rgb_denoised.png"];
 
-/// `trace --denoise` on the small page, into `out`.
+/// Returns the command `trace --denoise` on the small scene, with output in `out`.
 fn denoise_into(out: &Path) -> Command {
     trace(&["--scene", SMALL, "--width", "48", "--spp", "2", "--threads", "2", "--denoise", "--out", path(out)])
 }
 
-/// The same with a denoiser that is this shell script; `None`: a folder without one.
+/// Runs the command with a denoiser that is this shell script, or with a folder without one (`None`).
 #[cfg(unix)]
 fn denoise_with(script: Option<&str>, out: &Path, folder: &Path) -> Output {
     use std::os::unix::fs::PermissionsExt;
@@ -42,7 +43,7 @@ fn denoise_with(script: Option<&str>, out: &Path, folder: &Path) -> Output {
     denoise_into(out).env("OIDN_DIR", folder).output().unwrap()
 }
 
-/// Compiles the library that plays the denoiser to where `folder` is looked into.
+/// Compiles the stand-in library to the path at which `folder` is searched.
 #[cfg(unix)]
 fn stand_in(folder: &Path, flags: &[&str]) {
     let library = folder.join("lib/libOpenImageDenoise.so.2");
@@ -53,7 +54,7 @@ fn stand_in(folder: &Path, flags: &[&str]) {
     succeed(compiler);
 }
 
-/// `command` with that library; what it said, and the library's notes line by line.
+/// Runs `command` with the stand-in library; returns its output and the library's log lines.
 #[cfg(unix)]
 fn with_stand_in(mut command: Command, folder: &Path) -> (Output, Vec<String>) {
     let notes = folder.join("notes");
@@ -62,19 +63,19 @@ fn with_stand_in(mut command: Command, folder: &Path) -> (Output, Vec<String>) {
     (done, notes.lines().map(str::to_owned).collect())
 }
 
-/// How many of these lines begin so.
+/// Returns the number of lines that start with `begin`.
 fn count(lines: &[String], begin: &str) -> usize {
     lines.iter().filter(|line| line.starts_with(begin)).count()
 }
 
-/// Copies the picture behind the first of --hdr, --alb and --nrm to the one behind -o, and notes how it was called.
+/// Script that copies the image after the first of --hdr, --alb and --nrm to the path after -o, and logs its arguments.
 const COPY: &str = r#"echo "$*" >> "$(dirname "$0")/calls"
 while [ $# -gt 0 ]; do case "$1" in
   --hdr|--alb|--nrm) in="${in:-$2}"; shift;;
   -o) out="$2"; shift;;
 esac; shift; done; cp "$in" "$out""#;
 
-/// Holds an image to what a denoiser that changes nothing must leave.
+/// Checks the output of a denoiser that changes nothing.
 fn every_band_is_back(done: &Output, out: &Path) {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let mut all: Vec<&str> = FILES.iter().chain(&DENOISED).copied().collect();
@@ -101,12 +102,12 @@ fn a_program_that_changes_nothing_gives_back_every_band() {
     let done = denoise_with(Some(COPY), &out, keep.path());
     every_band_is_back(&done, &out);
     let calls = std::fs::read_to_string(keep.path().join("bin/calls")).unwrap();
-    assert_eq!(calls.lines().count(), 5, "three guides and two pictures:\n{calls}");
+    assert_eq!(calls.lines().count(), 5, "three guides and two images:\n{calls}");
     assert_eq!(calls.lines().filter(|c| c.contains("--hdr") && c.contains("--clean_aux")).count(), 2, "{calls}");
 }
 
-/// Expected: a device for the trial and one for the image, of its threads; guides by themselves, then pictures of high range with clean ones;
-/// all released.
+/// Expected: one device for the trial and one for the image, with its number of threads; guides are denoised first and
+/// on their own, then the HDR images with clean guides; everything is released.
 #[cfg(unix)]
 #[test]
 fn a_library_that_changes_nothing_gives_back_every_band() {
@@ -123,7 +124,7 @@ fn a_library_that_changes_nothing_gives_back_every_band() {
     assert_eq!((count(&notes, "filter released"), count(&notes, "device released")), (5, 2), "{notes:#?}");
 }
 
-/// Expected: as many devices as images are under way at once, however many images there are.
+/// Expected: the number of devices is the number of images in progress at once, independent of the number of images.
 #[cfg(unix)]
 #[test]
 fn a_run_keeps_its_devices() {
@@ -137,7 +138,7 @@ fn a_run_keeps_its_devices() {
     assert_eq!(count(&notes, "device of"), count(&notes, "device released"), "{notes:#?}");
 }
 
-/// Expected: its own words, and the noisy files.
+/// Expected: the library's own error message, and the noisy files.
 #[cfg(unix)]
 #[test]
 fn a_library_that_fails_leaves_the_noisy_picture() {
@@ -149,12 +150,12 @@ fn a_library_that_fails_leaves_the_noisy_picture() {
     let said = String::from_utf8(done.stderr).unwrap();
     assert_eq!(done.status.code(), Some(1), "{said}");
     assert!(said.contains("Open Image Denoise: out of memory"), "{said}");
-    assert_eq!(names(&out), FILES, "the noisy files are there, no half of the denoised ones");
+    assert_eq!(names(&out), FILES, "the noisy files must exist, without partial denoised ones");
     assert_eq!((count(&notes, "filter released"), count(&notes, "device released")), (1, 2), "{notes:#?}");
 }
 
-/// Rationale: a library of another version, or on another oneTBB, may lack what is called. Expected: the program where there is one, else an
-/// error that names what is missing, before anything is rendered.
+/// Rationale: a library of another version, or with another oneTBB, may lack functions that are called. Expected: the
+/// program is used if there is one; otherwise an error names the missing function before anything is rendered.
 #[cfg(unix)]
 #[test]
 fn without_a_library_that_can_be_loaded_the_program_is_asked() {
@@ -166,7 +167,7 @@ fn without_a_library_that_can_be_loaded_the_program_is_asked() {
     every_band_is_back(&denoise_with(Some(COPY), &out, keep.path()), &out);
 }
 
-/// Expected: the words of what is damaged rather than a signal.
+/// Expected: an error message that names the damaged file, instead of a crash by a signal.
 #[cfg(unix)]
 #[test]
 fn a_library_that_is_none_is_told() {
@@ -200,11 +201,11 @@ fn a_denoiser_that_fails_leaves_the_noisy_picture() {
         let said = String::from_utf8(done.stderr).unwrap();
         assert_eq!(done.status.code(), Some(1), "{said}");
         assert!(said.contains(words), "{said}");
-        assert_eq!(names(&out), FILES, "the noisy files are there, no half of the denoised ones");
+        assert_eq!(names(&out), FILES, "the noisy files must exist, without partial denoised ones");
     }
 }
 
-/// Expected: the error names the folder that could not be used, not one that the author had.
+/// Expected: the error names the temporary folder that could not be used, not a fixed path.
 #[cfg(unix)]
 #[test]
 fn a_folder_for_temporary_files_that_is_not_there_is_named() {
@@ -219,8 +220,8 @@ fn a_folder_for_temporary_files_that_is_not_there_is_named() {
     assert!(said.contains(&format!("error: {}: ", gone.display())), "{said}");
 }
 
-/// Peak signal-to-noise ratio of all bands as an eye sees them, decibels: each divided by what 99 % of the reference stay
-/// below, clipped, and raised to 1/2.2.
+/// Peak signal-to-noise ratio of all bands on a display scale, decibels: each band is divided by the reference's 99th
+/// percentile, clipped, and raised to 1/2.2.
 fn psnr(film: &Film, reference: &Film) -> f64 {
     let white: Vec<f32> = (0..4)
         .map(|band| {
@@ -239,12 +240,12 @@ fn psnr(film: &Film, reference: &Film) -> f64 {
     -10.0 * (sum / (4 * film.pixels.len()) as f64).log10()
 }
 
-/// Expected: on a piece of the main scene at full size, 16 samples and the denoiser come nearer to a long render than twice the
-/// samples without it (35.6 and 33.6 dB where this was written; eight times the samples reached 40.2), and the bits do not
-/// depend on the number of threads. At a quarter of the size, where clods and their shadows are finer than a pixel, there is
-/// less that a denoiser could know.
+/// Expected: on a crop of the main scene at full size, 16 samples with the denoiser are closer to a long render than 32
+/// samples without it, and the bits do not depend on the number of threads. Measured when this was written: 35.6 and
+/// 33.6 dB; 128 samples reached 40.2 dB. At a quarter of the size, where clods and their shadows are smaller than a
+/// pixel, denoising gains less.
 #[test]
-#[ignore = "needs Open Image Denoise, and minutes"]
+#[ignore = "needs Open Image Denoise, and takes minutes"]
 fn sixteen_samples_denoised_beat_thirty_two() {
     let denoiser = Denoiser::find().unwrap_or_else(|e| panic!("{e}"));
     let field = assemble::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
@@ -257,14 +258,14 @@ fn sixteen_samples_denoised_beat_thirty_two() {
     });
     let [few, twice, many, reference] = &films;
     let clean = denoiser.denoise(few, 1).unwrap();
-    assert!(denoiser.denoise(few, 2).unwrap() == clean, "two threads make other bits");
+    assert!(denoiser.denoise(few, 2).unwrap() == clean, "two threads give other bits");
     let [few, clean, twice, many] = [few, &clean, twice, many].map(|film| psnr(film, reference));
     println!("16 samples {few:.1} dB, denoised {clean:.1} dB; 32 samples {twice:.1} dB, 128 samples {many:.1} dB");
     assert!(clean > twice + 0.5 && twice > few, "{clean} and {twice}");
 }
 
-/// Rationale: which of both is there must not show. Expected: the same bits from the library of `OIDN_DIR`, in one process with Embree and its
-/// oneTBB, as from its program.
+/// Rationale: whether library or program is used must not change the result. Expected: the library of `OIDN_DIR`, in
+/// one process with Embree and its oneTBB, gives the same bits as its program.
 #[cfg(unix)]
 #[test]
 #[ignore = "needs Open Image Denoise"]

@@ -1,20 +1,22 @@
-//! What the programs and their tests are built of: licences and sources of all dependencies.
+//! Licences and sources of all dependencies of the programs and their tests.
 //!
-//! Rationale: who passes a program on must keep to the licences of all that is in it. Expected: each dependency comes from crates.io and can be
-//! had under licences of the list in `deny.toml`, each of which some dependency needs. Source: `cargo metadata`.
+//! Rationale: redistributors of a program must comply with the licences of everything in it. Expected: each dependency
+//! comes from crates.io and is available under licences of the list in `deny.toml`, and each listed licence is needed
+//! by some dependency. Source: `cargo metadata`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-/// Licences that are allowed, from `deny.toml`.
+/// Returns the allowed licences, from `deny.toml`.
 fn allowed() -> BTreeSet<String> {
     let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/deny.toml")).expect("deny.toml");
     let list = text.split("\nallow = [").nth(1).and_then(|rest| rest.split(']').next()).expect("a list");
     list.split('"').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-/// Whether an SPDX expression can be met with these licences. AND is taken to bind less than OR, which can only refuse more; `/` is the old OR.
+/// Returns whether an SPDX expression is satisfied by these licences. AND is treated as binding less tightly than OR,
+/// which can only refuse more; `/` is the old notation for OR.
 fn can_be_met(expression: &str, allowed: &BTreeSet<String>) -> bool {
     let expression = expression.replace('/', " OR ");
     let name = |part: &str| part.trim_matches(['(', ')', ' ']).to_owned();
@@ -53,8 +55,9 @@ fn every_dependency_has_an_allowed_licence_and_comes_from_crates_io() {
     }
 }
 
-/// Rationale: the fuzzer is built by itself and seldom, so a lock file that is older than `Cargo.toml` goes unseen, and what is not locked is
-/// whatever is newest. Expected: the library's entry there names all that `Cargo.toml` asks for whatever the features. Source: both files.
+/// Rationale: the fuzzer is built separately and rarely, so a lock file older than `Cargo.toml` goes unnoticed, and
+/// unlocked dependencies resolve to the newest version. Expected: the library's entry in the fuzzer's lock file names
+/// every non-optional dependency of `Cargo.toml`. Source: both files.
 #[test]
 fn the_lock_file_of_the_fuzzer_names_what_the_library_is_built_of() {
     let read = |name: &str| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).expect(name);

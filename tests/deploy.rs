@@ -1,32 +1,35 @@
-//! What was learnt, in other programs and on pictures without labels.
+//! Trained models in other programs, and predictions for images without labels.
 //!
-//! Rationale: a robot runs an exported file, not us; whoever asks about photographs has them in all sizes and folders, and must not lose
-//! files by it. Expected: ONNX Runtime and TorchScript give our values to 1e-4 of the largest, for one and two pictures, at even and odd
-//! sizes, whatever is taken out of the pictures; masks are what the network says; what cannot be done is refused with words and code
-//! 2, and leaves nothing. Source: `tests/train/check_onnx.py`, the programs named in `tests/requirements.txt`.
+//! Rationale: robots run an exported file instead of this program; users have photographs of all sizes in many folders,
+//! and prediction must not overwrite their files.
+//!
+//! Expected: ONNX Runtime and TorchScript agree with our values to 1e-4 of the largest value, for one and two images,
+//! at even and odd sizes, with every input normalisation; masks equal the network's predictions; invalid requests are
+//! refused with a message and exit code 2, and write nothing. Source: `tests/train/check_onnx.py`, the programs named
+//! in `tests/requirements.txt`.
 
 use crate::common::dataset::{fail, path, succeed};
 use crate::common::program::{SMALL, names, trace};
 use crate::common::python::{ask, python, torch};
 use crate::common::training::{self, learn, normalised, pictures, stirred};
-use furrow::output::{self, Picture};
-use furrow::train::deploy::pictures::Prediction;
-use furrow::train::deploy::{onnx, torchscript};
-use furrow::train::fit::hyper::NormalizationMode;
-use furrow::train::net::Network;
-use furrow::train::refine::{Refine, Seen};
-use furrow::train::run::{self, TrainedModel};
-use furrow::train::torch::{Model, Precision, Where, device};
-use furrow::train::weights::{self, Array};
+use furrow_output::Picture;
+use furrow_train::deploy::pictures::Prediction;
+use furrow_train::deploy::{onnx, torchscript};
+use furrow_train::fit::hyper::NormalizationMode;
+use furrow_train::net::Network;
+use furrow_train::refine::{Refine, Seen};
+use furrow_train::run::{self, TrainedModel};
+use furrow_train::torch::tch::{CModule, Device, Kind, Tensor};
+use furrow_train::torch::{Model, Precision, Where, device};
+use furrow_train::weights::{self, Array};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
-use tch::{CModule, Device, Kind, Tensor};
 
 static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("deploy-set"));
 
-/// A run of Basic SegNet that sees these bands; stays until the next time.
+/// Trains Basic SegNet on these bands; the run is kept until the next test run.
 fn trained(name: &str, bands: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
@@ -39,7 +42,7 @@ fn trained(name: &str, bands: &str) -> PathBuf {
 static RGB: LazyLock<PathBuf> = LazyLock::new(|| trained("deploy-rgb", "rgb"));
 static RGBN: LazyLock<PathBuf> = LazyLock::new(|| trained("deploy-rgbn", "rgbn"));
 
-/// `train` with these arguments, on one thread and in single precision where it computes.
+/// Returns the command `train` with these arguments, and for `predict` with one thread and single precision.
 fn train(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments);
@@ -56,13 +59,14 @@ fn model(learnt: &TrainedModel) -> Model {
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
 }
 
-/// Number of pictures and size: the network's own, nearly the smallest that it takes, odd, and a larger one.
+/// Numbers of images and their sizes: the network's own size, almost the smallest size that it accepts, odd sizes, and
+/// a larger one.
 fn cases(network: Network) -> [(usize, (u32, u32)); 4] {
     let least = network.least_side().max(16);
     [(1, training::SIZE), (2, training::SIZE), (16, (least + 3, least + 1)), (2, (81, 66))]
 }
 
-/// Writes 8-bit pictures and what the network makes of them.
+/// Writes 8-bit images and the network's outputs for them.
 fn record(learnt: &TrainedModel, file: &Path) {
     let bands = learnt.card.input.bands.len();
     let model = model(learnt);
@@ -82,7 +86,7 @@ fn record(learnt: &TrainedModel, file: &Path) {
     weights::write(file, &arrays, "").unwrap();
 }
 
-/// Networks of all kinds, normalised in all ways.
+/// Networks of every kind, with every normalisation.
 const KINDS: [(Network, &str, NormalizationMode); 6] = [
     (Network::BasicSegnet, "rgbn", NormalizationMode::Band),
     (Network::BasicSegnet, "rgb", NormalizationMode::Image),
@@ -99,7 +103,8 @@ fn exported_networks_compute_what_ours_do() {
     for (network, bands, exposure) in KINDS {
         let folder = tempfile::tempdir().unwrap();
         let taught = learn(network, bands, exposure, &SET, &folder.path().join("run"));
-        // Stirred, the fifty clipped layers of this one make more of the rounding of batch norms that a runtime folds into convolutions.
+        // With random weights, this network's fifty ReLU6 layers amplify rounding differences, because runtimes fold
+        // batch norms into convolutions.
         let learnt = if network == Network::LiteUnet { taught } else { stirred(&taught, 13) };
         let out = folder.path().join("out");
         learnt.write(&out).unwrap();
@@ -131,7 +136,7 @@ fn exported_networks_compute_what_ours_do() {
             assert!(scores.len() == ours.len() && scores.iter().all(|v| v.is_finite()), "{}", network.name());
             let largest = ours.iter().fold(1f32, |m, v| m.max(v.abs()));
             let apart = ours.iter().zip(&scores).fold(0f32, |m, (a, b)| m.max((a - b).abs())) / largest;
-            eprintln!("{} TorchScript, {images} pictures: apart by {apart:.1e}", network.name());
+            eprintln!("{} TorchScript, {images} pictures: difference {apart:.1e}", network.name());
             assert!(apart < 1e-4, "{} {images}: {apart}", network.name());
         }
         if let Some(python) = &torch_python {
@@ -163,7 +168,7 @@ fn export_writes_where_it_is_told() {
     let before = names(folder.path());
     assert_eq!(before, ["new", "robot.pt", "robot.pt.json"]);
     for (arguments, words) in [
-        (vec!["--size", "40x40"], "only a TorchScript is for pictures of one size"),
+        (vec!["--size", "40x40"], "--size applies to TorchScript exports only"),
         (vec!["--out", path(folder.path())], "this is a folder"),
         (vec!["--format", "torchscript", "--size", "4000x10"], "sides from 32 to 8192"),
         (vec!["--format", "coreml"], "invalid value 'coreml'"),
@@ -176,7 +181,8 @@ fn export_writes_where_it_is_told() {
     assert_eq!(before, names(folder.path()));
 }
 
-/// Expected: half of the bytes, each weight rounded to half precision, the same classes but for ties, and a folder that is a run's for every command.
+/// Expected: half the bytes, each weight rounded to half precision, the same classes except for ties, and a folder that
+/// every command accepts as a run.
 #[test]
 fn half_precision_is_a_run_of_half_the_size() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +199,8 @@ fn half_precision_is_a_run_of_half_the_size() {
     let (whole, halved) = (weights(&RGB), weights(&half));
     assert!(whole.keys().eq(halved.keys()));
     for (name, tensor) in whole.iter().filter(|(_, tensor)| tensor.kind() == Kind::Float) {
-        // Half a unit in the last of eleven bits; below 6·10⁻⁵ numbers are spaced evenly.
+        // Half a unit in the last place of eleven significant bits; below 6·10⁻⁵, half-precision numbers are evenly
+        // spaced.
         let apart = (tensor - halved[name].to_kind(Kind::Float)).abs() - tensor.abs() * 2f64.powi(-11);
         assert!(apart.max().double_value(&[]) <= 2f64.powi(-25) * 1.001, "{name}");
     }
@@ -201,15 +208,16 @@ fn half_precision_is_a_run_of_half_the_size() {
     let answers = [&*RGB, &half].map(|run| {
         let out = folder.path().join(run.file_name().unwrap()).join("answers");
         succeed(train(&["predict", path(run), path(&photos), "--out", path(&out)]));
-        output::read_indexed(&out.join("large.png")).unwrap().2
+        furrow_output::read_indexed(&out.join("large.png")).unwrap().2
     });
     let differ = answers[0].iter().zip(&answers[1]).filter(|(a, b)| a != b).count();
-    // A network of few steps is undecided in many pixels: one in ten may fall on the other side.
+    // After few training steps the network is undecided in many pixels: up to one in ten may change class.
     assert!(differ * 10 <= answers[0].len(), "{differ} of {} pixels differ", answers[0].len());
 }
 
-/// Rationale: whoever has photographs and no network gets an answer on the first evening. Expected: the networks that ship are listed; by
-/// its name, from any folder, one finds the plants of a field that it has not seen; nothing is written beside it.
+/// Rationale: users with photographs but no network should get predictions on the first evening. Expected: the shipped
+/// networks are listed; addressed by name from any folder, one finds the plants of a field it was not trained on;
+/// nothing is written beside it.
 #[test]
 fn a_network_that_ships_finds_plants() {
     let listed = succeed(train(&["zoo"]));
@@ -244,22 +252,22 @@ fn a_network_that_ships_finds_plants() {
         predict.current_dir(folder.path());
         predict
     });
-    let (_, _, truth) = output::read_indexed(&field.join("semantics.png")).unwrap();
-    let (_, _, answer) = output::read_indexed(&out.join("rgb.png")).unwrap();
+    let (_, _, truth) = furrow_output::read_indexed(&field.join("semantics.png")).unwrap();
+    let (_, _, answer) = furrow_output::read_indexed(&out.join("rgb.png")).unwrap();
     let count = |test: fn(u8, u8) -> bool| truth.iter().zip(&answer).filter(|(a, b)| test(**a, **b)).count() as f64;
     let overlap = count(|a, b| a > 0 && b > 0) / count(|a, b| a > 0 || b > 0);
     assert!(overlap > 0.6, "{overlap}");
 
-    // A folder of that name without a network in it, such as one for reports, does not hide the one that ships.
+    // A folder of that name without a network, such as one for reports, does not hide the shipped network.
     std::fs::create_dir(folder.path().join("any-field")).unwrap();
     let mut export = train(&["export", "any-field", "--out", path(&folder.path().join("network.onnx"))]);
     export.current_dir(folder.path());
     succeed(export);
     let said = fail(train(&["export", "any-field"]), 2);
-    assert!(said.contains("`any-field` ships with the program, and nothing is written beside it"), "{said}");
+    assert!(said.contains("`any-field` ships with the program, and its folder is not for output"), "{said}");
 }
 
-/// Photographs of three kinds and sizes, from the waves of [`pictures`].
+/// Writes three images of different formats and sizes, made from the waves of [`pictures`].
 fn photographs(folder: &Path) -> BTreeMap<&'static str, (u32, u32)> {
     let sizes = [("large", (150, 101)), ("small", (33, 70)), ("same", training::SIZE)];
     for (k, (name, (w, h))) in sizes.into_iter().enumerate() {
@@ -267,12 +275,12 @@ fn photographs(folder: &Path) -> BTreeMap<&'static str, (u32, u32)> {
         let rgb = pixels.as_chunks::<3>().0;
         if name == "large" {
             std::fs::create_dir_all(folder).unwrap();
-            std::fs::write(folder.join("large.JPG"), output::encode_jpeg(w, h, rgb, 90).unwrap()).unwrap();
+            std::fs::write(folder.join("large.JPG"), furrow_output::encode_jpeg(w, h, rgb, 90).unwrap()).unwrap();
         } else {
-            output::write_png(&folder.join(format!("{name}.png")), w, h, &Picture::Rgb(rgb), "").unwrap();
+            furrow_output::write_png(&folder.join(format!("{name}.png")), w, h, &Picture::Rgb(rgb), "").unwrap();
         }
         let nir = pictures(1, (w, h), 1, 50 + k as u64);
-        output::write_png(&folder.join(format!("{name}.nir.png")), w, h, &Picture::Gray(&nir), "").unwrap();
+        furrow_output::write_png(&folder.join(format!("{name}.nir.png")), w, h, &Picture::Gray(&nir), "").unwrap();
     }
     std::fs::write(folder.join("notes.txt"), "no picture").unwrap();
     sizes.into()
@@ -296,38 +304,39 @@ fn photographs_of_any_size_get_masks_of_their_size() {
 
     let learnt = TrainedModel::open(&RGB).unwrap();
     for (name, size) in &sizes {
-        let (w, h, map) = output::read_map(&out.join(format!("{name}.png"))).unwrap();
-        let output::Map::Indexed(classes, palette) = map else { panic!("{name}: no indices") };
+        let (w, h, map) = furrow_output::read_map(&out.join(format!("{name}.png"))).unwrap();
+        let furrow_output::Map::Indexed(classes, palette) = map else { panic!("{name}: not an indexed image") };
         assert_eq!(((w, h), classes.len()), (*size, (size.0 * size.1) as usize));
         assert!(classes.iter().all(|c| *c < 3));
         assert_eq!(palette, learnt.card.classes.colors());
-        let (w, h, over) = output::read_rgb(&out.join(format!("{name}.overlay.png"))).unwrap();
+        let (w, h, over) = furrow_output::read_rgb(&out.join(format!("{name}.overlay.png"))).unwrap();
         assert_eq!((w, h), *size);
-        // The ground is as it was, plants are not.
+        // The overlay leaves soil pixels unchanged and colours plants.
         if *name != "large" {
-            let (_, _, rgb) = output::read_rgb(&photos.join(format!("{name}.png"))).unwrap();
+            let (_, _, rgb) = furrow_output::read_rgb(&photos.join(format!("{name}.png"))).unwrap();
             for ((class, a), b) in classes.iter().zip(&rgb).zip(&over) {
                 assert!(*class != 0 || a == b);
             }
         }
     }
-    // At its own size the mask is the network's answer, pixel for pixel.
-    let (_, _, rgb) = output::read_rgb(&photos.join("same.png")).unwrap();
+    // At the network's own size, the mask equals its prediction pixel by pixel.
+    let (_, _, rgb) = furrow_output::read_rgb(&photos.join("same.png")).unwrap();
     let pixels = normalised(&learnt, rgb.as_flattened(), training::SIZE);
     let answer = model(&learnt).predict(&pixels, training::SIZE).unwrap();
-    let (_, _, mask) = output::read_indexed(&out.join("same.png")).unwrap();
+    let (_, _, mask) = furrow_output::read_indexed(&out.join("same.png")).unwrap();
     let differ = mask.iter().zip(&answer).filter(|(a, b)| a != b).count();
     assert!(differ * 1000 <= mask.len(), "{differ} of {} pixels differ", mask.len());
 
-    // The same command once more gives the same bytes.
+    // Repeating the command gives the same bytes.
     let read = || files.iter().map(|f| std::fs::read(out.join(f)).unwrap()).collect::<Vec<_>>();
     let before = read();
     succeed(train(&arguments));
     assert!(before == read());
 }
 
-/// Expected: a folder of two runs answers with the class of the highest mean of their probabilities; a run that is not done and one that sees
-/// other bands are told by their folders. Source: softmax and mean, computed here from the logits of each.
+/// Expected: for a folder of two runs, the prediction is the class with the highest mean probability; an unfinished run
+/// and a run with other bands are reported by their folders. Source: softmax and mean, computed here from the logits of
+/// each run.
 #[test]
 fn runs_of_one_folder_answer_together() {
     let folder = tempfile::tempdir().unwrap();
@@ -341,7 +350,7 @@ fn runs_of_one_folder_answer_together() {
     let bytes = pictures(1, size, 3, 4);
     std::fs::create_dir_all(&photos).unwrap();
     let rgb: Vec<[u8; 3]> = bytes.as_chunks().0.to_vec();
-    output::write_png(&photos.join("a.png"), size.0, size.1, &Picture::Rgb(&rgb), "").unwrap();
+    furrow_output::write_png(&photos.join("a.png"), size.0, size.1, &Picture::Rgb(&rgb), "").unwrap();
     let arguments = ["predict", path(&runs), path(&photos), "--out", path(&out)];
     succeed(train(&arguments));
 
@@ -355,11 +364,11 @@ fn runs_of_one_folder_answer_together() {
         }
     }
     let highest = |at: usize| (0..3).max_by(|a, b| mean[a * n + at].total_cmp(&mean[b * n + at])).unwrap() as u8;
-    let (_, _, mask) = output::read_indexed(&out.join("a.png")).unwrap();
+    let (_, _, mask) = furrow_output::read_indexed(&out.join("a.png")).unwrap();
     let differ = (0..n).filter(|at| mask[*at] != highest(*at)).count();
     assert!(differ * 1000 <= n, "{differ} of {n} pixels differ");
     let alone: Vec<u8> = model(&first).predict(&normalised(&first, &bytes, size), size).unwrap();
-    assert!(mask != alone, "the second run has no say");
+    assert!(mask != alone, "the second run does not affect the prediction");
 
     TrainedModel::open(&RGBN).unwrap().write(&runs.join("seed-3")).unwrap();
     let words = fail(train(&arguments), 2);
@@ -370,8 +379,9 @@ fn runs_of_one_folder_answer_together() {
     assert!(words.contains("seed-3") && words.contains("not done"), "{words}");
 }
 
-/// Rationale: who stores a dataset in packs would unpack all of it to predict some of its images. Expected: the same masks, overlays and picture names of
-/// a dataset in packs and in folders, near infrared among the bands; an image that is in no pack yet is told.
+/// Rationale: users who store a dataset in packs should not have to unpack all of it to predict some images. Expected:
+/// a dataset in packs and one in folders, with a near-infrared band, give the same masks, overlays and file names; an
+/// image that is not in any pack yet is reported.
 #[test]
 fn images_in_packs_are_predicted_as_those_in_folders_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -392,7 +402,7 @@ fn images_in_packs_are_predicted_as_those_in_folders_are() {
             .collect::<Vec<_>>()
     });
     assert_eq!(answers[0].len(), 6);
-    assert!(answers[0] == answers[1], "other predictions of packs");
+    assert!(answers[0] == answers[1], "packs and folders give different predictions");
     let packs = folder.path().join("packs");
     for pack in ["packs", "seals"] {
         std::fs::remove_dir_all(packs.join(pack)).unwrap();
@@ -410,19 +420,20 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     succeed(train(&["predict", path(&RGBN), &some, "--out", path(&out)]));
     let answers = ["000002.overlay.png", "000002.png", "000003.overlay.png", "000003.png", "prediction.json"];
     assert_eq!(names(&out), answers);
-    // Di Cicco's evaluation sees the same picture: its answer is the same map.
+    // The evaluation for Di Cicco's dataset receives the same image and must predict the same map.
     let learnt = TrainedModel::open(&RGBN).unwrap();
     let image = SET.join("images/000002");
-    let (w, h, rgb) = output::read_rgb(&image.join("rgb.png")).unwrap();
-    let (_, _, nir) = output::read_gray(&image.join("nir.png")).unwrap();
+    let (w, h, rgb) = furrow_output::read_rgb(&image.join("rgb.png")).unwrap();
+    let (_, _, nir) = furrow_output::read_gray(&image.join("nir.png")).unwrap();
     assert_eq!((w, h), training::SIZE);
     let four: Vec<u8> = rgb.iter().zip(&nir).flat_map(|(p, n)| [p[0], p[1], p[2], *n]).collect();
     let answer = model(&learnt).predict(&normalised(&learnt, &four, (w, h)), (w, h)).unwrap();
-    let mask = |out: &Path, name: &str| output::read_indexed(&out.join(name)).unwrap().2;
+    let mask = |out: &Path, name: &str| furrow_output::read_indexed(&out.join(name)).unwrap().2;
     let differ = mask(&out, "000002.png").iter().zip(&answer).filter(|(a, b)| a != b).count();
     assert!(differ * 1000 <= answer.len(), "{differ}");
 
-    // Refined: by the program what the library makes of the network's probabilities, refused beside other answers, and without red no colours.
+    // Refinement: the program applies the library's refinement to the network's probabilities, refuses to write beside
+    // unrefined predictions, and cannot use colours without a red band.
     let refined = folder.path().join("refined");
     let ask =
         |refine: &str, out: &Path| train(&["predict", path(&RGBN), &some, "--out", path(out), "--refine", refine]);
@@ -442,7 +453,8 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     assert!(fail(ask("none", &refined), 2).contains("refined otherwise"));
     assert!(fail(ask("color", &refined), 2).contains("there is no refinement `color`"));
 
-    // Beside the photograph, in its own folder, by another name: the same band, the same answer.
+    // The near-infrared band may be beside the photograph under another name, or in another folder: the prediction is
+    // the same.
     for (k, photo, band, more) in
         [(0, "a.png", "a.nir.png", false), (1, "rgb_7.png", "nir_7.png", false), (2, "a.png", "elsewhere/a.png", true)]
     {
@@ -458,7 +470,7 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
         }
         succeed(train(&arguments));
         assert_eq!(mask(&answers, photo), mask(&out, "000002.png"), "{band}");
-        assert_eq!(names(&answers).len(), 3, "{band} is no picture of its own");
+        assert_eq!(names(&answers).len(), 3, "{band} must not be predicted as an image");
     }
 }
 
@@ -469,18 +481,18 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let photos = at("photos");
     photographs(&photos);
     let write = |file: &Path, value: u8| {
-        output::write_png(file, 40, 40, &Picture::Rgb(&[[value, 90, 60]; 1600]), "").unwrap();
+        furrow_output::write_png(file, 40, 40, &Picture::Rgb(&[[value, 90, 60]; 1600]), "").unwrap();
     };
     write(&at("more/small.png"), 40);
     write(&at("plain/a.png"), 40);
     std::fs::create_dir_all(at("empty")).unwrap();
     std::fs::write(at("empty/notes.txt"), "").unwrap();
-    output::write_png(&at("gray.png"), 40, 40, &Picture::Gray(&[7; 1600]), "").unwrap();
+    furrow_output::write_png(&at("gray.png"), 40, 40, &Picture::Gray(&[7; 1600]), "").unwrap();
     let whole = std::fs::read(photos.join("small.png")).unwrap();
     std::fs::write(at("cut.png"), &whole[..whole.len() / 2]).unwrap();
     std::fs::write(at("words.png"), "no picture at all").unwrap();
-    output::write_png(&at("odd/a.png"), 40, 40, &Picture::Rgb(&[[9; 3]; 1600]), "").unwrap();
-    output::write_png(&at("odd/a.nir.png"), 20, 40, &Picture::Gray(&[9; 800]), "").unwrap();
+    furrow_output::write_png(&at("odd/a.png"), 40, 40, &Picture::Rgb(&[[9; 3]; 1600]), "").unwrap();
+    furrow_output::write_png(&at("odd/a.nir.png"), 20, 40, &Picture::Gray(&[9; 800]), "").unwrap();
 
     let refuse = |run: &Path, images: &[&Path], more: &[&str], words: &[&str]| {
         let out = at("refused");
@@ -496,48 +508,48 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
         assert!(left.is_empty(), "{words:?}: {left:?}");
     };
     refuse(&at("none"), &[&photos], &[], &["there is no trained network in this folder", "train fit --out DIR"]);
-    refuse(&RGB, &[&at("nothing.png")], &[], &["nothing.png: there is no such picture", "DIR@PICK"]);
-    refuse(&RGB, &[&at("empty")], &[], &["empty: there is no picture in this folder"]);
+    refuse(&RGB, &[&at("nothing.png")], &[], &["nothing.png: there is no such image", "DIR@PICK"]);
+    refuse(&RGB, &[&at("empty")], &[], &["empty: there is no image in this folder"]);
     refuse(&RGB, &[&at("cut.png")], &[], &["cut.png: this image cannot be read"]);
     refuse(&RGB, &[&at("words.png")], &[], &["words.png: this image cannot be read"]);
     refuse(&RGB, &[&at("gray.png")], &[], &["gray.png: this picture is gray", "red, green and blue"]);
     refuse(&RGB, &[&photos, &at("more")], &[], &["photos/small.png and", "more/small.png would both become small.png"]);
     refuse(&RGB, &[&photos], &["--band", "nir=x"], &["the network does not see the band `nir`", "red, green, blue"]);
-    refuse(&RGB, &[&photos], &["--band", "red=x"], &["`red` is the photograph's own"]);
+    refuse(&RGB, &[&photos], &["--band", "red=x"], &["`red` is read from the image itself"]);
     refuse(&RGBN, &[&at("plain")], &[], &["a.png: the network sees the band `nir`", "a.nir.png", "--band nir=DIR"]);
     refuse(&RGBN, &[&at("odd")], &[], &["a.nir.png: it is 20 × 40 pixels", "is 40 × 40"]);
     let few = PathBuf::from(format!("{}@5..99", path(&SET)));
     refuse(&RGB, &[&few], &[], &["the set has 8 images"]);
     refuse(&RGB, &[&PathBuf::from(format!("{}@most", path(&SET)))], &[], &["`most` picks no images"]);
 
-    // One that cannot be read keeps no other from its answer.
+    // An unreadable image does not prevent predictions for the others.
     let out = at("others");
     let said = fail(train(&["predict", path(&RGB), path(&at("cut.png")), path(&photos), "--out", path(&out)]), 2);
     assert!(
-        said.contains("1 of 4 pictures could not be read, the others have predictions:") && said.contains("cut.png: "),
+        said.contains("1 of 4 images could not be read; the others have predictions:") && said.contains("cut.png: "),
         "{said}"
     );
     assert_eq!(names(&out).len(), 7, "{:?}", names(&out));
     let told: Prediction = run::read_json(&out.join("prediction.json")).unwrap();
     assert_eq!(told.pictures.keys().collect::<Vec<_>>(), ["large", "same", "small"]);
 
-    // Answers beside the photographs would be written over them.
+    // Masks written beside the photographs would overwrite them.
     let said = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
     assert!(
-        said.contains("small.png: this is no prediction of ours")
-            || said.contains("same.png: this is no prediction of ours"),
+        said.contains("small.png: this file is not a prediction")
+            || said.contains("same.png: this file is not a prediction"),
         "{said}"
     );
     assert_eq!(std::fs::read(photos.join("small.png")).unwrap(), whole);
-    // Answers to other photographs of the same name, or of another network.
+    // Predictions for other images of the same name, or by another network, are not overwritten.
     let before = std::fs::read(out.join("small.png")).unwrap();
     let said = fail(train(&["predict", path(&RGB), path(&at("more")), "--out", path(&out)]), 2);
     assert!(said.contains("small.png: this is the prediction of") && said.contains("photos/small.png"), "{said}");
     let said = fail(train(&["predict", path(&RGBN), path(&photos), "--out", path(&out)]), 2);
-    assert!(said.contains("predictions of another network lie in this folder"), "{said}");
+    assert!(said.contains("this folder holds predictions of another network"), "{said}");
     assert_eq!(std::fs::read(out.join("small.png")).unwrap(), before);
 
-    // Weights that are damaged, or not those of the card.
+    // Weights that are damaged, or that do not belong to the model card.
     let broken = at("broken");
     std::fs::create_dir_all(&broken).unwrap();
     for file in ["model.json", "weights.safetensors"] {
@@ -547,17 +559,17 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     std::fs::write(broken.join("weights.safetensors"), &bytes).unwrap();
-    refuse(&broken, &[&photos], &[], &["weights.safetensors: these are no weights of `train`, or they are damaged"]);
+    refuse(&broken, &[&photos], &[], &["weights.safetensors: this is not a weights file of `train`, or it is damaged"]);
     let said = fail(train(&["export", path(&broken)]), 2);
     assert!(said.contains("they are damaged"), "{said}");
     std::fs::copy(RGBN.join("weights.safetensors"), broken.join("weights.safetensors")).unwrap();
-    refuse(&broken, &[&photos], &[], &["these are not the weights that model.json beside them is about"]);
+    refuse(&broken, &[&photos], &[], &["these are not the weights that model.json in this folder describes"]);
     assert_eq!(names(&broken), ["model.json", "weights.safetensors"]);
 }
 
-/// Rationale: what is learnt from photographs must depend on which they are, not on how they go through the network. Expected: with appearance,
-/// the same masks in batches of one and of three; of one photograph, from which nothing is learnt, those of rows alone; without rows it is
-/// refused.
+/// Rationale: statistics learnt from a set of photographs must depend on the set, not on the batch size. Expected: with
+/// appearance features, batches of one and of three give the same masks; a single photograph gives the masks of row
+/// refinement alone; without rows the option is refused.
 #[test]
 fn appearance_is_learnt_from_all_pictures_and_from_one_alone_not() {
     let folder = tempfile::tempdir().unwrap();
@@ -568,7 +580,7 @@ fn appearance_is_learnt_from_all_pictures_and_from_one_alone_not() {
         let set = format!("{}@{images}", path(&SET));
         succeed(train(&["predict", path(&RGB), &set, "--out", path(&out), "--refine", refine, "--batch", batch]));
         let of = |name: &&String| !name.contains("overlay") && !name.contains("prediction");
-        names(&out).iter().filter(of).map(|name| output::read_indexed(&out.join(name)).unwrap().2).collect()
+        names(&out).iter().filter(of).map(|name| furrow_output::read_indexed(&out.join(name)).unwrap().2).collect()
     };
     let (one_by_one, together) = (masks("a", "0..3", looks, "1"), masks("b", "0..3", looks, "3"));
     assert!(one_by_one.len() == 3 && one_by_one == together);
@@ -577,7 +589,7 @@ fn appearance_is_learnt_from_all_pictures_and_from_one_alone_not() {
     let out = folder.path().join("e");
     let words =
         fail(train(&["predict", path(&RGB), path(&SET), "--out", path(&out), "--refine", "plants,appearance"]), 2);
-    assert!(words.contains("appearance is learnt from what rows say"), "{words}");
+    assert!(words.contains("appearance needs rows"), "{words}");
 
     let report = folder.path().join("report");
     succeed(train(&["eval", path(&RGB), "--set", path(&SET), "--refine", looks, "--out", path(&report)]));

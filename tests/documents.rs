@@ -1,40 +1,41 @@
-//! What README, CONTRIBUTING and the book in `docs/` promise: pages parse, links lead somewhere, commands and files are there.
+//! README, CONTRIBUTING and the book in `docs/`: pages parse, links lead somewhere, commands and files exist.
 //!
-//! Rationale: a README is the first program that a newcomer runs, and a page that names a flag or a test that is gone misleads. Expected:
-//! nothing in them is stale. Source: the pages; the rules stand in CONTRIBUTING.md. `tests/guide.rs` runs the guide.
+//! Rationale: newcomers start with the commands of the README, and a page that names a removed flag or test misleads.
+//! Expected: nothing in them is outdated. Source: the pages; the rules are in CONTRIBUTING.md. `tests/guide.rs` runs
+//! the guide.
 
 use crate::common::book::{self, anchors, blocks, commands, links, pages, program, prose, quoted, read, root, shell};
 use crate::common::program::SMALL;
-use furrow::light::LightDesc;
-use furrow::material::LeafDesc;
-use furrow::ron_file::RonFile;
-use furrow::scene::desc::{FieldDesc, ModelDesc};
-use furrow::scene::shipped;
-use furrow::sensor::{CameraDesc, LidarDesc, SensorDesc};
-use furrow::soil::SoilDesc;
+use furrow_base::ron_file::RonFile;
+use furrow_field::desc::{FieldDesc, ModelDesc};
+use furrow_field::shipped;
+use furrow_grow::soil::SoilDesc;
+use furrow_optics::light::LightDesc;
+use furrow_optics::sensor::{CameraDesc, LidarDesc, SensorDesc};
+use furrow_render::material::LeafDesc;
 
-/// Pages that the program writes from its own types and command line: they may be linked to before they are there.
+/// Pages that the program generates from its own types and command line; links to them are valid before they exist.
 const GENERATED: [&str; 6] = ["scene", "species", "texture", "experiment", "trace", "train"];
 
-/// Whether a path is that of a page which the program writes.
+/// Returns whether a path is that of a generated page.
 fn generated(path: &str) -> bool {
     GENERATED.iter().any(|name| path == format!("docs/reference/{name}.md"))
 }
 
-/// Whether the program has written a page, so that rules for people's prose do not hold for it.
+/// Returns whether people wrote a page; the rules for prose do not apply to generated pages.
 fn written_by_people(path: &str) -> bool {
     !generated(path)
 }
 
-/// README, CONTRIBUTING and all pages of the book.
+/// Returns the paths of README, CONTRIBUTING and all pages of the book.
 fn documents() -> Vec<String> {
     ["README.md", "CONTRIBUTING.md"].map(String::from).into_iter().chain(pages()).collect()
 }
 
-/// Most words of a paragraph, or of an item of a list, that people read with ease.
+/// Maximum number of words in a paragraph or list item.
 const MOST_WORDS: usize = 80;
 
-/// Paragraphs and items of lists, without code blocks, tables, headings and pictures.
+/// Returns paragraphs and list items, without code blocks, tables, headings and images.
 fn paragraphs(text: &str) -> Vec<String> {
     let mut all = vec![String::new()];
     for line in prose(text).lines() {
@@ -57,19 +58,19 @@ fn paragraphs(text: &str) -> Vec<String> {
 fn paragraphs_are_short() {
     for file in documents().into_iter().filter(|file| written_by_people(file)) {
         let all = paragraphs(&read(&file));
-        assert!(!all.is_empty(), "{file}: no words");
+        assert!(!all.is_empty(), "{file}: no paragraphs");
         for paragraph in all {
             let words = paragraph.split_whitespace().count();
             assert!(words <= MOST_WORDS, "{file}: a paragraph of {words} words:{paragraph}");
         }
     }
-    // The test must be able to fail.
+    // The check must be able to fail.
     let long = format!("one\n\n{}\n- an item\n1. another\n", "word ".repeat(90));
     let words: Vec<usize> = paragraphs(&long).iter().map(|p| p.split_whitespace().count()).collect();
     assert_eq!(words, [1, 90, 3, 2]);
 }
 
-/// Expected: the README is one screen or two, and its pictures and those of the guide are small.
+/// Expected: the README is one or two screens long, and its images and those of the guide are small files.
 #[test]
 fn the_readme_is_short_and_pictures_are_small() {
     assert!(read("README.md").lines().count() <= 80);
@@ -83,7 +84,7 @@ fn the_readme_is_short_and_pictures_are_small() {
     assert!(pictures >= 8, "{pictures}");
 }
 
-/// Expected: who searches README or docs for a standard term of rendering or training finds it.
+/// Expected: readers who search README or docs for a standard term of rendering or training find it.
 #[test]
 fn standard_terms_are_found() {
     let text = documents().iter().map(|file| read(file)).collect::<String>().to_lowercase();
@@ -105,17 +106,17 @@ fn standard_terms_are_found() {
         "phyllotaxis",
         "bootstrap",
     ] {
-        assert!(text.contains(term), "nobody finds `{term}`");
+        assert!(text.contains(term), "`{term}` occurs in no page");
     }
 }
 
-/// Expected: every page of the book stands in its list, once, and everything in the list is a page.
+/// Expected: every page of the book is in the table of contents once, and every entry is a page.
 #[test]
 fn every_page_is_in_the_summary() {
     let summary = links(&read("docs/SUMMARY.md"));
     for page in pages() {
         let listed = summary.iter().filter(|link| format!("docs/{link}") == page).count();
-        assert_eq!(listed, 1, "{page} stands {listed} times in docs/SUMMARY.md");
+        assert_eq!(listed, 1, "{page} is listed {listed} times in docs/SUMMARY.md");
     }
     for link in &summary {
         let path = format!("docs/{link}");
@@ -123,7 +124,7 @@ fn every_page_is_in_the_summary() {
     }
 }
 
-/// A path with its `..` taken back, relative to the repository; `None` where it leads out.
+/// Resolves `..` in a relative link; the result is relative to the repository, `None` if it leads outside.
 fn joined(folder: &str, link: &str) -> Option<String> {
     let mut parts: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
     for part in link.split('/') {
@@ -138,7 +139,7 @@ fn joined(folder: &str, link: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// What is wrong with a link of a page; `None` for one that leads somewhere.
+/// Returns the fault of a page's link; `None` if it leads somewhere.
 fn fault(page: &str, text: &str, link: &str) -> Option<String> {
     if link.contains("://") {
         return None;
@@ -151,7 +152,7 @@ fn fault(page: &str, text: &str, link: &str) -> Option<String> {
         return Some("it leaves the book".into());
     }
     if !root().join(&to).exists() {
-        return (!generated(&to)).then(|| format!("{to} is not there"));
+        return (!generated(&to)).then(|| format!("{to} does not exist"));
     }
     if anchor.is_empty() {
         return None;
@@ -172,13 +173,13 @@ fn every_link_leads_somewhere() {
         }
     }
     assert!(checked > 100, "{checked}");
-    // The test must be able to fail.
+    // The check must be able to fail.
     let page = "# One heading\n\n[a](b.md) [b](guide/lessons.md#8-condition) [c](#one-heading) [d](../README.md) [e](#two) [f](../../x)\n";
     let faults: Vec<bool> = links(page).iter().map(|link| fault("docs/glossary.md", page, link).is_some()).collect();
     assert_eq!(faults, [true, false, false, true, true, true]);
 }
 
-/// Expected: files that a page names in backticks are there, and so is the function of a test.
+/// Expected: files that a page names in backticks exist, and so do named test functions.
 #[test]
 fn files_and_tests_that_pages_name_are_there() {
     let folders = ["scenes/", "src/", "tests/", "textures/", "benches/", "examples/", ".ci/", ".libtorch/", "docs/"];
@@ -201,8 +202,8 @@ fn files_and_tests_that_pages_name_are_there() {
     assert!(checked > 150, "{checked}");
 }
 
-/// Parses a piece of RON as a page says what it is; `None` for a file, which `tests/guide.rs` gives to the program.
-fn parsed(note: &str, text: &str) -> Option<furrow::Result<()>> {
+/// Parses a RON block according to its note; returns `None` for a file, which `tests/guide.rs` passes to the program.
+fn parsed(note: &str, text: &str) -> Option<furrow_base::Result<()>> {
     let file = RonFile { path: "scenes/page.ron".into(), text: text.into() };
     Some(match note {
         "camera" => file.parse::<CameraDesc>().map(drop),
@@ -220,7 +221,7 @@ fn parsed(note: &str, text: &str) -> Option<furrow::Result<()>> {
             })
         }),
         file if file.starts_with("file=") => return None,
-        _ => panic!("a block of RON says what it is: {note:?}"),
+        _ => panic!("unknown kind of RON block: {note:?}"),
     })
 }
 
@@ -236,23 +237,23 @@ fn every_piece_of_ron_is_what_it_says() {
         }
     }
     for kind in ["camera", "sensor", "lidar", "light", "soil", "model", "leaf", "scenes"] {
-        assert!(kinds.contains(kind), "no page shows a {kind}");
+        assert!(kinds.contains(kind), "no page has a block of kind {kind}");
     }
     assert!(
         parsed("camera", "JaiAd130(hight_m: 1)").is_some_and(|read| read.is_err()),
-        "the test must be able to fail"
+        "the check must be able to fail"
     );
 }
 
-/// Expected: every command that a page shows is one that its program takes: subcommand, flags and values. `--help` stands behind each, so
-/// that it is parsed and not run.
+/// Expected: the program accepts every command shown on a page: subcommand, flags and values. `--help` is appended to
+/// each, so that it is parsed but not run.
 #[test]
 fn every_command_is_taken_by_its_program() {
     let mut checked = 0;
     for page in documents() {
         for block in blocks(&read(&page)).into_iter().filter(|block| block.language == "sh") {
             for command in commands(&block) {
-                // What the README's first line hands to `cargo run` is the program's.
+                // The README passes the arguments of its first line to the program through `cargo run`.
                 let command = command
                     .split_once("cargo run --release -- ")
                     .map_or(command.clone(), |(_, rest)| format!("trace {rest}"));
@@ -260,7 +261,7 @@ fn every_command_is_taken_by_its_program() {
                 if program == "train" && !cfg!(feature = "train") {
                     continue;
                 }
-                // What a pipe leads to is another's.
+                // Only the part before a pipe is ours.
                 let own = command.split(" | ").next().unwrap_or_default().replace("target/release/", "");
                 let output = shell(&format!("{own} --help"), root());
                 let words = String::from_utf8_lossy(&output.stderr);
@@ -271,7 +272,7 @@ fn every_command_is_taken_by_its_program() {
     }
     assert!(checked > 40, "{checked}");
     let wrong = format!("trace --scene {SMALL} --sp 3 --help");
-    assert!(!shell(&wrong, root()).status.success(), "the test must be able to fail");
+    assert!(!shell(&wrong, root()).status.success(), "the check must be able to fail");
 }
 
 #[test]
@@ -283,19 +284,24 @@ fn the_test_command_is_the_one_that_is_run() {
     assert_eq!(run.trim().lines().last().unwrap(), command);
 }
 
-/// Expected: each part of the results tells command, commit, seeds, split and machine above its tables.
+/// Expected: each section of the results names command, commit, seeds, split and machine above its tables; the index
+/// states which settings were tuned on which data.
 #[test]
 fn every_result_says_how_it_was_measured() {
-    let results = read("docs/results.md");
-    let parts: Vec<&str> = results.split("\n## ").skip(1).collect();
-    assert!(parts.len() >= 6, "{}", parts.len());
-    for part in parts {
-        assert!(part.contains("| command | commit | seeds | split | machine |"), "{}", part.lines().next().unwrap());
+    let index = "docs/results/README.md";
+    let mut sections = 0;
+    for page in pages().into_iter().filter(|page| page.starts_with("docs/results/") && page != index) {
+        for section in read(&page).split("\n## ").skip(1) {
+            let title = section.lines().next().unwrap();
+            assert!(section.contains("| command | commit | seeds | split | machine |"), "{page}: {title}");
+            sections += 1;
+        }
     }
-    assert!(results.find("> **What was tuned on what.**") < results.find("\n## "), "what was tuned stands on top");
+    assert!(sections >= 30, "{sections}");
+    assert!(read(index).contains("> **What was tuned on what.**"));
 }
 
-/// Expected: the layers that people read are those that `tests/architecture.rs` holds the sources to.
+/// Expected: the table of layers in the documentation equals the one that `tests/architecture.rs` enforces.
 #[test]
 fn the_layers_are_those_of_the_library() {
     let page = read("docs/ARCHITECTURE.md");
@@ -310,7 +316,7 @@ fn the_layers_are_those_of_the_library() {
     assert_eq!(told, held);
 }
 
-/// Expected: pages that `tests/guide.rs` runs are those that CONTRIBUTING lists, and files are written in no other page.
+/// Expected: CONTRIBUTING lists the pages that `tests/guide.rs` runs, and no other page writes files.
 #[test]
 fn the_pages_that_are_run_are_listed() {
     let listed: Vec<String> =
@@ -319,6 +325,6 @@ fn the_pages_that_are_run_are_listed() {
     for page in pages() {
         let writes = blocks(&read(&page)).iter().any(|block| block.note.starts_with("file="));
         let run = book::RUN.iter().any(|name| page == format!("docs/{name}"));
-        assert!(!writes || run, "{page} writes files and is not run");
+        assert!(!writes || run, "{page} writes files but is not run");
     }
 }

@@ -1,23 +1,26 @@
-//! Drives: several images of one field, from cameras that move together.
+//! Drives: several images of one field, taken by cameras that move together.
 //!
-//! Rationale: who learns from sequences needs to know where each camera was, and where a pixel of one image lies in the next. Expected: flow
-//! over a plane in closed form; the same plant and leaf where flow leads; images that do not depend on which others were made before. Source:
-//! the pinhole camera's geometry; equality is exact otherwise. COLMAP's own reader and OpenCV's stereo matcher are asked as well.
+//! Rationale: networks that learn from sequences need the pose of each camera, and the position of each pixel in the
+//! next image. Expected: optical flow over a plane follows its closed form; flow leads to the same plant and leaf;
+//! images do not depend on which others were rendered before. Source: the geometry of the pinhole camera; otherwise
+//! equality is exact. COLMAP's own reader and OpenCV's stereo matcher check the results as well.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, small_text, trace};
 use crate::common::python::python;
-use furrow::accel::EmbreeAccel;
-use furrow::dataset::flow::flows;
-use furrow::dataset::time_left::TimeLeft;
-use furrow::dataset::{Callbacks, Order, Record, Set, Work, native, timing_log};
-use furrow::geometry::Window;
-use furrow::job::{Field, SceneFile};
-use furrow::math::Vec3;
-use furrow::render;
-use furrow::scene::PartKind;
-use furrow::scene::assemble::{self, Options, Source};
-use furrow::settings::{Quality, RenderOptions};
+use furrow_base::geometry::Window;
+use furrow_base::math::Vec3;
+use furrow_dataset::make::flow::flows;
+use furrow_dataset::make::time_left::TimeLeft;
+use furrow_dataset::make::timing_log;
+use furrow_dataset::read::native;
+use furrow_dataset::{Callbacks, Order, Record, Set, Work};
+use furrow_field::PartKind;
+use furrow_field::assemble::{self, Options, Source};
+use furrow_job::{Field, SceneFile};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::render;
+use furrow_render::settings::{Quality, RenderOptions};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -26,7 +29,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// The small page with a second camera and a drive.
+/// Writes the small scene file with a second camera and a drive; `change` edits its text.
 fn page(folder: &Path, name: &str, change: &dyn Fn(String) -> String) -> PathBuf {
     let drive = "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), \
                  pose: Nadir(height_m: 0.45, at_m: (0.04, 0))))],\n    \
@@ -44,7 +47,7 @@ fn grown(page: &Path) -> Field {
     SceneFile::open(page).unwrap().field(0).unwrap()
 }
 
-/// Labels of a field's present image.
+/// Renders the labels of the field's current capture.
 fn labels(field: &Field) -> render::LabelMap {
     let scene = &field.grown().scene;
     let window = Window::full(scene.camera.width(), scene.camera.height());
@@ -52,7 +55,8 @@ fn labels(field: &Field) -> render::LabelMap {
     field.threads().install(|| render::label(geometry, &scene.parts, &scene.camera, window))
 }
 
-/// The images of a dataset for which a field was grown, in order: all others were taken of a field as it was, and grew for 0 s.
+/// Indices of the images for which a field was built, sorted; all others reused a built field and have a build time of
+/// 0 s.
 fn growers(dataset: &Path) -> Vec<u64> {
     let rows = timing_log::rows(dataset).unwrap();
     let mut images: Vec<u64> = rows.iter().filter(|row| row.grow_s > 0.0).map(|row| row.index).collect();
@@ -60,7 +64,7 @@ fn growers(dataset: &Path) -> Vec<u64> {
     images
 }
 
-/// A field of soil and a row of beets, seen by a camera that drives along a path.
+/// Writes a scene file with soil and a row of beets, seen by a camera that moves along a path.
 fn along(folder: &Path, name: &str, frames: usize, path: &str) -> PathBuf {
     let root = env!("CARGO_MANIFEST_DIR");
     let text = format!(
@@ -88,8 +92,9 @@ fn along(folder: &Path, name: &str, frames: usize, path: &str) -> PathBuf {
     page
 }
 
-/// A field without looks, and the triangles of its ground and of what lies on it.
-fn bare(page: &Path) -> (furrow::scene::Field, usize) {
+/// Builds a field without materials; returns it with the number of triangles of its ground and of everything that
+/// belongs to no plant.
+fn bare(page: &Path) -> (furrow_field::Field, usize) {
     let options = Options { unlit: true, ..Options::default() };
     let field = render::pool(0).unwrap().install(|| assemble::field(page, &options)).unwrap_or_else(|e| panic!("{e}"));
     let ground = field.scene.parts.iter().filter(|part| part.tag.plant == 0);
@@ -97,9 +102,10 @@ fn bare(page: &Path) -> (furrow::scene::Field, usize) {
     (field, triangles)
 }
 
-/// Rationale: whoever drives along rows that lie at an angle should not pay for the rectangle about all views. Expected: a drive of 2 m to the
-/// north-east makes at most 1.6 times the triangles of the same drive to the north, though the rectangle about its views has more than twice the
-/// area. The estimate follows, between half and three times what grows. Source: the strip that is seen is the same but for its margins.
+/// Rationale: a drive along rows at an angle should not build the ground for the bounding rectangle of all views.
+/// Expected: a drive of 2 m to the north-east builds at most 1.6 times the triangles of the same drive to the north,
+/// although the bounding rectangle of its views has more than twice the area. The estimate is between 0.5 and 3 times
+/// the number built. Source: the visible strip is the same except for its margins.
 #[test]
 fn a_drive_at_an_angle_makes_little_more_ground_than_one_to_the_north() {
     let (_keep, folder) = scratch();
@@ -115,13 +121,14 @@ fn a_drive_at_an_angle_makes_little_more_ground_than_one_to_the_north() {
         ground
     };
     let (north, angle) = (made(0), made(45));
-    assert!(angle * 10 <= north * 16, "{angle} beside {north}");
+    assert!(angle * 10 <= north * 16, "{angle} to the north-east, {north} to the north");
 }
 
-/// Rationale: what a frame shows must not follow from what else is made. Expected: a drive along a diagonal, and one that goes on over all of the
-/// rectangle about it, have the same labels in the frames that they share, and ground in each pixel, though the first makes far less of it. Images
-/// are turned by 45°, so that they do not fill the rectangles about them. Source: the second drive; depth may differ in its last bits, for the
-/// kernels look at what is there in another order.
+/// Rationale: a frame's content must not depend on the other frames. Expected: a drive along a diagonal, and one that
+/// continues over the whole bounding rectangle, have the same labels in their common frames and ground in every pixel,
+/// although the first builds far less ground. Images are rotated by 45° so that they do not fill their bounding
+/// rectangles. Source: the second drive; depth may differ in the last bits, because the kernels traverse the geometry
+/// in another order.
 #[test]
 fn frames_show_the_same_ground_whatever_others_see() {
     let (_keep, folder) = scratch();
@@ -135,11 +142,11 @@ fn frames_show_the_same_ground_whatever_others_see() {
     let (all, many) = bare(&along(&folder, "all.ron", 32, "Poses(\"all.tum\")"));
     assert!(many * 2 > few * 3, "{few} of {many}");
     let pool = render::pool(0).unwrap();
-    let looks = |field: &furrow::scene::Field| -> Vec<(render::LabelMap, Vec<PartKind>)> {
+    let looks = |field: &furrow_field::Field| -> Vec<(render::LabelMap, Vec<PartKind>)> {
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 1).unwrap();
         let look = |camera| {
             let map = render::label(&geometry, &field.scene.parts, camera, Window::full(64, 48));
-            // Soil and sky have one tag.
+            // Soil and sky have the same tag.
             assert!(map.parts.iter().all(|part| *part != render::label::NONE));
             let kinds: Vec<PartKind> = map.parts.iter().map(|part| field.kinds[*part as usize]).collect();
             (map, kinds)
@@ -154,8 +161,8 @@ fn frames_show_the_same_ground_whatever_others_see() {
     }
 }
 
-/// Rationale: a reader of poses takes all rows of an image to be seen from one place. Expected: planning says so where a phone's rolling shutter drives,
-/// and not of a global shutter.
+/// Rationale: readers of pose files assume that all rows of an image are seen from one position. Expected: planning
+/// warns about this for a moving phone with a rolling shutter, and not for a global shutter.
 #[test]
 fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
     let (_keep, folder) = scratch();
@@ -178,7 +185,8 @@ fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
     }
 }
 
-/// Expected: over the plane z = 0 seen from height h, a camera that moves by b to its right sees points f · b / h pixels further left.
+/// Expected: over the plane z = 0, seen from height h, a camera that moves by b to its right sees points f · b / h
+/// pixels further left.
 #[test]
 fn flow_over_a_plane_is_that_of_the_pinhole() {
     let (_keep, folder) = scratch();
@@ -201,22 +209,22 @@ fn flow_over_a_plane_is_that_of_the_pinhole() {
     assert_eq!(all.iter().map(|f| f.to.as_str()).collect::<Vec<_>>(), ["next", "right"]);
     for (i, depth) in labels(&field).depth.iter().enumerate() {
         assert!((depth - 0.5).abs() < 1e-5, "{depth}");
-        // North is up in the image, so things move down as the camera goes north.
+        // North is up in the image, so points move down while the camera moves north.
         for (flow, expected) in all.iter().zip([[0.0, 80.0 * 0.025 / 0.5], [-80.0 * 0.05 / 0.5, 0.0]]) {
             for axis in 0..2 {
                 assert!((flow.pixels[i][axis] - expected[axis]).abs() < 1e-3, "{:?} {expected:?}", flow.pixels[i]);
             }
             let there = [(i % 64) as f32 + 0.5 + expected[0], (i / 64) as f32 + 0.5 + expected[1]];
             let inside = (0.0..64.0).contains(&there[0]) && (0.0..48.0).contains(&there[1]);
-            // Where rounding decides, either answer is right.
+            // At the image border rounding decides; either result is right.
             let edge = (0..2).any(|axis| [0.0, 64.0, 48.0].iter().any(|end| (there[axis] - end).abs() < 0.01));
             assert!(edge || inside == flow.visible[i], "{there:?}");
         }
     }
 }
 
-/// Expected: where a point of a plant is visible in another image, the label there is the same plant and leaf, in 99.9 % of the pixels whose
-/// neighbours are of one label there.
+/// Expected: if a point of a plant is visible in another image, the label there is the same plant and leaf in 99.9 % of
+/// the pixels whose neighbours all have the same label.
 #[test]
 fn flow_leads_to_the_same_plant_and_leaf() {
     let (_keep, folder) = scratch();
@@ -231,13 +239,13 @@ fn flow_leads_to_the_same_plant_and_leaf() {
             labels(&field)
         })
         .collect();
-    // Built once for all of them.
+    // The acceleration structure is built once for all captures.
     assert!(field.times() == times && times.1 > Duration::ZERO);
     let captures = &field.grown().captures;
     let (mut asked, mut wrong, mut hidden) = (0, 0, 0);
     for at in 0..6 {
         for flow in flows(captures, at, &maps[at].depth, field.geometry().unwrap()) {
-            // Frames of two cameras follow each other.
+            // Captures alternate between the two cameras.
             let to = if flow.to == "next" { at + 2 } else { at ^ 1 };
             for (i, tag) in maps[at].tags.iter().enumerate().filter(|(_, tag)| tag.plant > 0) {
                 if !flow.visible[i] {
@@ -258,12 +266,13 @@ fn flow_leads_to_the_same_plant_and_leaf() {
             }
         }
     }
-    assert!(asked > 20_000 && hidden > 1_000, "{asked} asked, {hidden} hidden");
+    assert!(asked > 20_000 && hidden > 1_000, "{asked} visible, {hidden} hidden");
     assert!(wrong * 1000 <= asked, "{wrong} of {asked}");
 }
 
-/// Expected: one image of a drive has the same bytes alone, and after any others; shards hold whole fields; all images of a field are in one split. Each
-/// field is grown once in a run, and where nothing but a lost image of it is made again, for that.
+/// Expected: an image of a drive has the same bytes when rendered alone and after any others; shards contain whole
+/// fields; all images of a field are in one split. Each field is built once per run, also if only one lost image of it
+/// is rendered again.
 #[test]
 fn images_of_a_drive_do_not_depend_on_the_others() {
     let (_keep, folder) = scratch();
@@ -287,7 +296,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     // A plant keeps its identity in all images of its field.
     let ids = |index| record(index).plants.iter().filter_map(|p| p.id).collect::<Vec<_>>();
     assert!(ids(0).iter().filter(|id| ids(4).contains(id)).count() > 2);
-    // Lost images are made again without the others.
+    // Lost images are rendered again without the others.
     for name in ["000003", "000010"] {
         std::fs::remove_dir_all(whole.join("images").join(name)).unwrap();
     }
@@ -319,7 +328,8 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     same(&tree(&parts), &before);
     assert_eq!(growers(&parts), [0, 6]);
     succeed(verb("verify", &parts, &["--rerender", "3"]));
-    // A further format leaves what only the renderer knows as it is, and so does a derived file that is lost.
+    // Adding a format leaves files that only the renderer can write unchanged, and so does restoring a lost derived
+    // file.
     succeed(verb("finish", &parts, &["--format", "coco", "--quiet"]));
     std::fs::remove_file(parts.join("coco/images/train/000003.png")).unwrap();
     succeed(verb("render", &parts, &["--quiet"]));
@@ -328,7 +338,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     assert_eq!(std::fs::read(parts.join("flow/000003.exr")).unwrap(), before["flow/000003.exr"]);
     let coco = std::fs::read_to_string(parts.join("coco/annotations/instances_train.json")).unwrap();
     assert!(coco.contains("\"track_id\"") && coco.contains("\"video_id\""));
-    // The single image is the same.
+    // The image rendered on its own is the same.
     let one = folder.join("one");
     let alone = [
         "--scene",
@@ -347,7 +357,7 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     succeed(trace(&alone));
     for name in ["rgb.png", "plants.png"] {
         let (ours, single) = (std::fs::read(parts.join("images/000011").join(name)), std::fs::read(one.join(name)));
-        assert!(furrow::output::read_rgb(&parts.join("images/000011/rgb.png")).is_ok());
+        assert!(furrow_output::read_rgb(&parts.join("images/000011/rgb.png")).is_ok());
         let pixels =
             |bytes: std::io::Result<Vec<u8>>| image::load_from_memory(&bytes.unwrap()).unwrap().into_rgb16().into_raw();
         assert_eq!(pixels(ours), pixels(single), "{name}");
@@ -360,10 +370,13 @@ fn images_of_a_drive_do_not_depend_on_the_others() {
     );
 }
 
-/// Rationale: who trains on videos reads a list of them, their frames in order, and a number that stays with a plant; frames of two cameras in one video have
-/// no order. Expected: a video for each camera of each field, named as the files of MOTS are; its frames count from 0 in the order of time; plants and leaves have
-/// in all of them the identities of the records. Shards, a lost image, archives and a format that comes later give the bytes of one run. Where each image is of a
-/// field of its own, there is none of these keys. Source: the records; the list of `CocoVID` in MMTracking.
+/// Rationale: training on videos needs a list of videos, their frames in order, and an id that stays with a plant;
+/// frames of two cameras in one video have no order.
+///
+/// Expected: one video per camera and field, named like the files of MOTS; its frames count from 0 in order of time; in
+/// all of them, plants and leaves have the identities of the records. Shards, a lost image, archives and a format added
+/// later give the bytes of one run. These keys are absent if each image has its own field. Source: the records; the
+/// list of `CocoVID` in MMTracking.
 #[test]
 fn coco_has_a_video_for_each_camera_of_each_field() {
     let (_keep, folder) = scratch();
@@ -414,8 +427,8 @@ fn coco_has_a_video_for_each_camera_of_each_field() {
             }
         }
     }
-    assert!(tracks.values().any(|seen| seen.len() == 6), "a plant in all images of its field: {tracks:?}");
-    // What is lost is made again.
+    assert!(tracks.values().any(|seen| seen.len() == 6), "no plant is in all images of its field: {tracks:?}");
+    // Lost files are made again.
     std::fs::remove_dir_all(whole.join("images/000003")).unwrap();
     std::fs::remove_dir_all(whole.join("coco/annotations")).unwrap();
     succeed(one_run());
@@ -442,8 +455,9 @@ fn coco_has_a_video_for_each_camera_of_each_field() {
     assert!(!["video", "frame_id", "instance_id", "track_id"].iter().any(|key| text.contains(key)), "{text}");
 }
 
-/// Rationale: the first frame of a drive waits for its field to grow, and no other does. Expected: from the first frame on, the time that is left is
-/// that of what frames take beside growing, and after the last there is none. Source: the timing log, which tells growing from the rest.
+/// Rationale: only the first frame of a drive waits for the scene to be built. Expected: from the first frame on, the
+/// remaining time is estimated from the frames' time without scene construction, and it is zero after the last frame.
+/// Source: the timing log, which lists construction separately.
 #[test]
 fn the_time_that_is_left_counts_growing_once() {
     let (_keep, folder) = scratch();
@@ -460,9 +474,9 @@ fn the_time_that_is_left_counts_growing_once() {
         told.lock().unwrap().push((left.as_secs_f64(), begin.elapsed().as_secs_f64()));
     };
     let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &done, soon: &never, now: &never };
-    let set = furrow::dataset::begin(&out, &order, &callbacks).unwrap();
+    let set = furrow_dataset::make::begin(&out, &order, &callbacks).unwrap();
     let work = Work { at_once: 1, time_left: Some(&time_left), ..Work::default() };
-    furrow::dataset::generate::generate(&set, &work, &callbacks).unwrap();
+    furrow_dataset::make::generate::generate(&set, &work, &callbacks).unwrap();
     let rows = timing_log::rows(&out).unwrap();
     assert!(rows.len() == 6 && rows[0].grow_s > 0.01 * rows[0].seconds, "{rows:?}");
     let told = told.into_inner().unwrap();
@@ -490,7 +504,7 @@ fn written_poses_are_a_path() {
     for (a, b) in one.grown().captures.iter().zip(&two.grown().captures) {
         let (p, q) = (a.camera.pose(), b.camera.pose());
         assert!((p.position - q.position).length() < 1e-6 && (a.time_s - b.time_s).abs() < 1e-9);
-        let turn = |axes: furrow::math::Mat3| axes * Vec3::new(0.3, 0.4, 0.5);
+        let turn = |axes: furrow_base::math::Mat3| axes * Vec3::new(0.3, 0.4, 0.5);
         assert!((turn(p.axes) - turn(q.axes)).length() < 1e-6);
     }
     let dataset = folder.join("flown");
@@ -498,9 +512,10 @@ fn written_poses_are_a_path() {
     assert!(dataset.join("scene").join("flight.tum").is_file() || find(&dataset.join("scene"), "flight.tum"));
 }
 
-/// Rationale: some programs write the scalar of a quaternion first, others last, and the first line of a table alone tells which. Expected: a table as
-/// EuRoC writes it gives the cameras of the same flight as TUM writes it; names that are not understood end the program with exit code 2, the line and
-/// the names, and so does a file in UTF-16. Source: equality.
+/// Rationale: some programs write the scalar part of a quaternion first, others last; only the header of the table
+/// shows which. Expected: the same flight in EuRoC's and in TUM's layout gives the same cameras; unknown column names
+/// end the program with exit code 2 and a message with the line and the names; so does a file in UTF-16. Source:
+/// equality.
 #[test]
 fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
     let (_keep, folder) = scratch();
@@ -521,7 +536,7 @@ fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
         (
             "unknown.csv",
             unknown.as_bytes(),
-            "line 1 names the columns time, x, y, height, qx, qy, qz, qw: `height` is none",
+            "line 1 names the columns time, x, y, height, qx, qy, qz, qw: `height` is not a known name",
         ),
         ("wide.tum", wide.as_slice(), "not UTF-8 text"),
     ] {
@@ -531,7 +546,7 @@ fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
     }
 }
 
-/// Whether a folder holds a file of this name at any depth.
+/// Returns whether a folder contains a file of this name at any depth.
 fn find(folder: &Path, name: &str) -> bool {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries.into_iter().any(|at| at.ends_with(name) || at.is_dir() && find(&at, name))
@@ -546,9 +561,9 @@ fn what_is_no_drive_is_told() {
         fail(trace(&["--scene", path(&page), "--spp", "1", "--out", path(&folder.join("no"))]), 2)
     };
     for (name, from, to, words) in [
-        ("name", "\"right\"", "\"../right\"", "cannot be part of a file's name"),
+        ("name", "\"right\"", "\"../right\"", "cannot be part of a file name"),
         ("twice", "\"right\"", "\"camera\"", "two cameras are called `camera`"),
-        ("taken", "\"right\"", "\"next\"", "no camera can be called `next`"),
+        ("taken", "\"right\"", "\"next\"", "a camera cannot be called `next`"),
         ("rows", "Straight(heading_deg: 30, speed_m_s: 0.2)", "Poses(\"none.tum\")", "none.tum"),
         ("far", "speed_m_s: 0.2", "speed_m_s: 500", "more than the 144 m² of one field"),
         ("many", "frames: 3", "frames: 90000", "are too many for one field"),
@@ -572,8 +587,9 @@ fn what_is_no_drive_is_told() {
     assert!(!folder.join("no").exists());
 }
 
-/// Expected: COLMAP's own reader projects the stems of plants where our records have them; OpenCV's matcher finds our disparity within a
-/// pixel, in the median, on ground with texture. pycolmap and OpenCV are Python packages; without them the test says so and passes.
+/// Expected: COLMAP's own reader projects plant stems to the positions in our records; OpenCV's stereo matcher finds
+/// our disparity within one pixel (median) on textured ground. pycolmap and OpenCV are Python packages; without them
+/// the test is skipped with a note.
 #[test]
 fn other_programs_read_poses_and_find_the_disparity() {
     let Some(python) = python("import pycolmap, cv2, OpenEXR") else { return };

@@ -1,25 +1,26 @@
-//! Images that grow until a figure or a clock is met.
+//! Renders that add samples until an error target or a time limit is reached.
 //!
-//! Rationale: who asks for an error or a time must get an honest picture: unbiased, the same at any number of threads, and no
-//! worse than it says. Expected: passes make the bits of one go; the error that is told covers the error that is there;
-//! what was used to decide is not in the picture. Source: none needed for bits; a long render and closed forms for errors.
+//! Rationale: users who set an error or a time must get a correct image: unbiased, the same with any number of threads,
+//! and with an error no larger than reported. Expected: passes give the bits of a single render; the reported error
+//! covers the true error; samples that decide when to stop are not part of the image. Source: none needed for bits; a
+//! long render and closed forms for errors.
 
 use crate::common::layers::read_layers;
 use crate::common::program::{FILES, bits, field, names, run, scratch, small_text, trace};
 use crate::common::scenes::with_world;
-use furrow::film::Film;
-use furrow::geometry::{PACKET, Window};
-use furrow::integrator::{Integrator, PathTracer, Sample, Sighting, World};
-use furrow::math::Spectrum;
-use furrow::render::{self, Progressive, Settings};
-use furrow::sampling::Points;
-use furrow::scene::Field;
-use furrow::scene::assemble::Options;
+use furrow_base::geometry::{PACKET, Window};
+use furrow_base::math::Spectrum;
+use furrow_base::sampling::Points;
+use furrow_field::Field;
+use furrow_field::assemble::Options;
+use furrow_render::film::Film;
+use furrow_render::integrator::{Integrator, PathTracer, Sample, Sighting, World};
+use furrow_render::render::{self, Progressive, Settings};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-/// The small page, this wide.
+/// Builds the small scene at the given width.
 fn small(width: u32) -> (Field, Settings) {
     let field = field(&small_text(), &Options { width: Some(width), ..Options::default() });
     let window = Window::full(field.scene.camera.width(), field.scene.camera.height());
@@ -34,13 +35,13 @@ fn passes_make_the_bits_of_one_go() {
         let path = PathTracer::default();
         let whole = render::render(world, &path, &settings, watch).unwrap();
         let mut growing = Progressive::new(world, &path, &settings);
-        // Whole packets, and again what is there already.
+        // Packets of whole size and partial ones; the last call requests samples that already exist.
         for spp in [8, 8, 3, 16] {
             growing.advance(spp, watch).unwrap();
         }
         assert!(bits(&growing.film()) == bits(&whole));
         growing.advance(17, watch).unwrap();
-        assert!(bits(&growing.film()) != bits(&whole), "one sample more should show");
+        assert!(bits(&growing.film()) != bits(&whole), "one more sample should change the film");
     });
 }
 
@@ -53,9 +54,12 @@ fn a_clock_decides_the_number_of_samples_and_nothing_else() {
             let open = Settings { spp: most, ..settings };
             let film = render::timed(world, &path, &open, Instant::now() + time, watch).unwrap();
             let (least, _, spp) = film.samples();
-            assert_eq!(least, spp, "every pixel has the same number of samples");
+            assert_eq!(least, spp, "every pixel must have the same number of samples");
             assert!((1..=most).contains(&spp), "{spp}");
-            assert!(time > Duration::ZERO || spp == PACKET as u32, "no time is time for one packet, not for {spp}");
+            assert!(
+                time > Duration::ZERO || spp == PACKET as u32,
+                "a zero time limit allows one packet, not {spp} samples"
+            );
             assert!(time < Duration::from_secs(1) || spp == most, "{spp}");
             let same = render::render(world, &path, &Settings { spp, ..settings }, watch).unwrap();
             assert!(bits(&film) == bits(&same), "{spp} samples");
@@ -76,15 +80,16 @@ fn an_adaptive_image_comes_to_its_error_and_is_the_same_bits_at_any_number_of_th
     };
     let film = render(2);
     let error = film.median_relative_error();
-    assert!(error > 0.6 * target && error <= 1.05 * target, "{error} is not about {target}");
+    assert!(error > 0.6 * target && error <= 1.05 * target, "{error} is not close to {target}");
     let (least, _, most) = film.samples();
-    assert!(least >= 16 && most > least, "{least} to {most}: every tile has the same number");
+    assert!(least >= 16 && most > least, "{least} to {most}: all tiles have the same number of samples");
     for threads in [1, 7] {
-        assert!(bits(&render(threads)) == bits(&film), "{threads} threads make other bits");
+        assert!(bits(&render(threads)) == bits(&film), "{threads} threads give other bits");
     }
 }
 
-/// Each tile decides by itself: the tiles of a crop along the image's grid are those of the whole image.
+/// Each tile decides independently: the tiles of a crop aligned with the image's tile grid equal those of the whole
+/// image.
 #[test]
 fn an_adaptive_tile_does_not_depend_on_others() {
     let (field, settings) = small(64);
@@ -103,8 +108,9 @@ fn an_adaptive_tile_does_not_depend_on_others() {
     });
 }
 
-/// The error that the film tells is that of independent samples; stratified ones err less. So the mean of (x − reference)² over
-/// the mean of what is told must not exceed one, beyond its own noise, nor be so small that the figure says nothing.
+/// The error reported by the film assumes independent samples; stratified samples have a smaller error. The mean of (x
+/// − reference)², divided by the mean of the reported variance, must not exceed one beyond its own noise, and must not
+/// be so small that the reported error is meaningless.
 #[test]
 fn the_error_told_covers_the_error_made() {
     let (field, settings) = small(64);
@@ -133,7 +139,7 @@ fn the_error_told_covers_the_error_made() {
     });
 }
 
-/// Light of mean one that comes in rare flashes: one sample in twenty brings twenty.
+/// An integrator whose radiance has mean one but comes in rare flashes: one sample in twenty returns 20.
 struct Flashes;
 
 impl Integrator for Flashes {
@@ -144,9 +150,9 @@ impl Integrator for Flashes {
     }
 }
 
-/// Rationale: stopping where one's own samples agree biases the mean. Expected: over many tiles of one pixel, where decisions
-/// are at their noisiest, the mean of the adaptive estimate is one within four standard errors; the naive estimate, whose own
-/// first samples decide, is found to be off. Source: Kirk & Arvo 1991.
+/// Rationale: stopping when a tile's own samples agree biases the mean. Expected: over many one-pixel tiles, where
+/// decisions are noisiest, the mean of the adaptive estimate is one within four standard errors; a naive estimate,
+/// whose own first samples decide, is measurably biased. Source: Kirk & Arvo 1991.
 #[test]
 fn adaptive_sampling_is_unbiased_where_naive_stopping_is_not() {
     let (field, _) = small(64);
@@ -171,15 +177,16 @@ fn adaptive_sampling_is_unbiased_where_naive_stopping_is_not() {
         (mean - 1.0) / (variance / n).sqrt()
     };
     assert!(z(&held).abs() < 4.0, "held out: z = {}", z(&held));
-    assert!(z(&naive).abs() > 4.0, "the test would not notice a bias: z = {}", z(&naive));
+    assert!(z(&naive).abs() > 4.0, "the test would not detect a bias: z = {}", z(&naive));
 }
 
-/// Expected: in time, exit code 0, and every file byte for byte that of `--spp` with the number that it tells.
+/// Expected: the run ends in time with exit code 0, and every file is byte-identical to a run with `--spp` set to the
+/// reported number.
 #[test]
 fn an_image_by_the_clock_is_that_of_its_number_of_samples() {
     let (_keep, out) = scratch();
     let (timed, counted) = (out.join("timed"), out.join("counted"));
-    // What the program needs beside samples on this machine, as busy as it is.
+    // Time that the program needs besides rendering samples, on this machine at its current load.
     let begin = Instant::now();
     run(&out.join("one"), &["--width", "64", "--spp", "1"]);
     let aside = begin.elapsed();

@@ -1,19 +1,20 @@
-//! What a field will take is told before it grows, and what is too much is refused.
+//! The memory estimate of a field is computed before it is built, and fields that need too much are refused.
 //!
-//! Rationale: a scene file that asks for a thousand times too many clods must not take all of a machine's memory before it fails, and the
-//! estimate that says so must not refuse what is ordinary. Expected: for each shipped scene file, and for dense ones, the estimate is at
-//! least half of the triangles that grow and at most three times as many: plants beside the view are grown, and dropped. Source: the fields.
+//! Rationale: a scene file that requests a thousand times too many clods must not fill the machine's memory before it
+//! fails, and the estimate must not refuse ordinary fields. Expected: for each shipped scene file, and for dense ones,
+//! the estimate is between 0.5 and 3 times the number of triangles built; it counts plants outside the view, which are
+//! built and then dropped. Source: the fields.
 
 use crate::common::program::{scratch, small_text, trace};
-use furrow::render;
-use furrow::scene::assemble::{self, Options, Source};
-use furrow::scene::estimate::Estimate;
+use furrow_field::assemble::{self, Options, Source};
+use furrow_field::estimate::Estimate;
+use furrow_render::render;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Estimated triangles over those that grew: plants that share meshes have them once.
+/// Returns the ratio of estimated to built triangles; plants that share meshes count once.
 fn ratio(path: &Path, options: &Options) -> f64 {
     let pool = render::pool(0).expect("a pool");
     pool.install(|| {
@@ -29,7 +30,7 @@ fn near(ratio: f64, name: &str) {
     assert!((0.5..3.0).contains(&ratio), "{name}: {ratio}");
 }
 
-/// The small scene file with its soil replaced, in a folder that stays as long as the first value.
+/// Writes the small scene file with its soil replaced; its folder is deleted when the first value is dropped.
 fn with_soil(soil: &str) -> (tempfile::TempDir, PathBuf) {
     let (keep, _) = scratch();
     let text = small_text();
@@ -53,7 +54,7 @@ fn the_scene_files_that_ship_grow_as_estimated() {
     }
 }
 
-/// Each as dense as a test can afford: what is estimated for a thousand times more is counted by the same rule.
+/// Each soil is as dense as a test can afford; the same rule estimates soils a thousand times denser.
 #[test]
 fn dense_ground_grows_as_estimated() {
     for soil in [
@@ -70,8 +71,8 @@ fn dense_ground_grows_as_estimated() {
     }
 }
 
-/// Expected: exit code 2, the field that is to blame under a caret, the limit, and what to do; nothing is written, and nothing grown, which
-/// would take hours or all memory.
+/// Expected: exit code 2 and a message with a caret under the field responsible, the limit, and a remedy; nothing is
+/// written, and nothing is built, which would take hours or all memory.
 #[test]
 fn what_would_take_too_much_is_refused_where_it_stands() {
     for (soil, blamed) in [
@@ -89,7 +90,7 @@ fn what_would_take_too_much_is_refused_where_it_stands() {
         let scene = path.to_str().expect("UTF-8");
         let run = trace(&["--scene", scene, "--out", out.to_str().expect("UTF-8"), "--spp", "1", "--memory", "2"]);
         let said = refused(run);
-        let line = soil.lines().position(|line| line.contains(blamed)).expect("a line of it");
+        let line = soil.lines().position(|line| line.contains(blamed)).expect("the faulty line");
         let first = said.lines().next().unwrap_or_default();
         assert!(first.contains("this field would take about"), "{soil}: {said}");
         assert!(said.contains("the limit is") && said.contains(" help: "), "{soil}: {said}");
@@ -128,7 +129,7 @@ fn the_limit_is_raised_by_a_flag_and_changes_no_byte() {
     }
 }
 
-/// Writes a flat picture of so many pixels a side, a few kilobytes.
+/// Writes a uniform image with `side` × `side` pixels, which takes a few kilobytes.
 fn flat(path: &Path, side: u32, color: png::ColorType) {
     let file = std::fs::File::create(path).expect("a file");
     let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), side, side);
@@ -141,15 +142,16 @@ fn flat(path: &Path, side: u32, color: png::ColorType) {
     rows.finish().expect("an end");
 }
 
-/// What a scene file would take, where so many bytes are allowed.
-fn estimate(path: &Path, memory: u64) -> furrow::Result<Estimate> {
+/// Estimates a scene file with a memory limit of `memory` bytes.
+fn estimate(path: &Path, memory: u64) -> furrow_base::Result<Estimate> {
     let options = Options { width: Some(64), memory: Some(memory), ..Options::default() };
     let pool = render::pool(0).expect("a pool");
     pool.install(|| Source::open(path).unwrap_or_else(|e| panic!("{e}")).estimate(&options))
 }
 
-/// Rationale: a small file may hold many pixels, and maps of a soil layer without a height map take 40 bytes of each at their peak.
-/// Expected: 1.3 GiB told before anything is decoded, exit code 2, the file and the limit; the same estimate within a larger limit.
+/// Rationale: a small file may hold many pixels, and the maps of a soil layer without a height map need 40 bytes per
+/// pixel at their peak. Expected: 1.3 GiB reported before anything is decoded, with exit code 2, the file and the
+/// limit; the same estimate is accepted under a higher limit.
 #[test]
 fn a_picture_that_would_take_too_much_is_refused() {
     let layers = "layers: [(albedo: \"large.png\", size_m: 1, height_mm: (0, 1))]";
@@ -169,11 +171,12 @@ fn a_picture_that_would_take_too_much_is_refused() {
     assert_eq!(estimate(&path, 1 << 30).unwrap_err().exit_code(), 2);
     let estimate = estimate(&path, 4 << 30).unwrap_or_else(|e| panic!("{e}"));
     assert!(estimate.check(4 << 30).is_ok());
-    let share = estimate.shares.iter().find(|share| share.advice.contains("large.png")).expect("a share of its own");
+    let share = estimate.shares.iter().find(|share| share.advice.contains("large.png")).expect("a share for large.png");
     assert!((share.cost.bytes / (40.0 * 36e6) - 1.0).abs() < 0.01, "{share:?}");
 }
 
-/// The same of a model: its first picture fits, the second does not beside it. Expected: its file's name, and what is there already.
+/// The same limit for a model: its first image fits, the second does not fit in addition. Expected: a message with the
+/// second file's name and the memory already used.
 #[test]
 fn pictures_of_a_model_are_counted_together() {
     let (keep, _) = scratch();
@@ -189,13 +192,13 @@ fn pictures_of_a_model_are_counted_together() {
     let said = error.to_string();
     assert_eq!(error.exit_code(), 2, "{said}");
     assert!(said.contains("`m.obj` cannot be used: its picture `stem.png`: 2000 × 2000 pixels"), "{said}");
-    assert!(said.contains("about 56 MiB of memory, beside 20 MiB of other pictures; the limit is 64 MiB"), "{said}");
+    assert!(said.contains("about 56 MiB of memory, beside 20 MiB of other images; the limit is 64 MiB"), "{said}");
     let estimate = estimate(&keep.path().join("page.ron"), 1 << 30).unwrap_or_else(|e| panic!("{e}"));
-    let share = estimate.shares.iter().find(|share| share.advice.contains("m.obj")).expect("a share of its own");
+    let share = estimate.shares.iter().find(|share| share.advice.contains("m.obj")).expect("a share for m.obj");
     assert!((share.cost.bytes / (20.0 * 4e6) - 1.0).abs() < 0.01, "{share:?}");
 }
 
-/// A field is refused in each verb that grows it.
+/// Every command that builds a field refuses it.
 #[test]
 fn every_verb_that_grows_a_field_refuses_it() {
     let (keep, path) = with_soil("soil: (clods: (over_5mm_per_m2: 9e11))");
@@ -213,7 +216,7 @@ fn every_verb_that_grows_a_field_refuses_it() {
     }
 }
 
-/// Lights, cameras and species files that no field was meant to have.
+/// Lights, cameras and species files outside any sensible range.
 #[test]
 fn what_no_field_was_meant_to_have_is_refused() {
     let camera = |height: &str| {
@@ -234,7 +237,7 @@ fn what_no_field_was_meant_to_have_is_refused() {
     assert!(assemble::field_of(&lights(256), &Options { width: Some(8), ..Options::default() }).is_ok());
 }
 
-/// Runs a command that must be refused; returns what it said.
+/// Runs a command that must be refused; returns its standard error.
 fn refused(mut command: std::process::Command) -> String {
     let output = command.output().expect("the program");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -242,23 +245,24 @@ fn refused(mut command: std::process::Command) -> String {
     said
 }
 
-/// The same of a picture of all directions, of which little is kept but much is read. Expected: refused by its header, in both kinds of files.
+/// The same limit for an environment map, whose reading needs more memory than the result. Expected: refused by its
+/// header, for both file types.
 #[test]
 fn an_environment_map_that_would_take_too_much_is_refused() {
     let (keep, _) = scratch();
     let (width, height) = (1024, 512);
     let hdr = std::fs::File::create(keep.path().join("sky.hdr")).expect("a file");
     let pixels = vec![image::Rgb([1.0_f32; 3]); width * height];
-    image::codecs::hdr::HdrEncoder::new(hdr).encode(&pixels, width, height).expect("a picture");
+    image::codecs::hdr::HdrEncoder::new(hdr).encode(&pixels, width, height).expect("an image");
     let sky = exr::prelude::SpecificChannels::rgb(|_| (1.0_f32, 1.0_f32, 1.0_f32));
     let sky = exr::prelude::Image::from_channels((width, height), sky);
-    exr::prelude::WritableImage::write(&sky).to_file(keep.path().join("sky.exr")).expect("a picture");
+    exr::prelude::WritableImage::write(&sky).to_file(keep.path().join("sky.exr")).expect("an image");
     for name in ["sky.hdr", "sky.exr"] {
         let page = keep.path().join("page.ron");
         let light = format!("lights: [EnvironmentMap(file: \"{name}\", nir: OfRed(0.8))]");
         let soil = "soil: (layers: [(albedo: \"soil.png\", size_m: 1, height_mm: (0, 1))])";
         flat(&keep.path().join("soil.png"), 64, png::ColorType::Rgb);
-        std::fs::write(&page, format!("Field(camera: JaiAd130(), {light}, {soil})")).expect("a page");
+        std::fs::write(&page, format!("Field(camera: JaiAd130(), {light}, {soil})")).expect("a scene file");
         let error = estimate(&page, 8 << 20).unwrap_err();
         let said = error.to_string();
         assert_eq!(error.exit_code(), 2, "{said}");

@@ -1,14 +1,15 @@
-//! The programs in `examples/` run, and the library's image is the program's, byte for byte.
+//! The programs in `examples/` run, and the library's image equals the program's byte for byte.
 //!
-//! Rationale: an example is the first thing that a user of the library copies. Expected: each runs at a small size and leaves
-//! what it promises. Cargo builds them with the tests; with `--test all` alone, `cargo build --examples` must have run.
+//! Rationale: users of the library start by copying an example. Expected: each runs at a small size and writes the
+//! promised files. Cargo builds the examples with the tests; with `--test all` alone, run `cargo build --examples`
+//! first.
 
 use crate::common::program::{SMALL, names, scratch, trace};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A built example.
+/// Returns the command of a built example.
 fn example(name: &str) -> Command {
     let tests = std::env::current_exe().expect("this test");
     let program: PathBuf = tests.ancestors().nth(2).expect("target/debug").join("examples").join(name);
@@ -16,7 +17,7 @@ fn example(name: &str) -> Command {
     Command::new(program)
 }
 
-/// Runs an example in a folder of its own, in which the scene files and textures are seen under their names.
+/// Runs an example in its own folder, which contains links to the repository's scene files, textures and tests.
 fn run(name: &str, arguments: &[&str]) -> (tempfile::TempDir, PathBuf) {
     let (keep, folder) = scratch();
     fs::create_dir_all(&folder).expect("a folder");
@@ -28,7 +29,7 @@ fn run(name: &str, arguments: &[&str]) -> (tempfile::TempDir, PathBuf) {
     let words = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{name}: {words}");
     let paths = String::from_utf8(output.stdout).expect("paths");
-    assert!(paths.lines().count() > 0, "{name} names no file");
+    assert!(paths.lines().count() > 0, "{name} prints no path");
     for path in paths.lines() {
         assert!(folder.join(path).is_file(), "{name}: {path}");
     }

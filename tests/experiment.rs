@@ -1,33 +1,34 @@
-//! Experiments: what a page may say, what is made of it, and that nothing is made twice. Networks are played by hands that need no
-//! libtorch; `tests/table.rs` runs the program itself.
+//! Experiments: valid experiment files, their results, and reuse of finished work. Mock callbacks replace the networks,
+//! so no libtorch is needed; `tests/table.rs` runs the program itself.
 //!
-//! Rationale: an experiment takes hours on several machines that stop and start. Expected: wrong pages are refused with their place
-//! before anything is written; whatever the order and the interruptions, the files are the same; numbers of tables are means of the
-//! runs' numbers. Source: Di Cicco et al. 2017 for what the tables hold; equality is exact.
+//! Rationale: an experiment takes hours on several machines that stop and start. Expected: invalid experiment files are
+//! refused with the position of the fault before anything is written; the files are the same for any order of work and
+//! any interruptions; table figures are means of the runs' figures. Source: Di Cicco et al. 2017 for the contents of
+//! the tables; equality is exact.
 
 use crate::common::dataset::{make, same, succeed, tree};
-use furrow::dataset::classes::Classes;
-use furrow::dataset::generate::Shard;
-use furrow::error::Kind;
-use furrow::ron_file::RonFile;
-use furrow::train::baseline::files;
-use furrow::train::data::{Normalization, Pick, Resize, Selection, Shape, Store};
-use furrow::train::fit::checkpoint::History;
-use furrow::train::fit::{Hyperparameters, Plan};
-use furrow::train::measure::{Evaluation, Prediction, Report};
-use furrow::train::net;
-use furrow::train::refine::Refine;
-use furrow::train::run::{self, Identity, ModelCard, Results, TrainedModel};
-use furrow::train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real};
-use furrow::train::weights::{self, Array};
-use furrow::{Error, Result};
+use furrow_base::error::Kind;
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
+use furrow_dataset::make::generate::Shard;
+use furrow_dataset::model::classes::Classes;
+use furrow_train::baseline::files;
+use furrow_train::data::{Normalization, Pick, Resize, Selection, Shape, Store};
+use furrow_train::fit::checkpoint::History;
+use furrow_train::fit::{Hyperparameters, Plan};
+use furrow_train::measure::{Evaluation, Prediction, Report};
+use furrow_train::net;
+use furrow_train::refine::Refine;
+use furrow_train::run::{self, Identity, ModelCard, Results, TrainedModel};
+use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real};
+use furrow_train::weights::{self, Array};
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock};
 use tempfile::TempDir;
 
-/// Eight labelled images, made once.
+/// Eight labelled images, rendered once.
 fn frames() -> &'static Path {
     static FRAMES: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let made = FRAMES.get_or_init(|| {
@@ -56,22 +57,22 @@ const PAGE: &str = r#"Experiment(
 )"#;
 
 fn page(text: &str) -> RonFile {
-    // Paths count from the page's folder: the repository's, where tests run.
+    // Relative paths start at the experiment file's folder, here the repository.
     RonFile { path: "experiment.ron".into(), text: text.into() }
 }
 
-/// Stands for the networks: a run with an odd seed predicts soil everywhere, one with an even seed the truth.
+/// Mock networks: a run with an odd seed predicts soil everywhere, one with an even seed predicts the truth.
 #[derive(Default)]
 struct Players {
-    /// Calls so far, in words.
+    /// Calls so far, as text.
     calls: RefCell<Vec<String>>,
-    /// What was warned of.
+    /// Warnings so far.
     warned: Mutex<Vec<String>>,
-    /// After so many calls the next is interrupted.
+    /// Number of calls after which the next one is interrupted.
     patience: Cell<Option<usize>>,
 }
 
-/// How many numbers a plan's network learns, as its card must say.
+/// Number of trainable parameters of a plan's network, as its model card must state.
 fn trainable(plan: &Plan) -> usize {
     let all = net::parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
     all.iter().filter(|p| p.role.is_trainable()).map(net::Parameter::len).sum()
@@ -170,7 +171,7 @@ impl Players {
             &order,
             &Callbacks {
                 fit: &|plan, folder| self.fit(plan, folder),
-                page: &|folder| furrow::output::write_atomically(&folder.join(table::PAGE), b"a page"),
+                page: &|folder| furrow_output::write_atomically(&folder.join(table::PAGE), b"a page"),
                 evaluate: &|predictor, on, _| self.evaluate(predictor, on),
                 training: &|_, _| (),
                 tell: &|_| (),
@@ -185,26 +186,27 @@ impl Players {
     }
 }
 
-/// Runs the page to its end in a folder that goes away with what is returned.
+/// Runs the experiment to its end in a temporary folder, which is deleted when the returned value is dropped.
 fn whole(text: &str) -> (TempDir, PathBuf) {
     let (keep, out) = crate::common::program::scratch();
     Players::default().run(text, &out, Shard::ALL, None).unwrap();
     (keep, out)
 }
 
-/// All files but those of clock times and of locks.
+/// Reads all files except those with clock times and locks.
 fn files(out: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
     let clock = |name: &str| name.contains("/time/") || name.starts_with("times.") || name.contains("plan.json");
     tree(out).into_iter().filter(|(name, _)| !clock(name)).collect()
 }
 
-/// The number in a column of the row that begins with these words.
+/// Returns the number in a column of the first table row that starts with these words.
 fn number(out: &Path, table: &str, begin: &[&str], column: &str) -> f64 {
     let text = std::fs::read_to_string(out.join(format!("{table}.csv"))).unwrap();
     let mut lines = text.lines().map(|l| l.split(',').collect::<Vec<_>>());
     let heads = lines.next().unwrap();
-    let at = heads.iter().position(|h| *h == column).unwrap_or_else(|| panic!("no {column} among {heads:?}"));
-    let row = lines.find(|l| l.starts_with(begin)).unwrap_or_else(|| panic!("no {begin:?} in {text}"));
+    let at =
+        heads.iter().position(|h| *h == column).unwrap_or_else(|| panic!("column {column} is not among {heads:?}"));
+    let row = lines.find(|l| l.starts_with(begin)).unwrap_or_else(|| panic!("row {begin:?} is not in {text}"));
     row[at].parse().unwrap_or(f64::NAN)
 }
 
@@ -212,7 +214,7 @@ fn number(out: &Path, table: &str, begin: &[&str], column: &str) -> f64 {
 fn tables_hold_means_of_the_seeds_and_how_far_they_stray() {
     let (_keep, out) = whole(PAGE);
     let soil = number(&out, "runs", &["unet", "Few", "1", "10", "", "Test A"], "GA");
-    assert!(soil > 20.0 && soil < 99.9, "{soil}: the frames are neither all soil nor without any");
+    assert!(soil > 20.0 && soil < 99.9, "{soil}: the images must be neither all soil nor without soil");
     let close = |table: &str, column: &str, expected: f64| {
         let found = number(&out, table, &["unet", "Few"], column);
         assert!((found - expected).abs() < 1e-9, "{column}: {found}, not {expected}");
@@ -220,14 +222,14 @@ fn tables_hold_means_of_the_seeds_and_how_far_they_stray() {
     close("table-1", "Test A GA", f64::midpoint(soil, 100.0));
     close("table-1", "runs", 2.0);
     close("table-3", "Test A vegetation", 50.0);
-    // Of 0 and 100 with n − 1.
+    // Standard deviation of 0 and 100, with n − 1.
     close("table-3", "Test A vegetation ±", 50.0 * 2.0_f64.sqrt());
     close("table-2", "Test B R", 50.0);
-    // Soil alone claims no plant: its precision is of nothing, and the other seed's is all there is.
+    // A prediction of soil alone contains no plants, so its precision is undefined, and only the other seed counts.
     close("table-2", "Test A P", 100.0);
     assert_eq!(number(&out, "times", &["unet"], "Test A: seconds an image"), 0.5);
     assert_eq!(number(&out, "times", &["unet"], "minutes of a training"), 1.0);
-    // A colour baseline has trained something on these frames, and no seed.
+    // Colour baselines are trained on these images without a seed.
     assert!(number(&out, "table-3", &["exg", "Few"], "Test A vegetation") > 20.0);
     assert!(number(&out, "table-3", &["exg", "Few"], "Test A vegetation ±").is_nan());
     assert_eq!(number(&out, "table-1", &["exg", "More"], "runs"), 1.0);
@@ -250,7 +252,7 @@ fn interrupted_before_every_step_it_ends_with_the_same_files() {
         }
         assert!(sittings < 100, "no end");
     }
-    // 8 trainings and 16 evaluations, one a sitting, and the last sitting ends it.
+    // 8 trainings and 16 evaluations, one per run of the experiment; the last run completes it.
     assert_eq!((sittings, players.took().len()), (23, 24));
     same(&files(&out), &files(&expected));
 }
@@ -265,14 +267,14 @@ fn shards_of_rows_make_the_whole_in_any_order() {
         players.run(PAGE, &out, Shard { number, of: 3 }, None).unwrap();
         all.extend(players.took());
         if number == 2 {
-            // What the others have not done yet is shown as not known.
+            // Results that other shards have not produced yet are shown as unknown.
             assert!(number_is_missing(&out));
         }
     }
     let calls = all.len();
     all.sort();
     all.dedup();
-    assert_eq!((calls, all.len()), (24, 24), "each training and evaluation once");
+    assert_eq!((calls, all.len()), (24, 24), "each training and evaluation must run once");
     same(&files(&out), &files(&expected));
 }
 
@@ -334,16 +336,16 @@ fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
         assert_eq!(players.took().len(), judged);
         same(&files(&out), &before);
     }
-    // Tables alone make nothing again: they leave it out.
+    // With `Only::Tables`, nothing is computed again; the faulty result is left out.
     std::fs::write(&file, "").unwrap();
     players.run(PAGE, &out, Shard::ALL, Some(Only::Tables)).unwrap();
     assert!(std::mem::take(&mut *players.warned.lock().expect("no panic")).join("\n").contains("leave it out"));
     assert_eq!(number(&out, "table-1", &["unet", "Few"], "runs"), 1.0);
-    // That of the other seed alone, which is wrong.
+    // Only the other seed's result, whose predictions are wrong.
     assert!(
         number(&out, "table-1", &["unet", "Few"], "Test A GA") < number(&out, "table-1", &["unet", "Few"], "Test B GA")
     );
-    // Other test images: what is there is of others.
+    // Other test images: existing evaluations used different images.
     let other = PAGE.replace("4..6", "5..6");
     players.run(&other, &out, Shard::ALL, None).unwrap();
     assert!(
@@ -398,12 +400,16 @@ fn sets_are_bound_left_out_or_asked_for() {
     assert_eq!((bound.left_out, bound.experiment.train.len()), (vec!["Few".to_owned()], 1));
     let empty = format!("frames={}", scratch.path().display());
     let faults: [(&[&str], &[&str], &str); 8] = [
-        (&[], &[], "nobody has said where the images of `frames` (eight frames) lie\n help: --real frames=DIR"),
+        (
+            &[],
+            &[],
+            "no folder is given for the images of `frames` (eight frames)\n help: give it with --real frames=DIR",
+        ),
         (&["frame=x"], &[], "there is no real set `frame`\n help: did you mean `frames`?"),
         (&["small=x"], &[], "there is no real set `small`"),
         (&[&here, &here], &[], "twice"),
         (&["frames=nowhere"], &[], "there is no such folder"),
-        (&[&empty], &[], "in this folder are no labelled images"),
+        (&[&empty], &[], "this folder holds no labelled images"),
         (&[], &["framse"], "there is no set `framse`\n help: did you mean `frames`?"),
         (&[], &["frames"], "without frames there is no test set left"),
     ];
@@ -415,18 +421,18 @@ fn sets_are_bound_left_out_or_asked_for() {
     assert!(Real::parse("frames").is_err() && Real::parse("=x").is_err());
 }
 
-/// Expected: what is wrong is underlined, in its line; what it is; what to do.
+/// Expected: the faulty text is underlined in its line, with a message that describes the fault and the remedy.
 #[test]
 fn mistakes_in_a_page_are_shown_where_they_are() {
     let frames = "(set: \"frames\", images: \"0..2\")";
     let faults = [
         ("networks:", "network:", "network", "unknown field `network`", "did you mean `networks`?"),
         ("\"unet\"", "\"unett\"", "\"unett\"", "there is no network `unett`", "did you mean `unet`?"),
-        ("\"unet\"", "\"basic-segnet\"", "\"basic-segnet\"", "the network `basic-segnet` is there twice", "keep one"),
-        ("[\"basic-segnet\", \"unet\"]", "[]", "[]", "there is no network", "name one"),
+        ("\"unet\"", "\"basic-segnet\"", "\"basic-segnet\"", "the network `basic-segnet` is given twice", "keep one"),
+        ("[\"basic-segnet\", \"unet\"]", "[]", "[]", "there is no network", "give at least one"),
         ("\"exg\"", "\"exgreen\"", "\"exgreen\"", "there is no baseline `exgreen`", "exg-size"),
         ("[1, 2]", "[]", "[]", "there is no seed", "such as [1]"),
-        ("[1, 2]", "[1, 2, 1]", "1", "the seed 1 is there twice", "keep one"),
+        ("[1, 2]", "[1, 2, 1]", "1", "the seed 1 is given twice", "keep one"),
         ("steps: 10", "stepps: 10", "stepps", "unknown field `stepps` in Hyperparameters", "did you mean `steps`?"),
         ("steps: 10", "steps: 0", "0", "0 is out of range", "above 0"),
         ("batch: 2", "batch: 5000", "5000", "5000 is out of range", "from 1 to 1024"),
@@ -434,9 +440,21 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("batch: 2", "optimiser: \"adm\"", "\"adm\"", "there is no optimiser `adm`", "sgd or adam"),
         ("batch: 2", "augment: \"flip,spin\"", "\"flip,spin\"", "there is no augmentation `spin`", "rotate"),
         ("batch: 2", "rate: -1", "-1", "-1 is out of range", "above 0"),
-        ("batch: 2", "classes: \"soil; plant=crop,weed\"", "[\"exg\"]", "baselines know soil, crop and weed", "leave"),
-        ("\"frames\": Real", "\"fra/mes\": Real", "Real(about: \"eight frames\")", "`fra/mes` is no name", "letters"),
-        ("\"small\":", "\"frames\":", "Scene", "the set `frames` is there twice", "of its own"),
+        (
+            "batch: 2",
+            "classes: \"soil; plant=crop,weed\"",
+            "[\"exg\"]",
+            "baselines support only soil, crop and weed",
+            "leave",
+        ),
+        (
+            "\"frames\": Real",
+            "\"fra/mes\": Real",
+            "Real(about: \"eight frames\")",
+            "`fra/mes` is not a valid name",
+            "letters",
+        ),
+        ("\"small\":", "\"frames\":", "Scene", "the set `frames` is given twice", "of its own"),
         (
             "tests/ref/small.ron",
             "tests/ref/smal.ron",
@@ -448,17 +466,23 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("spp: 1)", "spp: 0)", "0", "0 samples", "from 1"),
         ("Scene(", "Scen(", "Scen", "unknown name `Scen`", "Scene"),
         ("count: 6,", "count: 6, edit: \"rastr\",", "\"rastr\"", "there is no edit `rastr`", "did you mean `raster`?"),
-        ("count: 6,", "count: 6, split: (0, 0, 0),", "(0, 0, 0)", "these are no shares", "train,val,test"),
+        ("count: 6,", "count: 6, split: (0, 0, 0),", "(0, 0, 0)", "these are not valid shares", "train,val,test"),
         ("name: \"More\"", "name: \"few!\"", "\"few!\"", "there is another `few!`", "of its own"),
         ("name: \"More\"", "name: \"?\"", "\"?\"", "no letter and no digit", "letters"),
-        ("steps: 10", "crop_size: (8, 8), steps: 10", "(8, 8)", "networks do not see 8 × 8 pixels", "sides from 32"),
+        (
+            "steps: 10",
+            "crop_size: (8, 8), steps: 10",
+            "(8, 8)",
+            "networks do not support 8 × 8 pixels",
+            "sides from 32",
+        ),
         ("steps: 10", "rare_crops: 1.5, steps: 10", "1.5", "1.5 is out of range", "from 0 to 1"),
         (
             "from: [(set: \"frames\", images: \"0..2\")]",
             "from: []",
             "[]",
             "the training set has no images",
-            "name a dataset",
+            "give a dataset",
         ),
         (frames, "(set: \"frame\")", "\"frame\"", "there is no set `frame`", "did you mean `frames`?"),
         ("\"0..2\"", "\"2..0\"", "\"2..0\"", "`2..0` picks no images", "0..10"),
@@ -473,7 +497,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
             "`size` cannot differ between training sets",
             "`hyperparameters` of the experiment",
         ),
-        ("repeat: 2", "dilate_px: -17", "-17", "not dilated by -17 pixels", "from -16 to 16"),
+        ("repeat: 2", "dilate_px: -17", "-17", "cannot be dilated by -17 pixels", "from -16 to 16"),
         (
             "set: \"frames\", images: \"6..8\"",
             "set: \"jai\"",
@@ -492,12 +516,12 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ),
         (
             "steps: 10",
-            "window: (48, 37), steps: 10",
+            "crop_size: (48, 37), steps: 10",
             "(48, 37)",
             "a crop of 48 × 37 pixels is larger",
             "a smaller crop",
         ),
-        ("batch: 2", "balance: \"much\"", "\"much\"", "there are no class weights `much`", "annealed"),
+        ("batch: 2", "class_weights: \"much\"", "\"much\"", "there are no class weights `much`", "annealed"),
         ("batch: 2", "pretrained: \"none.safetensors\"", "\"none.safetensors\"", "`none.safetensors`", ""),
         ("seeds: [7]", "seeds: []", "[]", "there is no seed", "such as [1]"),
     ];
@@ -549,9 +573,7 @@ fn a_scale_changes_what_it_names_and_nothing_else() {
     assert_eq!((images(&large), &large.test), (images(&small), &small.test));
 }
 
-/// Rationale: experiment files are kept for years. Expected: one with the names of version 0.1 is the same experiment, and each old name
-/// is warned of with its line and the new one; a fault of such a value is shown where the old name stands. Source: the changelog.
-/// Expected: what a training set says of its own holds for its rows alone, on top of the scale's.
+/// Expected: hyper-parameters given for a training set apply only to its rows, and override those of the scale.
 #[test]
 fn a_training_set_may_be_learnt_from_in_its_own_way() {
     let own = PAGE.replace("(name: \"Few\",", "(name: \"Few\", hyperparameters: (batch: 1, rate: 0.25),");
@@ -570,32 +592,10 @@ fn a_training_set_may_be_learnt_from_in_its_own_way() {
 }
 
 #[test]
-fn old_names_are_read_with_a_warning() {
-    let new = PAGE.replace("steps: 10", "steps: 10, crop_size: (40, 32), rare_crops: 0.5, class_weights: \"annealed\"");
-    let old = [
-        ("hyperparameters:", "learn:"),
-        ("validation:", "watch:"),
-        ("crop_size:", "window:"),
-        ("Scene(file:", "Scene(page:"),
-        ("rare_crops:", "rare:"),
-        ("class_weights: \"annealed\"", "balance: \"fading\""),
-    ];
-    let text = old.iter().fold(new.clone(), |text, (new, old)| text.replace(new, old));
-    assert_eq!(Experiment::of(&page(&text), None).unwrap(), Experiment::of(&page(&new), None).unwrap());
-    assert_eq!(page(&new).renamed(table::RENAMED), Vec::<String>::new());
-    let warnings = page(&text).renamed(table::RENAMED);
-    assert_eq!(warnings.len(), old.len() + 1, "{warnings:?}");
-    assert!(
-        warnings.iter().any(|w| w.starts_with("experiment.ron:5:") && w.contains("`window` is now called `crop_size`")),
-        "{warnings:?}"
-    );
-}
-
-#[test]
 fn our_pages_are_understood_at_both_scales() {
     let mut pages = 0;
-    for entry in std::fs::read_dir("scenes/experiments").expect("our pages") {
-        let path = entry.expect("a page").path();
+    for entry in std::fs::read_dir("scenes/experiments").expect("a folder") {
+        let path = entry.expect("an entry").path();
         for scale in [None, Some("paper")] {
             let experiment = Experiment::read(&path, scale).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
             let (width, height) = experiment.plan.crop_size();
@@ -606,7 +606,7 @@ fn our_pages_are_understood_at_both_scales() {
     assert!(pages >= 2);
 }
 
-/// Two datasets of the same fields, the second without its sky; made once.
+/// Two datasets of the same fields, the second without the sky; rendered once.
 fn variants() -> &'static Path {
     static VARIANTS: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let made = VARIANTS.get_or_init(|| {
@@ -620,7 +620,7 @@ fn variants() -> &'static Path {
     &made.1
 }
 
-/// The page that was written beside them, small.
+/// The experiment file that was written beside the datasets, with a smaller network and fewer seeds.
 fn written() -> RonFile {
     let mut page = RonFile::read(&variants().join("ablation.ron")).unwrap();
     page.text = page.text.replace("\"unet\"", "\"basic-segnet\"").replace("[1, 2, 3]", "[1, 2]");
@@ -654,7 +654,8 @@ fn changes_are_told_seed_by_seed_with_their_spread() {
     let table = |column: &str| number(&out, "against", &["basic-segnet", "no-sky"], column);
     assert_eq!((table("Rendered vegetation"), table("Rendered vegetation ±"), table("seeds")), (0.0, 0.0, 2.0));
     assert!(table("times full") > 0.0 && table("FLIP") > 0.01 && table("CIEDE2000") > 0.1);
-    // The players answer by seed alone: soil with seed 1, the truth with seed 2. Now the changed set has taught seed 2 nothing as well.
+    // The mock predictions depend only on the seed: soil for seed 1, the truth for seed 2. Now the training set with
+    // the edit also gives soil for seed 2.
     let eval = |set: &str, seed: u32| out.join(format!("runs/basic-segnet/{set}/seed-{seed}/eval/rendered.json"));
     let read = |path: &Path| -> serde_json::Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
     let teach = |set: &str, seed: u32, from: u32| {
@@ -671,6 +672,6 @@ fn changes_are_told_seed_by_seed_with_their_spread() {
     assert!(teach("full", 1, 2) > 0, "-100 and -100 have no spread");
     assert_eq!((table("Rendered vegetation"), table("Rendered vegetation ±")), (-100.0, 0.0));
     let html = std::fs::read_to_string(out.join("results.html")).unwrap();
-    assert!(html.contains("Change of I/U against full") && html.contains("no-sky: sun and lamps alone"));
+    assert!(html.contains("Change of I/U against full") && html.contains("no-sky: sun and lamps only"));
     assert_eq!(html.matches("data:image/jpeg").count(), 1);
 }

@@ -1,9 +1,9 @@
-//! Method: `trace explain` and the generated pages are run as a user runs them. Expected: the pages under `docs/reference` are those that the
-//! programs write now, and every command that an error names answers.
+//! Method: run `trace explain` and the generation of reference pages like a user. Expected: the pages in
+//! `docs/reference` equal the current output of the programs, and every command that an error suggests gives an answer.
 //!
-//! `cargo run -- reference` (and `cargo run --features train --bin train -- reference`) writes the pages anew.
+//! `cargo run -- reference` and `cargo run --features train --bin train -- reference` regenerate the pages.
 
-use furrow::scene::assemble::{Options, Source};
+use furrow_field::assemble::{Options, Source};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -25,7 +25,7 @@ fn pages_are_fresh(program: &str) {
     for path in written.lines().map(Path::new) {
         let name = path.file_name().unwrap();
         let there = fs::read_to_string(Path::new("docs/reference").join(name)).unwrap_or_default();
-        assert!(there == fs::read_to_string(path).unwrap(), "docs/reference/{} is not fresh", name.display());
+        assert!(there == fs::read_to_string(path).unwrap(), "docs/reference/{} is outdated", name.display());
     }
 }
 
@@ -44,7 +44,7 @@ fn a_field_is_explained_with_unit_range_default_and_example() {
     }
     let words = said(&trace(&["explain", "camera.JaiAd130"]));
     assert!(words.contains("height_m") && words.contains("default 0.85"), "{words}");
-    // A name alone, and a name that stands in several places.
+    // A name without its path, and a name that occurs in several places.
     assert_eq!(said(&trace(&["explain", "moisture"])), said(&trace(&["explain", "soil.moisture"])));
     let words = said(&trace(&["explain", "azimuth_deg"]));
     assert!(words.contains("crops.rows.azimuth_deg") && words.contains("species.plant.azimuth_deg"), "{words}");
@@ -76,7 +76,8 @@ fn what_is_not_there_is_refused_with_the_nearest() {
 
 #[test]
 fn every_command_that_an_error_names_answers() {
-    let references = [furrow::reference::scene(), furrow::reference::species(), furrow::reference::texture()];
+    let references =
+        [furrow_cli::reference::scene(), furrow_cli::reference::species(), furrow_cli::reference::texture()];
     let mut asked = 0;
     for entry in fs::read_dir("tests/bad").unwrap() {
         let path = entry.unwrap().path();
@@ -84,7 +85,7 @@ fn every_command_that_an_error_names_answers() {
             continue;
         };
         for command in text.lines().filter_map(|line| line.strip_prefix(" see:  trace explain")) {
-            let answer = furrow::reference::answer(command.trim(), &references, "trace");
+            let answer = furrow_cli::reference::answer(command.trim(), &references, "trace");
             assert!(answer.is_ok(), "{}: {command}: {}", path.display(), answer.unwrap_err());
             asked += 1;
         }
@@ -92,7 +93,8 @@ fn every_command_that_an_error_names_answers() {
     assert!(asked > 30, "{asked} errors name a command");
 }
 
-/// Method: what people write who have not read anything. Expected: all that is missing is told at once, with the right form of what is wrong.
+/// Method: typical mistakes of users who have not read the documentation. Expected: all missing fields are reported at
+/// once, with the correct form of what is wrong.
 #[test]
 fn messages_tell_what_to_write() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,7 +114,7 @@ fn messages_tell_what_to_write() {
     assert!(words.contains("write AgeDays(18) or Bbch(18)"), "{words}");
     let words = told("Field(camera: Phone, soil: ())");
     assert!(words.contains("Phone has no brackets") && words.contains("write Phone()"), "{words}");
-    // A path is named as far as it exists.
+    // The suggested path ends at its last valid part.
     let words = told("Field(camera: JaiAd130(), soyl: (clods: (max_mm 3)))");
     let see = words.lines().find_map(|line| line.strip_prefix(" see:  ")).unwrap_or_else(|| panic!("{words}"));
     assert_eq!(see, "trace explain", "{words}");
@@ -120,21 +122,22 @@ fn messages_tell_what_to_write() {
     assert!(words.contains("write Uniform(0.8, 0.9)"), "{words}");
 }
 
-/// Expected: what pages say of soil is what the program takes, and what the scenes that teach have.
+/// Expected: the explanations of soil agree with the program's limits and with the tutorial scenes.
 #[test]
 fn what_is_said_of_soil_is_so() {
     let told = |path: &str| {
         let words = said(&trace(&["explain", path]));
         words.split_whitespace().collect::<Vec<_>>().join(" ")
     };
-    assert_eq!(furrow::soil::MAX_LAYERS, 4);
+    assert_eq!(furrow_grow::soil::MAX_LAYERS, 4);
     assert!(told("soil").contains("One to four layers"), "{}", told("soil"));
     assert!(fs::read_to_string("scenes/11-drone.ron").unwrap().contains("patch_m: 2.5"));
     let patches = told("soil.moisture.patch_m");
     assert!(patches.contains("0.02–0.15") && patches.contains("some metres in those of a field"), "{patches}");
 }
 
-/// Method: scene files with what is allowed and hardly meant. Expected: a warning for each, and none for the scenes that teach.
+/// Method: scene files with values that are valid but probably unintended. Expected: a warning for each, and none for
+/// the tutorial scenes.
 #[test]
 fn what_was_hardly_meant_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -146,9 +149,9 @@ fn what_was_hardly_meant_is_told() {
         let source = Source::open(&file).unwrap();
         let options = Options { width: Some(32), ..Options::default() };
         let (foretold, all) = (source.foretold(&options).unwrap(), source.field(&options).unwrap().warnings);
-        // All but what only a grown field can tell is told before it grows.
+        // All warnings are given before the field is built, except those that depend on the built field.
         let later: Vec<&String> = all.iter().filter(|warning| !foretold.contains(warning)).collect();
-        assert!(later.iter().all(|warning| warning.contains("no crop stands")), "{later:?}");
+        assert!(later.iter().all(|warning| warning.contains("no crop is in")), "{later:?}");
         assert!(foretold.iter().all(|warning| all.contains(warning)), "{foretold:?}");
         all.join("\n")
     };
@@ -156,13 +159,13 @@ fn what_was_hardly_meant_is_told() {
     let low = "JaiAd130(height_m: 3)";
     assert_eq!(warnings(low, &format!("growth: Bbch(14), {rows}")), "");
     let words = warnings(low, &format!("growth: Bbch(85), {rows}"));
-    assert!(words.contains("its plants end at BBCH 69, so BBCH 85 looks like that"), "{words}");
+    assert!(words.contains("its last stage is BBCH 69, so BBCH 85 looks like that"), "{words}");
     let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 75)");
     assert!(words.contains("rows of") && words.contains("stand 75 m apart"), "{words}");
     let words = warnings(low, "growth: Bbch(14), rows: (spacing_m: 0.75, in_row_m: 16)");
     assert!(words.contains("stands 16 m apart in its rows; in_row_m is in metres"), "{words}");
     let words = warnings(low, "growth: Bbch(11), rows: (spacing_m: 75, offset_m: 30)");
-    assert!(words.contains("no crop stands in the camera's view"), "{words}");
+    assert!(words.contains("no crop is in the camera's view"), "{words}");
     let words = warnings("JaiAd130(height_m: 8), sensor: Phone", &format!("growth: Bbch(14), {rows}"));
-    assert!(words.contains("hangs 8.0 m above the ground") && words.contains("sensor: JaiAd130"), "{words}");
+    assert!(words.contains("the camera is 8.0 m above the ground") && words.contains("sensor: JaiAd130"), "{words}");
 }

@@ -1,23 +1,24 @@
-//! How much of every plant and leaf could be seen: visible, hidden by others, cut by the frame.
+//! Extents: the number of pixels of every plant and leaf that are visible, hidden by others, or outside the frame.
 //!
-//! Rationale: the visible fraction is what tells a detector's test which plants it could have found. It must count the pixels of
-//! the labels, and rounding must never make more visible than there is.
-//! Expected: for every plant and leaf the numbers that Embree gives for that plant or leaf alone, pixel centre by pixel centre, in
-//! the image and beyond it, but for centres within a thousandth of a pixel of an outline; for plain shapes, the areas of geometry;
-//! visible ≤ unoccluded ≤ whole, always. The same numbers at any number of threads.
+//! Rationale: a detector's evaluation needs the visible fraction to decide which plants could have been found. It must
+//! be consistent with the label pixels, and rounding must never make the visible area larger than the whole.
+//!
+//! Expected: for every plant and leaf, the counts that Embree gives for that plant or leaf alone, pixel centre by pixel
+//! centre, inside the image and beyond it, except for centres within a thousandth of a pixel of an outline; for simple
+//! shapes, the areas of geometry; always visible ≤ unoccluded ≤ whole; the same numbers with any number of threads.
 //! Source: geometry.
 
 use crate::common::program::{field, small_text};
 use crate::common::scenes::{camera, square};
-use furrow::accel::{EmbreeAccel, Surface};
-use furrow::film::Filter;
-use furrow::geometry::{Intersect, Mesh, Ray, Window};
-use furrow::math::{Vec3, vec3};
-use furrow::render::{self, Extent, LabelMap, extents, label};
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Part, Scene};
-use furrow::sensor::{Camera, Distortion};
+use furrow_base::geometry::{Intersect, Mesh, Ray, Window};
+use furrow_base::math::{Vec3, vec3};
+use furrow_field::assemble::{self, Options};
+use furrow_optics::sensor::{Camera, Distortion};
+use furrow_render::accel::{EmbreeAccel, Surface};
+use furrow_render::film::Filter;
+use furrow_render::render::{self, Extent, LabelMap, extents, label};
+use furrow_render::scene::tag::{Class, Tag};
+use furrow_render::scene::{Part, Scene};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
@@ -33,7 +34,7 @@ fn full(scene: &Scene) -> Window {
     Window::full(scene.camera.width(), scene.camera.height())
 }
 
-/// Pixel centres of a set of parts alone, by Embree: those in the window, and all of them.
+/// Number of pixel centres that a set of parts covers on its own, by Embree: inside the window, and in total.
 fn alone(scene: &Scene, window: Window, is: impl Fn(&Part) -> bool) -> [u32; 2] {
     let surfaces: Vec<Surface<'_>> = scene.parts.iter().filter(|p| is(p)).map(Part::surface).collect();
     let geometry = EmbreeAccel::build(&surfaces, 1).expect("an accelerator");
@@ -53,7 +54,8 @@ fn alone(scene: &Scene, window: Window, is: impl Fn(&Part) -> bool) -> [u32; 2] 
     counts
 }
 
-/// Whether numbers are ordered, leaves lie in plants, and the visible ones are those of the labels.
+/// Checks that the counts are ordered, leaf counts do not exceed those of their plants, and visible counts equal the
+/// label pixels.
 fn check_order(found: &Extents, labels: &LabelMap) {
     let mut pixels: BTreeMap<(u32, u16), u32> = BTreeMap::new();
     for tag in labels.tags.iter().filter(|t| t.plant > 0) {
@@ -68,10 +70,10 @@ fn check_order(found: &Extents, labels: &LabelMap) {
         assert!(*visible <= plant.visible && *unoccluded <= plant.unoccluded && *whole <= plant.whole, "{key:?}");
         assert_eq!(*visible, pixels.remove(key).unwrap_or(0), "{key:?}");
     }
-    assert!(pixels.is_empty(), "visible, but without an extent: {pixels:?}");
+    assert!(pixels.is_empty(), "visible but without an extent: {pixels:?}");
 }
 
-/// Compares every plant and leaf with Embree's answers, which may differ by a few pixels in all.
+/// Compares every plant and leaf with Embree's counts; a few pixels in total may differ.
 fn check(scene: &Scene, window: Window) -> Extents {
     let labels = labels_of(scene, window);
     let found = extents(scene, &labels);
@@ -83,7 +85,7 @@ fn check(scene: &Scene, window: Window) -> Extents {
         let whole = alone(scene, window, |p| p.tag.plant == plant);
         if whole[0] == 0 {
             let few = found.get(&(plant, 0)).map_or(0, |e| e.unoccluded);
-            assert!(few < 2, "plant {plant} is not in the window, but {few} pixels of it are");
+            assert!(few < 2, "plant {plant} is outside the window, but {few} of its pixels are counted");
             continue;
         }
         for leaf in leaves.into_iter().chain([0]).collect::<BTreeSet<_>>() {
@@ -96,11 +98,11 @@ fn check(scene: &Scene, window: Window) -> Extents {
             compared += expected[1];
         }
     }
-    assert!(doubtful * 2000 <= compared, "{doubtful} of {compared} pixels in doubt");
+    assert!(doubtful * 2000 <= compared, "{doubtful} of {compared} pixels differ");
     found
 }
 
-/// The small page with a lens of its own.
+/// Builds the small scene with the given lens distortion.
 fn small(lens: Distortion) -> Scene {
     let mut scene = field(&small_text(), &Options::default()).scene;
     let [fx, fy, cx, cy] = scene.camera.intrinsics();
@@ -118,7 +120,7 @@ fn extents_are_those_of_each_plant_and_leaf_alone() {
     assert!(found.len() > 20 && hidden > 5 && cut > 2, "{} extents, {hidden} hidden, {cut} cut", found.len());
 }
 
-/// A closed canopy, where leaves lie over leaves many times, and models from disk, whose triangles may be large.
+/// A closed canopy with many overlapping leaves, and models from files, whose triangles may be large.
 #[test]
 fn extents_hold_in_a_canopy_and_for_models() {
     for page in ["benches/canopy.ron", "scenes/07-model.ron"] {
@@ -139,7 +141,7 @@ fn extents_hold_through_a_lens_that_distorts() {
     }
 }
 
-/// Expected: the window is the frame, so less is in it, and the whole is the same.
+/// Expected: the window acts as the frame, so fewer pixels are inside it, and the whole stays the same.
 #[test]
 fn a_crop_cuts_what_lies_outside_of_it() {
     let scene = small(Distortion::default());
@@ -154,12 +156,12 @@ fn a_crop_cuts_what_lies_outside_of_it() {
     assert!(less > 3 && !found.is_empty() && found.len() < whole.len(), "{less} of {} are cut", found.len());
 }
 
-/// A scene of squares with tags, 0.5 m below a camera of 100 × 80 pixels that sees 2 mm a pixel there.
+/// Builds a scene of tagged squares, 0.5 m below a camera of 100 × 80 pixels; a pixel covers 2 mm at that distance.
 fn squares(parts: &[(Vec3, f32, u32, u16)]) -> Scene {
     squares_in((100, 80), parts)
 }
 
-/// The same for a camera of so many pixels.
+/// Builds the same scene for a camera of `size` pixels.
 fn squares_in(size: (u32, u32), parts: &[(Vec3, f32, u32, u16)]) -> Scene {
     let fov = 2.0 * (0.001 * f64::from(size.0) / 0.5).atan().to_degrees();
     let eye = camera(size, vec3(0.0, 0.0, 0.5), Vec3::ZERO, fov);
@@ -177,14 +179,14 @@ fn squares_in(size: (u32, u32), parts: &[(Vec3, f32, u32, u16)]) -> Scene {
     Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, filter: Filter::Box.footprint() }
 }
 
-/// Expected: a leaf of 20 × 20 pixels whose right half lies under another plant's leaf, a stem of 4 × 20 beside it, and soil over
-/// nothing of them; the numbers follow by counting.
+/// Expected: a leaf of 20 × 20 pixels whose right half is below another plant's leaf, a stem of 10 × 10 pixels beside
+/// it, and soil that hides neither; the counts follow from geometry.
 #[test]
 fn a_leaf_half_hidden_by_another_is_half_visible() {
-    // A pixel's side on the plane z = 0.
+    // Side of a pixel on the plane z = 0.
     let p = 0.002;
     let at = |x: f32, y: f32, z: f32| vec3(x * p, y * p, z);
-    // The upper leaf hangs half-way to the camera, where a pixel is half as large.
+    // The upper leaf is half-way to the camera, where a pixel is half as large.
     let scene = squares(&[
         (at(0.0, 0.0, -0.001), 1.0, 0, 0),
         (at(0.0, 0.0, 0.0), 20.0 * p, 1, 1),
@@ -194,7 +196,7 @@ fn a_leaf_half_hidden_by_another_is_half_visible() {
     let labels = labels_of(&scene, full(&scene));
     let found = extents(&scene, &labels);
     check_order(&found, &labels);
-    // Seen on the plane, the upper leaf has its middle at 20 and sides of 40 pixels: it covers x from 0.
+    // Projected onto the plane, the upper leaf has its centre at 20 and sides of 40 pixels, so it covers x ≥ 0.
     let expected = [
         ((1, 0), Extent { visible: 200 + 100, unoccluded: 400 + 100, whole: 500 }),
         ((1, 1), Extent { visible: 200, unoccluded: 400, whole: 400 }),
@@ -203,7 +205,7 @@ fn a_leaf_half_hidden_by_another_is_half_visible() {
     ];
     assert_eq!(found, expected.into());
     assert_eq!(found[&(1, 1)].visible_fraction(), 0.5);
-    // Soil hides as leaves do.
+    // Soil hides leaves like other leaves do.
     let mut buried = scene;
     buried.parts[0].mesh = Arc::new(square(at(0.0, 0.0, 0.1), 1.0));
     let labels = labels_of(&buried, full(&buried));
@@ -212,8 +214,9 @@ fn a_leaf_half_hidden_by_another_is_half_visible() {
     assert_eq!((found[&(1, 1)].visible_fraction(), found[&(1, 1)].inside_fraction()), (0.0, 1.0));
 }
 
-/// Expected: a square plant with its middle on the frame's corner has a quarter in the image; its leaf outside is told with nothing
-/// in the image, a plant wholly outside is not told at all; the image goes on by its own size and no farther.
+/// Expected: a quarter of a square plant centred on the frame's corner is in the image; its leaf outside has an extent
+/// with no pixels inside; a plant entirely outside the image has no extent; pixels are counted up to one image size
+/// beyond each side of the frame.
 #[test]
 fn a_plant_cut_by_the_frame_counts_beyond_it() {
     let p = 0.002;
@@ -227,7 +230,7 @@ fn a_plant_cut_by_the_frame_counts_beyond_it() {
     let labels = labels_of(&scene, full(&scene));
     let found = extents(&scene, &labels);
     check_order(&found, &labels);
-    // All lie in one plane: what is seen where they overlap is for the labels to say.
+    // All squares are in one plane: the labels decide which is visible where they overlap.
     let hidden = |key: (u32, u16)| (found[&key].unoccluded, found[&key].whole);
     assert_eq!(hidden((1, 1)), (100, 400));
     assert_eq!(hidden((1, 2)), (0, 100));
@@ -237,8 +240,8 @@ fn a_plant_cut_by_the_frame_counts_beyond_it() {
     assert_eq!(found.keys().map(|k| k.0).collect::<BTreeSet<_>>(), [1, 3].into());
 }
 
-/// Rationale: a hectare has more plants than 16 bits number. Expected: of 72,000 plants, one a pixel, labels show each once, and each has an
-/// extent of that pixel; none is taken for the one whose number is less by 65,536.
+/// Rationale: a hectare has more than 65,536 plants. Expected: of 72,000 plants, one per pixel, labels show each once,
+/// and each has an extent of that pixel; none is confused with the one whose number is lower by 65,536.
 #[test]
 fn plants_beyond_16_bits_are_told_apart() {
     let (w, h) = (300, 240);
@@ -256,14 +259,14 @@ fn plants_beyond_16_bits_are_told_apart() {
     assert!(found.into_iter().eq(expected));
 }
 
-/// A plant that reaches past the lens must neither stop the count nor make it endless.
+/// A plant that extends past the camera must neither abort the count nor make it endless.
 #[test]
 fn a_leaf_that_reaches_behind_the_camera_is_counted_where_it_is_seen() {
     let mut scene = squares(&[(Vec3::ZERO, 0.04, 1, 1)]);
-    // A long triangle from below the camera up past it.
+    // A long triangle from below the camera to above it.
     scene.parts[0].mesh = Arc::new(Mesh::smooth(
         vec![vec3(-0.02, 0.01, 0.0), vec3(0.02, 0.01, 0.0), vec3(0.0, 0.05, 0.9)],
-        vec![furrow::math::Vec2::ZERO; 3],
+        vec![furrow_base::math::Vec2::ZERO; 3],
         vec![[0, 1, 2]],
     ));
     let found = check(&scene, full(&scene));
@@ -280,8 +283,8 @@ fn extents_are_the_same_at_any_number_of_threads() {
     assert!(one == count(2) && one == count(7));
 }
 
-/// Rationale: keypoints are drawn over pictures. Expected: in the world each leaf of every plant has one axis whose ends lie on that
-/// leaf's mesh, no farther from its corners than these stand apart; a plant of which one leaf is grown tells that leaf's alone.
+/// Rationale: keypoints are drawn over images. Expected: each leaf of every plant has one axis in world space whose
+/// ends are on that leaf's mesh, within 2 mm of its vertices; a plant with only one leaf lists only that leaf.
 #[test]
 fn keypoints_stand_in_the_world_where_the_leaves_do() {
     let mut ends = 0;

@@ -1,24 +1,27 @@
-//! The disk fails at one change after another: what is written stays whole, and going on ends as if nothing had been.
+//! The disk fails at one file operation after another: written files stay complete, and a second run ends like an
+//! undisturbed one.
 //!
-//! Rationale: a full disk, a lost network share and a dying drive show themselves at any write, flush or rename. Expected: wherever it is,
-//! exit code 1 and one error with a help, no file that is half under its final name, no file of the program's beside them, and the same
-//! command ends with the bytes of an undisturbed run. Source: none needed, equality is exact.
+//! Rationale: full disks, lost network shares and failing drives appear as errors of any write, flush or rename.
+//! Expected: wherever the fault occurs, exit code 1 and one error with a help line, no partial file under a final name,
+//! no temporary file left behind, and the same command then produces the bytes of an undisturbed run. Source: none
+//! needed, equality is exact.
 
 use crate::common::dataset::{path, same, succeed, tree};
 use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, failed_well, misdate, open_to_all};
 use crate::common::program::{FILES, SMALL, names, scratch, trace};
-use furrow::output::{Picture, write_png};
+use furrow_output::{Picture, write_png};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// One small image.
+/// Returns the command that renders one small image.
 fn image(out: &Path, seed: &str) -> Command {
     trace(&["--scene", SMALL, "--spp", "1", "--width", "24", "--quiet", "--seed", seed, "--out", path(out)])
 }
 
-/// Expected: whatever fails, the old image stays as it is, renamed files put back; where the disk fails for good after the first of them has its
-/// name, each file is the old one or the new one, whole. Where old files cannot be kept under a second name, they are replaced all the same.
+/// Expected: after any fault the old image is unchanged, and files already renamed are restored. If the disk fails
+/// permanently after the first rename, each file is completely old or completely new. If old files cannot be
+/// hard-linked under a second name, they are replaced nevertheless.
 #[test]
 fn an_image_is_replaced_whole_or_told() {
     let (_keep, out) = scratch();
@@ -34,7 +37,8 @@ fn an_image_is_replaced_whole_or_told() {
     assert!(old.keys().eq(new.keys()) && names(&out) == FILES);
     let mut seen = std::collections::BTreeSet::new();
     for at in 1..=over.changes {
-        // Names are kept and given in turn: by twos, so that both kinds fail once and for good.
+        // Link and rename operations alternate; `lasts` changes every second time, so that both kinds fail once
+        // temporarily and once permanently.
         let lasts = at / 2 % 2 == 0;
         let ended = faults::run(image(&out, "2"), &out, at, lasts);
         if ended.failed == "none" {
@@ -49,14 +53,17 @@ fn an_image_is_replaced_whole_or_told() {
             failed_well(&ended, &out, at);
             if lasts && replacing {
                 for (name, bytes) in &found {
-                    assert!(*bytes == old[name] || *bytes == new[name], "change {at}: {name} is neither");
+                    assert!(
+                        *bytes == old[name] || *bytes == new[name],
+                        "change {at}: {name} is neither the old nor the new file"
+                    );
                 }
             } else {
                 same(&found, &old);
             }
         }
         seen.insert((ended.failed, lasts));
-        std::fs::remove_dir_all(&out).expect("it goes");
+        std::fs::remove_dir_all(&out).expect("the folder is removed");
         restore(&out, &old);
     }
     for kind in ["make", "write", "flush", "rename", "link"] {
@@ -67,7 +74,7 @@ fn an_image_is_replaced_whole_or_told() {
     same(&tree(&out), &new);
 }
 
-/// Puts files back.
+/// Writes files back.
 fn restore(folder: &Path, files: &BTreeMap<String, Vec<u8>>) {
     for (name, bytes) in files {
         let to = folder.join(name);
@@ -76,7 +83,7 @@ fn restore(folder: &Path, files: &BTreeMap<String, Vec<u8>>) {
     }
 }
 
-/// A dataset of tiny images on one thread.
+/// Returns the command that generates a dataset of tiny images on one thread.
 fn dataset(data: &Path, count: &str) -> Command {
     let mut command =
         trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(data)]);
@@ -84,8 +91,8 @@ fn dataset(data: &Path, count: &str) -> Command {
     command
 }
 
-/// Whatever has its final name is whole, the lists of all images left out: those grow with the images. What goes into archives lies `beside` them
-/// before.
+/// Checks that every file with a final name is complete, except the lists of all images, which grow with the images.
+/// Files that go into archives are first stored separately, as in `beside`.
 fn is_whole(there: &Tree, whole: &Tree, beside: &Tree, what: &str) {
     let folders = ["images/", "packs/", "seals/", "scene/"];
     for (name, bytes) in there.iter().filter(|(name, _)| folders.iter().any(|f| name.starts_with(f))) {
@@ -104,7 +111,8 @@ fn a_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
     each_is_gone_on_from(&make, None, 16, &|there, whole, what| is_whole(there, whole, &Tree::new(), what));
 }
 
-/// Expected: no archive is half under its name, whatever change fails; images wait in folders of their own until theirs is whole.
+/// Expected: whatever operation fails, no archive is partial under its name; images wait in their own folders until
+/// their archive is complete.
 #[test]
 fn a_packed_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
     let (_keep, folders) = scratch();
@@ -125,7 +133,7 @@ fn a_packed_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
     }
 }
 
-/// Three photographs with masks in folders for training and validation.
+/// Writes three photographs with masks in folders for training and validation.
 fn photographs(root: &Path) {
     let (w, h) = (13, 9);
     let masks: Vec<u8> = (0..w * h).map(|i| u8::from(i % w > 4) + u8::from(i % w > 9)).collect();
@@ -150,8 +158,9 @@ fn an_import_that_meets_a_fault_goes_on_to_the_same_bytes() {
     each_is_gone_on_from(&make, None, 12, &|there, whole, what| is_whole(there, whole, &Tree::new(), what));
 }
 
-/// Rationale: shared folders hold other people's files, and clocks jump. Expected: what cannot be read or written is one error; a clock set
-/// back or ahead by years changes nothing, for no file holds a time and none is trusted by its age.
+/// Rationale: shared folders contain files of other users, and clocks jump. Expected: an unreadable or unwritable file
+/// gives one error; a clock that is wrong by years changes nothing, because no file stores a time and none is trusted
+/// by its age.
 #[test]
 fn files_of_another_user_and_old_clocks_are_an_error_or_the_same_result() {
     let (_keep, data) = scratch();
@@ -162,7 +171,7 @@ fn files_of_another_user_and_old_clocks_are_an_error_or_the_same_result() {
     std::fs::remove_file(data.join("seals/000001.json")).expect("a seal");
     succeed(make());
     same(&tree(&data), &whole);
-    // Root reads and writes what belongs to others: nobody cannot.
+    // Root can access all files of other users; the user `nobody` cannot.
     let Some(mut command) = as_nobody(&make()) else { return };
     open_to_all(&data, 0o755);
     std::fs::remove_file(data.join("seals/000001.json")).expect("a seal");

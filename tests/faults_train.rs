@@ -1,17 +1,19 @@
-//! Trainings and what follows them where the disk fails, files belong to somebody else, clocks jump and nobody reads what is said.
+//! Training and its follow-up commands with failing disks, files of other users, jumping clocks and closed output
+//! streams.
 //!
-//! Rationale: networks learn overnight on shared disks, and their programs run under schedulers that close streams. Expected: exit code 1 and one
-//! error with a help, no file that is half under its final name, and the same command ends with the bytes of an undisturbed run; what cannot be
-//! said changes neither files nor exit codes. Source: none needed, equality is exact.
+//! Rationale: networks are trained overnight on shared disks, under schedulers that close streams. Expected: exit code
+//! 1 and one error with a help line, no partial file under a final name, and the same command then produces the bytes
+//! of an undisturbed run; messages that cannot be printed change neither files nor exit codes. Source: none needed,
+//! equality is exact.
 
 use crate::common::dataset::{fail, path, same, succeed, tree};
 use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, misdate, open_to_all};
 use crate::common::program::scratch;
 use crate::common::training;
-use furrow::train::fit::checkpoint;
-use furrow::train::fit::hyper::NormalizationMode;
-use furrow::train::net::Network;
-use furrow::train::run;
+use furrow_train::fit::checkpoint;
+use furrow_train::fit::hyper::NormalizationMode;
+use furrow_train::net::Network;
+use furrow_train::run;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ use std::sync::LazyLock;
 
 static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("faults-set"));
 
-/// A trained network.
+/// Folder of a trained network.
 static RUN: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faults-run");
     if folder.exists() {
@@ -30,7 +32,7 @@ static RUN: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
-/// `train` with these arguments, in single precision on one thread.
+/// Returns the command `train` with these arguments, in single precision on one thread.
 fn train(verb: &str, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).arg(verb).args(arguments);
@@ -38,7 +40,7 @@ fn train(verb: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// Images of the set, as the program's words.
+/// Returns the command-line argument that selects images of the set.
 fn images(pick: &str) -> String {
     format!("{}@{pick}", SET.display())
 }
@@ -61,7 +63,7 @@ fn calibrate(out: &Path) -> Command {
     train("calibrate", &[path(&RUN), "--set", &images("all"), "--images", "2", "--out", path(out)])
 }
 
-/// Expected: each file is whole or absent.
+/// Expected: each file is complete or absent.
 #[test]
 fn a_prediction_that_meets_a_fault_goes_on_to_the_same_bytes() {
     let make = |out: &Path| predict(out, &["--quiet"]);
@@ -72,15 +74,15 @@ fn a_prediction_that_meets_a_fault_goes_on_to_the_same_bytes() {
     });
 }
 
-/// Expected: weights and the card that tells of them are there together or not at all.
+/// Expected: the weights and their model card are both present or both absent.
 #[test]
 fn a_calibration_that_meets_a_fault_leaves_nothing() {
     each_is_gone_on_from(&calibrate, None, 2, &|there: &Tree, _, what| {
-        assert!(there.is_empty(), "{what}: {:?} are there", there.keys());
+        assert!(there.is_empty(), "{what}: found {:?}", there.keys());
     });
 }
 
-/// A training of which the second checkpoint could not be written, with the first one there.
+/// Runs a training whose second checkpoint cannot be written, while the first is present.
 fn half_trained(out: &Path) {
     let checkpoint = out.join(checkpoint::FILE);
     let ended = faults::run(fit(out, &["--quiet"]), &checkpoint, 2, true);
@@ -89,7 +91,7 @@ fn half_trained(out: &Path) {
     assert!(checkpoint.is_file() && !out.join(run::RESULT).exists());
 }
 
-/// Expected: times of files in the past and in the future change no weight.
+/// Expected: file times in the past or the future change no weight.
 #[test]
 fn a_training_goes_on_whatever_the_times_of_its_files() {
     let (_keep, whole) = scratch();
@@ -101,11 +103,12 @@ fn a_training_goes_on_whatever_the_times_of_its_files() {
     succeed(fit(&out, &["--quiet"]));
     let weights = |run: &Path| fs::read(run.join(run::WEIGHTS)).expect("weights");
     assert!(weights(&out) == weights(&whole));
-    let history = |run: &Path| run::results(run).expect("results").expect("they are there").history;
+    let history = |run: &Path| run::results(run).expect("results").expect("present").history;
     assert_eq!(history(&out), history(&whole));
 }
 
-/// Expected: a folder that another user may not write to, and a checkpoint that he may not read, are one error, and nothing is changed.
+/// Expected: a folder that another user may not write to, or a checkpoint that they may not read, gives one error, and
+/// nothing is changed.
 #[test]
 fn a_training_of_another_user_is_told() {
     let (_keep, out) = scratch();
@@ -134,7 +137,7 @@ fn full() -> Stdio {
     fs::File::create("/dev/full").expect("Linux").into()
 }
 
-/// The same command with stderr closed, by a shell.
+/// Returns the same command with stderr closed by a shell.
 fn mute(inner: &Command) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", "exec \"$0\" \"$@\" 2>&-"]).arg(inner.get_program()).args(inner.get_args());
@@ -142,7 +145,8 @@ fn mute(inner: &Command) -> Command {
     command
 }
 
-/// What a command makes in a folder, whatever becomes of what it says: a full disk, a reader that is gone, no stream at all.
+/// Checks that a command writes the same files when its messages go to a full disk, to a closed pipe, or to a closed
+/// stream.
 fn makes_the_same(make: &dyn Fn(&Path) -> Command, files: &[&str]) {
     let made = |begin: &dyn Fn(Command) -> Command| {
         let (_keep, out) = scratch();
@@ -169,8 +173,8 @@ fn makes_the_same(make: &dyn Fn(&Path) -> Command, files: &[&str]) {
     }
 }
 
-/// Expected: files and exit code 0 as where somebody reads; exit code 2 where the command is wrong; paths that are lost on stdout are exit code 1, with
-/// the files there.
+/// Expected: the same files and exit code 0 as with open streams; exit code 2 if the command is wrong; if paths on
+/// stdout are lost, exit code 1 with the files present.
 #[test]
 fn full_and_closed_streams_end_no_training_and_no_prediction() {
     makes_the_same(&|out| fit(out, &[]), &[run::WEIGHTS, run::MODEL]);
@@ -184,8 +188,8 @@ fn full_and_closed_streams_end_no_training_and_no_prediction() {
     assert!(out.join("000001.png").is_file());
 }
 
-/// Rationale: the loader complains of a library that it is to load and does not find. Expected: where there is no CUDA, exit code 2 and words of
-/// ours alone.
+/// Rationale: the dynamic loader prints its own error about a preloaded library that it cannot find. Expected: without
+/// CUDA, exit code 2 and only the program's own message.
 #[test]
 fn a_missing_cuda_is_told_in_words_of_ours() {
     let (_keep, out) = scratch();

@@ -1,23 +1,24 @@
-//! What a field is and what it says of itself.
+//! Fields and their records.
 //!
-//! Rationale: people learn from what is written beside the images, so it must be what was drawn, in the units it names.
-//! Expected: a season is shared by all plants of a field; records agree with the scene that was built from the same numbers.
+//! Rationale: networks learn from the metadata beside the images, so it must be the values that were drawn, in the
+//! stated units. Expected: all plants of a field share a season; records agree with the scene that was built from the
+//! same numbers.
 
 use crate::common::program::{SMALL, field, shoot, small_text};
-use furrow::job::{Field as Shown, SceneFile};
-use furrow::light::LightRecord;
-use furrow::math::{Spectrum, Vec3, vec3};
-use furrow::plant::OrganKind;
-use furrow::scene::assemble::{self, Options, Preview};
-use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Field, PartKind, PlantRecord};
-use furrow::settings::Quality;
+use furrow_base::math::{Spectrum, Vec3, vec3};
+use furrow_field::assemble::{self, Options, Preview};
+use furrow_field::{Field, PartKind, PlantRecord};
+use furrow_grow::plant::OrganKind;
+use furrow_job::{Field as Shown, SceneFile};
+use furrow_optics::light::LightRecord;
+use furrow_render::scene::tag::{Class, Tag};
+use furrow_render::settings::Quality;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A row of beets among cleavers on a bare plane, by what their growths are.
+/// Builds a row of beets among cleavers on a bare plane, given their growth stages.
 fn meadow(beet: &str, cleavers: &str, index: u64) -> Field {
     let text = format!(
         r#"Field(
@@ -47,7 +48,7 @@ fn all_plants_of_a_field_share_its_season() {
         assert!(beets.iter().all(|p| p.bbch == if late { 16 } else { 10 }), "field {index}");
         assert!(cleavers.iter().all(|p| p.age_days == if late { 25.0 } else { 3.0 }), "field {index}");
     }
-    assert!(seen[0] > 1 && seen[1] > 1, "{seen:?}: one season never comes");
+    assert!(seen[0] > 1 && seen[1] > 1, "{seen:?}: one season never occurs");
 }
 
 #[test]
@@ -61,9 +62,10 @@ fn a_list_of_growths_moves_nothing_else() {
     assert_ne!(of(&plain, "GALAP"), of(&other, "GALAP"));
 }
 
-/// Rationale: one scene file for the fields of many farms must not sow them over each other. Expected: with `sown: One` each field has one of
-/// the crops, as it would be sown among all of them, and its record and its rows are that crop's; every crop comes; all fields are of
-/// one table of species; weeds stay where they are. Source: what `Sown` says.
+/// Rationale: a scene file for fields of many farms must not sow all their crops into one field. Expected: with
+/// `sown: One`, each field has one of the crops, at the positions it would have among all of them; its record and rows
+/// are that crop's; every crop occurs; all fields share one species table; weeds keep their positions. Source: the
+/// documentation of `Sown`.
 #[test]
 fn a_field_has_one_of_the_crops_where_the_scene_file_says_so() {
     let sow = |sown: &str, index: u64| {
@@ -106,9 +108,10 @@ fn a_field_has_one_of_the_crops_where_the_scene_file_says_so() {
     assert_eq!(seen.len(), 3, "{seen:?}");
 }
 
-/// Rationale: numbers are dense, so the same beet is 10 in one image and 8 in the next; whoever follows a plant through images needs
-/// what does not change. Expected: with the camera 5 cm further, and with another resolution, plants at the same place have the same
-/// identity, so have their leaves, and no two of a field are equal; another field has others. Source: what `PlantRecord::id` says.
+/// Rationale: plant numbers are dense, so the same beet is 10 in one image and 8 in the next; following a plant through
+/// images needs a stable identity. Expected: with the camera moved by 5 cm, and at another resolution, plants at the
+/// same position have the same identity, and so do their leaves; no two identities in a field are equal; another field
+/// has other identities. Source: the documentation of `PlantRecord::id`.
 #[test]
 fn a_plant_keeps_its_identity_wherever_the_camera_stands() {
     let look = |x: f64, index: u64, width: u32| {
@@ -141,19 +144,19 @@ fn a_plant_keeps_its_identity_wherever_the_camera_stands() {
             renumbered += usize::from(a.number != b.number);
         }
     }
-    assert!(renumbered > 0, "no number changed: nothing was tested");
+    assert!(renumbered > 0, "no plant number changed, so nothing was tested");
     let elsewhere = look(0.0, 1, 32);
     assert!(elsewhere.iter().all(|p| here.iter().all(|q| q.id != p.id)));
 }
 
-/// Rationale: codes 31 to 39 of beets are the share of the ground that they cover, and whoever asks for 33 means 30 %. Expected: drilled at
-/// 45 cm by 20 cm, none missing, they cover 10, 30, 50, 70 and 90 % within 2.5 points in the mean of three seeds; records say the code that was
-/// asked for, and older plants are not smaller. Source: Meier 2001, principal growth stage 3 of beet.
+/// Rationale: BBCH codes 31 to 39 of beets are defined by ground cover; code 33 means 30 %. Expected: sown at 45 cm by
+/// 20 cm without gaps, they cover 10, 30, 50, 70 and 90 % within 2.5 points, averaged over three seeds; records contain
+/// the requested code, and older plants are not smaller. Source: Meier 2001, principal growth stage 3 of beet.
 #[test]
 fn beets_cover_what_their_stage_says() {
-    use furrow::accel::EmbreeAccel;
-    use furrow::geometry::Window;
-    use furrow::render::label;
+    use furrow_base::geometry::Window;
+    use furrow_render::accel::EmbreeAccel;
+    use furrow_render::render::label;
     let mut days = 0.0;
     for (code, wanted) in [(31, 0.1), (33, 0.3), (35, 0.5), (37, 0.7), (39, 0.9)] {
         let mut covered = 0.0;
@@ -180,8 +183,8 @@ fn beets_cover_what_their_stage_says() {
     }
 }
 
-/// A sown field under a camera.
-fn under(camera: &str) -> furrow::Result<Field> {
+/// Builds a sown field under a camera.
+fn under(camera: &str) -> furrow_base::Result<Field> {
     let text = format!(
         r#"Field(
             camera: Pinhole(size: (16, 12), {camera}),
@@ -192,9 +195,10 @@ fn under(camera: &str) -> furrow::Result<Field> {
     assemble::field_of(&text, &Options::default())
 }
 
-/// Rationale: a tall or oblique camera saw bare edges, and labels called them soil. Expected: there is a plant within 0.6 m of each point
-/// of the ground in view, and no warning of bare ground; where the horizon is in view there is a warning that says so and what to do, and all is
-/// planted to 6 m; a view of which more than half would be bare is refused. Source: rows of 0.5 m by 0.5 m.
+/// Rationale: a high or oblique camera saw bare margins, which labels called soil. Expected: a plant within 0.6 m of
+/// every visible ground point, and no warning of bare ground. If the horizon is visible, a warning says so and suggests
+/// a remedy, and the field is planted up to 6 m; a view that would be more than half bare is refused. Source: rows of
+/// 0.5 m by 0.5 m.
 #[test]
 fn all_that_a_camera_sees_is_planted_or_told() {
     for camera in [
@@ -205,13 +209,13 @@ fn all_that_a_camera_sees_is_planted_or_told() {
         assert!(!field.warnings.iter().any(|words| words.contains("stays bare")), "{camera}: {:?}", field.warnings);
         let mut farthest = 0.0_f32;
         for (x, y) in [(0.0, 0.0), (16.0, 0.0), (0.0, 12.0), (16.0, 12.0), (8.0, 0.0), (0.0, 6.0)] {
-            let (from, along) = field.scene.camera.ray(furrow::math::vec2(x, y), [0.5; 2]);
+            let (from, along) = field.scene.camera.ray(furrow_base::math::vec2(x, y), [0.5; 2]);
             let at = from + along * (from.z / -along.z);
             let near = field.plants.iter().any(|p| p.position.truncate().distance(at.truncate()) < 0.6);
             assert!(near, "no plant near {at}: {camera}");
             farthest = farthest.max(at.truncate().length());
         }
-        assert!(farthest > 2.5, "{farthest} m: the old bound was not passed");
+        assert!(farthest > 2.5, "{farthest} m: too close to test the far ground");
     }
     let level =
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 4, 0.5))";
@@ -225,15 +229,16 @@ fn all_that_a_camera_sees_is_planted_or_told() {
     assert!(refused.contains("m away") && refused.contains("lower the camera"), "{refused}");
 }
 
-/// Rationale: ground that falls away is seen farther out than the plane z = 0, and clods and fine ground ended within the image. Expected: in each band of an
-/// image's rows, and of each beam of a LiDAR, clods are met at least a quarter as often as on the mean, whichever way the ground falls, in the second of these
-/// fields away from both. Source: clods lie everywhere alike.
+/// Rationale: ground that slopes down is visible farther out than the plane z = 0, and clods and fine ground ended
+/// inside the image. Expected: in each band of image rows, and for each LiDAR beam, clods are hit at least a quarter as
+/// often as on average, whichever way the ground slopes; in the second of these fields it slopes away from both
+/// sensors. Source: clods are distributed evenly.
 #[test]
 fn ground_is_made_as_far_as_it_is_seen_where_it_slopes() {
-    use furrow::accel::EmbreeAccel;
-    use furrow::geometry::{Intersect, Ray, Window};
-    use furrow::render::label;
-    use furrow::scene::assemble::Scanner;
+    use furrow_base::geometry::{Intersect, Ray, Window};
+    use furrow_field::assemble::Scanner;
+    use furrow_render::accel::EmbreeAccel;
+    use furrow_render::render::label;
     let text = "Field(
         seed: 3,
         camera: Pinhole(
@@ -253,7 +258,7 @@ fn ground_is_made_as_far_as_it_is_seen_where_it_slopes() {
         for scan in [None, Some(Scanner::OfScene)] {
             let field = field(text, &Options { index, scan, ..Options::default() });
             let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
-            // The ground itself is part 0.
+            // Part 0 is the ground itself.
             let bands: Vec<Vec<bool>> = match field.scanners.first() {
                 None => {
                     let window = Window::full(100, 24);
@@ -276,8 +281,9 @@ fn ground_is_made_as_far_as_it_is_seen_where_it_slopes() {
     }
 }
 
-/// Rationale: a camera within a clod or a ridge takes pictures of nothing, and who took them did not know why. Expected: a warning that says so where the
-/// ground's own triangle at the camera's place is above it, and none where it is not; both happen in sixteen fields.
+/// Rationale: a camera inside a clod or a ridge renders useless images, and the user did not learn why. Expected: a
+/// warning if the ground's triangle at the camera's position is above the camera, and none otherwise; both cases occur
+/// in sixteen fields.
 #[test]
 fn a_camera_under_the_ground_is_told() {
     let text = r"Field(
@@ -301,14 +307,14 @@ fn a_camera_under_the_ground_is_told() {
         if (height - 0.002).abs() < 1e-4 {
             continue;
         }
-        let told = field.warnings.iter().any(|words| words.contains("under the ground") && words.contains("raise it"));
+        let told = field.warnings.iter().any(|words| words.contains("below the ground") && words.contains("raise it"));
         assert_eq!(told, height > 0.002, "{index}: {height} m, {:?}", field.warnings);
         buried += usize::from(told);
     }
-    assert!((2..14).contains(&buried), "{buried} of 16");
+    assert!((2..14).contains(&buried), "{buried} of 16 cameras are below the ground");
 }
 
-/// Lengths of blades, base to tip, metres.
+/// Lengths of the leaf blades, base to tip, metres.
 fn lengths(plant: &PlantRecord) -> Vec<f32> {
     plant.leaf_axes.iter().map(|a| a.base.distance(a.tip)).collect()
 }
@@ -321,7 +327,7 @@ fn vigour_scales_the_plants_of_its_entry_and_moves_nothing_else() {
     let mut compared = 0;
     for (beet, dwarf) in beets.iter().zip(&dwarfs) {
         assert_eq!((beet.position, beet.axis, beet.age_days), (dwarf.position, dwarf.axis, dwarf.age_days));
-        // The youngest leaf, halved, may still be hidden in the bud.
+        // The youngest leaf, at half size, may still be hidden in the bud.
         for (whole, half) in lengths(beet).iter().zip(lengths(dwarf)) {
             assert!((half / whole - 0.5).abs() < 0.02, "{whole} m, {half} m");
             compared += 1;
@@ -337,7 +343,7 @@ fn vigour_scales_the_plants_of_its_entry_and_moves_nothing_else() {
     assert!(drawn.iter().all(|r| (0.38..1.02).contains(r)) && drawn.windows(2).any(|w| w[0] != w[1]), "{drawn:?}");
 }
 
-/// An empty field without ground, by what its camera and its lights are.
+/// Builds an empty field without ground, with the given camera and lights.
 fn studio(camera: &str, lights: &str, options: &Options) -> Field {
     field(&format!("Field(seed: 9, camera: {camera}, lights: [{lights}])"), options)
 }
@@ -353,7 +359,7 @@ fn a_cameras_record_projects_points_as_the_camera_does() {
         assert!(of.aperture.as_ref().is_some_and(|a| (a.focus_m - of.position_m[2] as f32).abs() < 1e-6));
         for k in 0..40 {
             let point = vec3(0.1 + 0.01 * (k % 7) as f32, -0.25 + 0.02 * (k / 7) as f32, 0.003 * k as f32);
-            // The formula as OpenCV's manual has it.
+            // The projection formula of OpenCV's manual.
             let d: Vec<f64> = (0..3).map(|i| f64::from(point[i]) - of.position_m[i]).collect();
             let [x, y, z] = of.world_to_camera.map(|row| row.iter().zip(&d).map(|(r, d)| r * d).sum::<f64>());
             let (x, y) = (x / z, y / z);
@@ -388,7 +394,7 @@ fn the_lights_records_tell_what_reaches_the_ground() {
         let sun = field.scene.lights[0].horizontal_irradiance();
         assert_eq!(sun, *sun_irradiance_w_m2_nm);
         let LightRecord::Lamp { power_w_nm, round, position_m, .. } = &rest[2] else { panic!("{rest:?}") };
-        // A Lambertian disc of radiance 1 and radius 5 cm sends out π² r².
+        // A Lambertian disc of radiance 1 and radius 5 cm emits π² r².
         let power = std::f32::consts::PI.powi(2) * 0.05 * 0.05;
         assert!(*round && *position_m == [0.3, 0.0, 0.8]);
         assert!((power_w_nm.to_array()[0] / power - 1.0).abs() < 1e-5, "{power_w_nm:?} {power}");
@@ -433,7 +439,7 @@ fn the_species_of_a_page_are_numbered_the_same_in_every_field() {
     let told: Vec<(&str, Class)> = tables[0].iter().map(|s| (s.eppo.as_str(), s.class)).collect();
     let models = [("", told[3].1), ("", told[4].1)];
     assert_eq!(told[..3], [("BEAVX", Class::Crop), ("GALAP", Class::Weed), ("CAPBP", Class::Weed)]);
-    assert_eq!(models, [("", Class::Crop), ("", Class::Weed)], "a model's own class, then the page's");
+    assert_eq!(models, [("", Class::Crop), ("", Class::Weed)], "a model's own class first, then the scene file's");
     assert!(tables[0][3..].iter().all(|s| s.name == "seedling") && tables[0].len() == 5, "{:?}", tables[0]);
 }
 
@@ -514,11 +520,12 @@ fn conditions_are_written_with_their_units() {
     assert_eq!(serde_json::to_value(&field.species[0]).unwrap()["class"], "crop");
 }
 
-/// Which parts are asked about: number of the part, class.
+/// Selects the parts to test by part number and class.
 type Seen = fn(u32, Class) -> bool;
 
-/// Rationale: a network that learns from near infrared takes the bands' relation for granted. Expected: under equal light in all bands the
-/// NDVI of what is rendered lies within that of measured leaves, bare soils and straw or wood. Source: `tests/ref/measured_ndvi.csv`.
+/// Rationale: a network trained with near infrared relies on the ratio of the bands. Expected: with equal light in all
+/// bands, the NDVI of rendered leaves, bare soil and straw is within the range measured for leaves, bare soils, and
+/// straw or wood. Source: `tests/ref/measured_ndvi.csv`.
 #[test]
 fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
     let text = std::fs::read_to_string("tests/ref/measured_ndvi.csv").unwrap();
@@ -545,7 +552,7 @@ fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
         ("leaf", &bare, |_, class| class == Class::Crop),
         ("soil", &bare, |_, class| class == Class::Soil),
         ("soil", &loess, |_, class| class == Class::Soil),
-        // The ground is the first part; what else there is on it is straw.
+        // The first part is the ground; all other soil parts are straw.
         ("straw", &strewn, |part, class| part > 0 && class == Class::Soil),
     ];
     for (what, page, is) in cases {
@@ -561,9 +568,10 @@ fn leaf_soil_and_straw_have_the_ndvi_of_measured_spectra() {
     }
 }
 
-/// Rationale: a soil of one's own must look as its spectrum says, and its file must travel with the scene. Expected: a spectrum that is twice another has
-/// ground twice as bright in each band, colour and near infrared; the file is among those that the field was built from, and decides the hash.
-/// Source: reflection is proportional to reflectance under light from everywhere but for what bounces twice.
+/// Rationale: a user-defined soil must have the colour of its spectrum, and its file must travel with the scene.
+/// Expected: doubling a spectrum doubles the brightness of the ground in each band, colour and near infrared; the file
+/// is listed among the field's files, and changes the hash. Source: reflected light is proportional to reflectance
+/// under uniform illumination, apart from interreflection.
 #[test]
 fn soil_has_the_spectrum_of_its_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -596,11 +604,11 @@ fn soil_has_the_spectrum_of_its_file() {
         let ratio = light[band] / dim[band];
         assert!((1.9..2.3).contains(&ratio), "band {band}: {ratio}");
     }
-    // The spectrum rises from blue to near infrared.
+    // The spectrum increases from blue to near infrared.
     assert!(dim[2] < dim[1] && dim[1] < dim[0] && dim[0] < dim[3], "{dim:?}");
 }
 
-/// A row of beets on ploughed ground with clods, as a camera of 320 pixels sees it.
+/// A row of beets on ploughed ground with clods, seen by a camera 320 pixels wide.
 const PLOUGHED: &str = r#"Field(
     seed: 4,
     camera: Pinhole(size: (320, 240), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.8)),
@@ -610,17 +618,18 @@ const PLOUGHED: &str = r#"Field(
     weeds: [(species: "scenes/species/galium.ron", growth: Bbch(12), spread: (per_m2: 20))],
 )"#;
 
-fn ploughed(preview: Option<Preview>) -> furrow::Result<Field> {
+fn ploughed(preview: Option<Preview>) -> furrow_base::Result<Field> {
     assemble::field_of(PLOUGHED, &Options { preview, ..Options::default() })
 }
 
-/// Rationale: whoever turns a slider must see the field that will be rendered. Expected: the same plants at the same places and the same
-/// ground from fewer triangles, and labels that differ at outlines alone. Source: what `Options::preview` says.
+/// Rationale: the preview of an edited value must show the field that will be rendered. Expected: the same plants at
+/// the same positions and the same ground with fewer triangles, and labels that differ only at outlines. Source: the
+/// documentation of `Options::preview`.
 #[test]
 fn a_preview_is_the_same_field_with_coarser_meshes() {
-    use furrow::accel::EmbreeAccel;
-    use furrow::geometry::Window;
-    use furrow::render::label;
+    use furrow_base::geometry::Window;
+    use furrow_render::accel::EmbreeAccel;
+    use furrow_render::render::label;
     let (whole, preview) = (ploughed(None).unwrap(), ploughed(Some(Preview::default())).unwrap());
     let feet = |field: &Field| field.plants.iter().map(|p| (p.id, p.position, p.bbch, p.leaves)).collect::<Vec<_>>();
     assert!(whole.plants.len() > 3);
@@ -630,7 +639,7 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
         parts.map(|part| part.mesh.triangles.len()).sum()
     };
     let (fine, coarse) = (triangles(&whole, true), triangles(&preview, true));
-    // Ribbons, as of mayweed, are as coarse as they can be.
+    // Ribbon leaves, such as mayweed's, cannot be made coarser.
     assert!(4 * coarse < 3 * fine, "{coarse} of {fine}");
     let labels = |field: &Field| {
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
@@ -643,17 +652,17 @@ fn a_preview_is_the_same_field_with_coarser_meshes() {
     assert!(differ > 0 && differ < plants / 12, "{differ} of {plants}");
 }
 
-/// Expected: where it is not wanted any more, nothing is grown.
+/// Expected: if a field is no longer wanted, building stops.
 #[test]
 fn a_field_that_is_not_wanted_is_given_up() {
     let stop = Some(Arc::new(AtomicBool::new(true)));
     let refusal = assemble::field_of(PLOUGHED, &Options { stop, ..Options::default() }).err().expect("an interruption");
-    assert_eq!(refusal.kind(), furrow::error::Kind::Interrupted);
+    assert_eq!(refusal.kind(), furrow_base::error::Kind::Interrupted);
 }
 
-/// Rationale: what is kept of the field before must never show where it is not what the scene file says now. Expected: after each change
-/// of the text the very parts that a preview without a past grows; the meshes of before where nothing that shapes them changed, and those
-/// of the plants alone where the soil did.
+/// Rationale: parts reused from the previous field must not be shown if the scene file has changed them. Expected:
+/// after each change of the text, exactly the parts of a preview built from scratch; meshes are reused where nothing
+/// that shapes them changed, and only those of the plants where the soil changed.
 #[test]
 fn a_preview_keeps_what_did_not_change_and_nothing_else() {
     let root = concat!("\"", env!("CARGO_MANIFEST_DIR"), "/scenes/species/");
@@ -665,7 +674,7 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
     let preview = Preview::default();
     let grow = |scene: &SceneFile, preview: &Preview| scene.clone().preview(preview).field(0).unwrap();
     let image = |field: &Shown| field.render(&Quality::spp(1)).unwrap().film.pixels;
-    // What is written, instead of what; whether the plants' meshes stay, and whether the ground's do.
+    // Text before and after the change; whether the plants' meshes are reused, and whether the ground's are.
     let steps = [
         ("seed: 4", "seed: 4", true, true),
         ("radiance: (1, 1, 1, 1)", "radiance: (2, 1, 1, 1)", true, true),
@@ -685,9 +694,9 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
             let parts = field.grown().scene.parts.iter();
             parts.map(|part| (part.mesh.clone(), part.mask.clone(), part.material, part.tag)).collect()
         };
-        assert!(parts(&kept) == parts(&fresh), "{to}: a field that was kept is not the field");
+        assert!(parts(&kept) == parts(&fresh), "{to}: the reused field differs from a fresh one");
         assert_eq!(kept.grown().plants, fresh.grown().plants, "{to}");
-        assert!(image(&kept) == image(&fresh), "{to}: a picture of what was kept is not the field's");
+        assert!(image(&kept) == image(&fresh), "{to}: the image of the reused field differs from a fresh one");
         let shared = |plants: bool| {
             let meshes = |field: &Shown| -> Vec<_> {
                 let parts = field.grown().scene.parts.iter().filter(|part| (part.tag.plant > 0) == plants);
@@ -701,7 +710,8 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
     }
 }
 
-/// Expected: a scene file that is saved as it was gives the very meshes and BVH of before, however many kinds of things its fields have.
+/// Expected: a scene file saved without changes gives the same meshes and BVH as before, however many kinds of objects
+/// its fields contain.
 #[test]
 fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
     let preview = Preview::default();
@@ -717,9 +727,10 @@ fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
     }
 }
 
-/// Rationale: a field of a drone is made of fewer triangles, not of other plants. Expected: at most one pixel in
-/// a hundred gets another class or plant, where a tenth are plants; soil whose small aggregates became heights of the ground, or too small to be drawn, is
-/// as bright within 5 %, as under clods elsewhere (`detail`); a quarter of the triangles. Source: the same scene in full detail, seed and all.
+/// Rationale: a field seen from a drone is built from fewer triangles, but with the same plants. Expected: with plants
+/// in a tenth of the pixels, at most one pixel in a hundred changes its class or plant. Soil whose small aggregates
+/// became height variation, or are too small to be built, has the same brightness within 5 % (`detail` tests soil under
+/// clods). A quarter of the triangles. Source: the same scene in full detail with the same seed.
 #[test]
 fn detail_by_pixel_shows_the_same_field() {
     let page = |detail: &str| {
@@ -749,7 +760,7 @@ fn detail_by_pixel_shows_the_same_field() {
     let other = pairs().filter(|(a, b)| (a.class, a.plant) != (b.class, b.plant)).count();
     let plants = pairs().filter(|(a, _)| a.plant > 0).count();
     assert!(plants > 2000 && 100 * other < labels.tags.len(), "{other} of {}, {plants} of plants", labels.tags.len());
-    let soil = |film: &furrow::film::Film| {
+    let soil = |film: &furrow_render::film::Film| {
         let pixels = film.pixels.iter().zip(pairs()).filter(|(_, (a, b))| a.plant == 0 && b.plant == 0);
         pixels.map(|(pixel, _)| pixel.mean).fold(Spectrum::ZERO, |sum, mean| sum + mean)
     };
@@ -757,9 +768,12 @@ fn detail_by_pixel_shows_the_same_field() {
     assert!(ratio.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{ratio:?}");
 }
 
-/// Rationale: a camera that looks along the rows sees plants a metre away and plants of a few pixels; each must be as fine as its own pixels, and still be the
-/// plant that full detail shows. Expected: the same plants with the same leaves where both are seen, labels equal in 98 % of the pixels at a third of the
-/// triangles, near leaves finer than far ones, feet on the ground, and the sky above a horizon without a gap.
+/// Rationale: a camera that looks along the rows sees plants one metre away and plants a few pixels high; each must be
+/// as detailed as its pixels require, and the same plant as in full detail.
+///
+/// Expected: the same plants with the same leaves where both fields show them, labels equal in 98 % of the pixels with
+/// a third of the triangles, near leaves finer than far ones, plants standing on the ground, and no gap below the sky
+/// at the horizon.
 #[test]
 fn a_front_camera_shows_the_same_field_by_pixel() {
     let page = |detail: &str| {
@@ -791,7 +805,7 @@ fn a_front_camera_shows_the_same_field_by_pixel() {
         assert_eq!(position.truncate(), plant.position.truncate());
         assert!((position.z - plant.position.z).abs() < 0.02, "{position} {}", plant.position);
     }
-    assert!(ground.positions.iter().any(|p| p.y > 190.0), "it ends at the horizon");
+    assert!(ground.positions.iter().any(|p| p.y > 190.0), "the ground must reach the horizon");
     let cells = |field: &Field, far: bool| {
         let plant = |tag: u32| field.plants.iter().find(|p| p.number == tag).map(|p| p.position.y);
         let of = field.scene.parts.iter().zip(&field.kinds).filter(|(part, kind)| {
@@ -802,11 +816,11 @@ fn a_front_camera_shows_the_same_field_by_pixel() {
     };
     assert!(cells(&coarse, false) > 2 * cells(&coarse, true), "{} {}", cells(&coarse, false), cells(&coarse, true));
     let [(_, fine), (film, labels)] = [&full, &coarse].map(|field| shoot(field, 8, 0));
-    // Numbers differ, for the rectangle about the view holds more plants than the view.
+    // Plant numbers differ, because the rectangle around the view holds more plants than the view.
     let name =
         |field: &Field, tag: &Tag| (tag.class, field.plants.iter().find(|p| p.number == tag.plant).map(|p| p.id));
     let other = fine.tags.iter().zip(&labels.tags).filter(|(a, b)| name(&full, a) != name(&coarse, b)).count();
     let plants = labels.tags.iter().filter(|tag| tag.plant > 0).count();
     assert!(plants > 2000 && 50 * other < labels.tags.len(), "{other} of {}, {plants} of plants", labels.tags.len());
-    assert!(film.pixels.iter().all(|pixel| !pixel.mean.is_black()), "no gap between the ground and the sky");
+    assert!(film.pixels.iter().all(|pixel| !pixel.mean.is_black()), "there is a gap between the ground and the sky");
 }

@@ -1,21 +1,23 @@
-//! Pictures and pages of what was learned: they show what they should, are well formed, and ask for nothing.
+//! Figures and HTML pages about training results: they show the right values, are well-formed, and load nothing.
 //!
-//! Rationale: a figure is what most people will judge by. Expected: each picture of a sheet in its place, pixel for pixel; curves that are
-//! XML, end at the axis' ends and lose no peak; a page whose numbers are those of the report, that opens without a network in windows wide
-//! and narrow. Source: the values worked out here; Python's XML parser; headless Chromium (Debian's `chromium`).
+//! Rationale: most readers judge results by their figures. Expected: each image of a sheet is at its position, pixel by
+//! pixel; curves are valid XML, end at the ends of the axis and keep every peak; pages contain the report's numbers,
+//! and open without a network connection in wide and narrow windows. Source: the values computed here; Python's XML
+//! parser; headless Chromium (Debian's `chromium`).
 
 use crate::common::browser::{browser, probe};
 use crate::common::program::scratch;
 use crate::common::python::python;
-use furrow::report::chart::{Chart, Curve};
-use furrow::train::data::{Band, Example};
-use furrow::train::figure::{Page, Shot, Shots, sheet, spread};
-use furrow::train::measure::{Evaluation, Prediction, Report};
+use furrow_report::chart::{Chart, Curve};
+use furrow_train::data::{Band, Example};
+use furrow_train::figure::{Page, Shot, Shots, sheet, spread};
+use furrow_train::measure::{Evaluation, Prediction, Report};
 use std::process::Command;
 
 const PALETTE: [[u8; 3]; 3] = [[0, 0, 0], [0, 255, 0], [255, 0, 0]];
 
-/// 6 × 4 pixels: a plant of crop, of which half is missed, a weed taken for crop, crop where there is none, a pixel without a label.
+/// 6 × 4 pixels: a crop plant that is half missed, a weed classified as crop, crop predicted on soil, and an unlabelled
+/// pixel.
 fn shot(name: &str) -> Shot {
     let map = |rows: [&str; 4]| -> Vec<u8> {
         rows.concat().bytes().map(|c| if c == b'x' { 255 } else { c - b'0' }).collect()
@@ -31,7 +33,7 @@ fn a_sheet_holds_each_picture_in_its_place() {
     let first = shot("a");
     let second = Shot { width: 4, height: 6, truth: Vec::new(), ..shot("b") };
     let picture = sheet(&[first.clone(), second.clone()], &PALETTE, false);
-    // Three columns as wide as the widest, four pixels apart; two rows.
+    // Three columns as wide as the widest image, four pixels apart; two rows.
     assert_eq!((picture.width, picture.height, picture.rgb.len()), (6 * 3 + 2 * 4, 4 + 4 + 6, 26 * 14));
     let at = |x: usize, y: usize| picture.rgb[y * 26 + x];
     for (x, y) in (0..4).flat_map(|y| (0..6).map(move |x| (x, y))) {
@@ -50,7 +52,7 @@ fn a_sheet_holds_each_picture_in_its_place() {
 fn errors_are_told_by_their_colours() {
     let errors = shot("a").errors(0);
     let at = |x: usize, y: usize| errors[y * 6 + x];
-    // Missed, found; the weed taken for crop; crop where none is; no label; soil that is right.
+    // Missed, correct; the weed classified as crop; crop predicted on soil; no label; correct soil.
     assert_eq!((at(2, 0), at(5, 2), at(1, 3), at(0, 3)), ([40, 120, 255], [230, 0, 200], [255, 190, 0], [128; 3]));
     let [plant, soil] = [at(1, 0), at(0, 0)];
     assert!(plant[0] == plant[1] && plant[0] > soil[0] && soil[0] == soil[2], "{plant:?} {soil:?}");
@@ -67,8 +69,9 @@ fn shots_are_made_small_and_spread_over_the_set() {
     assert_eq!((spread(100, 4), spread(3, 8), spread(0, 4)), (vec![12, 37, 62, 87], vec![0, 1, 2], vec![]));
 }
 
-/// Rationale: who looks at an evaluation looks for what went wrong. Expected: of images in any order those of the lowest mean I/U, the worst
-/// first, then those spread over the set that are not among them; without that, the spread ones alone.
+/// Rationale: readers of an evaluation look for its errors. Expected: from images in any order, those with the lowest
+/// mean IoU, worst first, then evenly spaced ones that are not among them; without the option for worst images, only
+/// the evenly spaced ones.
 #[test]
 fn the_worst_images_are_kept_and_some_spread_over_the_set() {
     let wrong = [3, 40, 7, 0, 90, 12, 55, 1, 30, 8];
@@ -86,11 +89,13 @@ fn the_worst_images_are_kept_and_some_spread_over_the_set() {
     let spread_alone = Shots::new(10, 3, 50, &[Band::Red]);
     assert_eq!(seen(spread_alone), ["1", "5", "8"]);
     let shots = Shots::new(10, 3, 50, &[Band::Red]).and_worst(4, 2);
-    // Of 10 × 10 pixels, 90, 55, 40 and 30 are wrong in the worst four; 5 is the only spread one that is not among them.
+    // Of 10 × 10 pixels, the worst four have 90, 55, 40 and 30 wrong; 5 is the only evenly spaced image that is not
+    // among them.
     assert_eq!(seen(shots), ["4", "6", "1", "8", "5"]);
 }
 
-/// Rationale: a loss that falls from 1.6 to 1.2 had an axis without a number. Expected: three numbers or more on a logarithmic axis however short.
+/// Rationale: a loss falling from 1.6 to 1.2 had an axis without labels. Expected: at least three numbers on a
+/// logarithmic axis of any range.
 #[test]
 fn a_short_logarithmic_axis_has_numbers() {
     for (from, to) in [(1.2, 1.6), (0.63, 1.82), (0.0301, 0.0309), (1.0, 900.0)] {
@@ -118,7 +123,7 @@ fn chart(logarithmic: bool) -> Chart {
     }
 }
 
-/// Numbers of the `d` of a curve's path.
+/// Parses the points of a curve's path attribute `d`.
 fn path(svg: &str, name: &str) -> Vec<Vec<(f64, f64)>> {
     let group = svg.split(&format!("data-curve=\"{name}\"")).nth(1).unwrap().split("</g>").next().unwrap();
     let Some(d) = group.split(" d=\"").nth(1) else { return Vec::new() };
@@ -134,19 +139,19 @@ fn path(svg: &str, name: &str) -> Vec<Vec<(f64, f64)>> {
 fn curves_keep_their_peaks_break_where_they_must_and_stay_in_the_plot() {
     let svg = chart(false).svg();
     let runs = path(&svg, "training &quot;a&quot;");
-    assert_eq!(runs.len(), 2, "what is not a number breaks the line");
+    assert_eq!(runs.len(), 2, "values that are not numbers must break the line");
     let all: Vec<(f64, f64)> = runs.concat();
-    assert!(all.len() < 1300, "{} points are drawn", all.len());
+    assert!(all.len() < 1300, "{} points are too many", all.len());
     assert!(all.windows(2).all(|w| w[0].0 <= w[1].0));
     let top = all.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-    assert!(all.iter().filter(|p| p.1 < top + 50.0).count() == 1, "the peak is there, alone");
+    assert!(all.iter().filter(|p| p.1 < top + 50.0).count() == 1, "the peak must be kept, once");
     assert!(all.iter().all(|(x, y)| (62.0..=624.0).contains(x) && (0.0..=316.0).contains(y)));
     assert_eq!((all[0].0, all[all.len() - 1].0), (62.0, 624.0));
     assert!(svg.contains("<circle") && path(&svg, "alone").is_empty());
-    // Half as high above the axis' zero as it is of the peak: the axis begins at zero.
+    // The axis starts at zero, so this value is at 0.5 / 3.5 of the peak's height.
     let half = path(&svg, "validation")[0][1].1;
     assert!(((316.0 - half) / (316.0 - top) - 0.5 / 3.5).abs() < 2e-3);
-    // On a logarithmic axis zero is not drawn; equal ratios are equal heights.
+    // A logarithmic axis omits zero; equal ratios have equal heights.
     let svg = chart(true).svg();
     assert_eq!(path(&svg, "validation")[0].len(), 2);
     let nothing = Chart { curves: Vec::new(), ..chart(false) }.svg();
@@ -176,7 +181,7 @@ fn curves_are_well_formed() {
     }
 }
 
-/// An evaluation of two images.
+/// Evaluates two images.
 fn report() -> Report {
     let mut evaluation = Evaluation::new(["soil", "crop", "weed"]);
     for name in ["a", "b"] {
@@ -215,7 +220,7 @@ fn page(report: &Report, shots: &[Shot]) -> String {
     page.html().unwrap()
 }
 
-/// The number of the element with this `data-key`.
+/// Returns the value of the element with this `data-key`.
 fn number(page: &str, key: &str) -> f64 {
     let rest = page.split(&format!("data-key=\"{key}\" data-value=\"")).nth(1).unwrap_or_else(|| panic!("no {key}"));
     rest.split('"').next().unwrap().parse().unwrap()
@@ -225,7 +230,7 @@ fn number(page: &str, key: &str) -> f64 {
 fn numbers_of_a_page_are_those_of_the_report_and_it_asks_for_nothing() {
     let (report, shots) = (report(), [shot("a"), shot("b")]);
     let html = page(&report, &shots);
-    assert_eq!(html, page(&report, &shots), "the same page twice");
+    assert_eq!(html, page(&report, &shots), "the page must be reproducible");
     assert_eq!(number(&html, "mean_iou"), report.scores.mean_iou.unwrap());
     assert_eq!((number(&html, "images"), number(&html, "seconds")), (2.0, 0.25));
     for (truth, predicted) in (0..3).flat_map(|t| (0..3).map(move |p| (t, p))) {
@@ -236,8 +241,8 @@ fn numbers_of_a_page_are_those_of_the_report_and_it_asks_for_nothing() {
         assert!(!html.contains(word), "the page has {word}");
     }
     assert_eq!(html.matches("<img src=\"data:image/").count(), html.matches("<img").count());
-    assert_eq!(html.matches("<img").count(), 8, "image, truth, prediction and errors of two");
-    // Of nothing, nothing is shown, and unknown scores are no numbers.
+    assert_eq!(html.matches("<img").count(), 8, "image, truth, prediction and errors of two images");
+    // An empty evaluation shows no images, and unknown scores are not shown as numbers.
     let empty = Evaluation::new(["soil", "crop", "weed"]).finish();
     let html = page(&empty, &[]);
     assert!(!html.contains("NaN") && !html.contains("<img") && html.contains("–"));
@@ -245,7 +250,7 @@ fn numbers_of_a_page_are_those_of_the_report_and_it_asks_for_nothing() {
     assert_eq!(bare.matches("<section>").count(), 0);
 }
 
-/// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
+/// Script that reads the page's state in the browser and stores it in the document; not part of the shipped page.
 const PROBE: &str = r#"<script>addEventListener("load", () => {
   const inside = e => { const r = e.getBoundingClientRect(); return r.width > 0 && r.height > 0; };
   document.body.dataset.probe = JSON.stringify({
@@ -271,7 +276,7 @@ fn a_browser_shows_the_page_in_wide_and_narrow_windows() {
         assert_eq!((seen["images"].as_i64(), seen["decoded"].as_i64()), (Some(8), Some(8)), "{seen}");
         assert_eq!(seen["curves"], 6, "{seen}");
         assert_eq!((seen["width"].as_i64(), seen["over"].as_i64()), (Some(width), Some(0)), "{seen}");
-        assert_eq!(seen["ink"], "rgb(34, 38, 31)", "the page's own colour: {seen}");
+        assert_eq!(seen["ink"], "rgb(34, 38, 31)", "the page's own style must apply: {seen}");
         assert_eq!(seen["requests"], serde_json::json!([]), "{seen}");
     }
 }

@@ -1,18 +1,19 @@
-//! Training: it learns, it says so, and stopping it changes nothing.
+//! Training: the loss falls, progress is logged, and interruptions change nothing.
 //!
-//! Rationale: a training runs overnight and is judged by its last weights, so a kill that changed them, or a file of another training
-//! taken for its own, would falsify every table made of it. Expected: equal bytes of `weights.safetensors` stopped or not, killed or not,
-//! with any number of loading threads; one clear error, exit code 2, for what cannot be gone on with. Source: what `train fit --help` says.
+//! Rationale: a training runs overnight and is judged by its final weights; a kill that changes them, or a file of
+//! another training used by mistake, would falsify every table of results. Expected: equal bytes of
+//! `weights.safetensors` whether the run is stopped, killed or undisturbed, with any number of loading threads; one
+//! clear error with exit code 2 if a run cannot be resumed. Source: the output of `train fit --help`.
 
 use crate::common::python::{ask, python};
-use furrow::dataset::classes::Classes;
-use furrow::output::{Picture, write_png};
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::train::data::{Augment, Band, Loader, Normalization, Order, Pick, Selection, Shape, Store};
-use furrow::train::fit::{Plan, settings};
-use furrow::train::run::{self, Results, TrainedModel};
-use furrow::train::table::Experiment;
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::model::classes::Classes;
+use furrow_output::{Picture, write_png};
+use furrow_train::data::{Augment, Band, Loader, Normalization, Order, Pick, Selection, Shape, Store};
+use furrow_train::fit::{Plan, settings};
+use furrow_train::run::{self, Results, TrainedModel};
+use furrow_train::table::Experiment;
 use std::borrow::Cow;
 use std::fs;
 use std::io::Write;
@@ -24,12 +25,13 @@ use std::time::{Duration, Instant};
 const W: u32 = 64;
 const H: u32 = 48;
 
-/// Images of brown ground with large green discs, the crop, and small ones of nearly the same green, the weeds; a set of them.
+/// Builds a set of images of brown ground with large green discs (crop) and small discs of almost the same green
+/// (weeds).
 fn set(folder: &Path, images: u64) -> PathBuf {
     set_with(folder, images, |_| true)
 }
 
-/// The same, where only some images have labels, by number.
+/// Builds a set in which only the images selected by number have labels.
 fn set_with(folder: &Path, images: u64, labelled: impl Fn(u64) -> bool) -> PathBuf {
     let (photos, masks, out) = (folder.join("images"), folder.join("masks"), folder.join("set"));
     for k in 0..images {
@@ -65,7 +67,7 @@ fn train(arguments: &str) -> Command {
     command
 }
 
-/// `train fit` on the set, small and quick: one thread, single precision.
+/// Returns a fast `train fit` command on the set: one thread, single precision.
 fn fit(set: &Path, out: &Path, more: &str) -> Command {
     let (set, out) = (set.display(), out.display());
     train(&format!("fit --set {set}@all --out {out} --size {W}x{H} --threads 1 --precision f32 --batch 4 {more}"))
@@ -77,7 +79,7 @@ fn succeed(command: &mut Command) -> Output {
     output
 }
 
-/// The program's error; it must have ended with `code`.
+/// Runs a command that must exit with `code`; returns its error message.
 fn refuse(command: &mut Command, code: i32) -> String {
     let output = command.output().unwrap();
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -108,10 +110,11 @@ fn eight_images_are_learnt_by_every_network_and_judged_so() {
         succeed(&mut fit(&set, &out, &more));
         let losses = results(&out).history.losses;
         let last = losses[losses.len() - 5..].iter().map(|l| l.loss).sum::<f64>() / 5.0;
-        // Soil everywhere costs 0.6 of entropy and two classes' overlap, 0.67; what is left is edges and the smallest weeds.
+        // Predicting only soil costs 0.6 of cross-entropy plus 0.67 of Dice loss for two classes; the rest is edges and
+        // the smallest weeds.
         assert!(losses[0].loss > 1.0 && last < 0.35, "{network}: {} to {last}", losses[0].loss);
         succeed(&mut train(&format!("eval {} --set {} --threads 1 --precision f32", out.display(), set.display())));
-        let report: furrow::train::measure::Report = run::read_json(&out.join("eval/set/report.json")).unwrap();
+        let report: furrow_train::measure::Report = run::read_json(&out.join("eval/set/report.json")).unwrap();
         assert!(report.scores.classes[1].iou.unwrap() > 0.6, "{network}: {:?}", report.scores);
         for name in ["report.html", "figure.png", "report.md"] {
             assert!(out.join("eval/set").join(name).is_file(), "{name}");
@@ -147,11 +150,11 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
                 assert!(begin.elapsed() < Duration::from_secs(60));
                 stops += usize::from(!status.success());
                 if signal == "TERM" {
-                    // None: it came while the program was still being loaded, before it can watch for signals.
+                    // `None`: the signal arrived while the program was still loading and had no handler.
                     assert!([Some(0), Some(75), None].contains(&status.code()), "{status}");
                 }
             }
-            assert!(stops > 0, "it was always done before it was {name}");
+            assert!(stops > 0, "every run finished before it was {name}");
             succeed(&mut fit(&set, &out, &more));
             assert_eq!(weights(&out), weights(&whole), "{method} {name}");
             assert_eq!(results(&out).history, results(&whole).history);
@@ -164,8 +167,8 @@ fn a_training_that_is_stopped_or_killed_ends_with_the_same_bytes() {
     }
 }
 
-/// Expected: whatever write of a training fails, of plan, logs, checkpoints or weights, exit code 1 and one error; the same command goes on and
-/// ends with the weights of a training that met none.
+/// Expected: whichever write of a training fails (plan, logs, checkpoints or weights), exit code 1 and one error; the
+/// same command then resumes and ends with the weights of an undisturbed training.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
 fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
@@ -181,7 +184,7 @@ fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
         let out = folder.join(format!("at-{at}"));
         let ended = crate::common::faults::run(begin(&out), &out, at, at % 2 == 0);
         let said = ended.said();
-        // Where an old file cannot be kept under a second name until its successor is there, it is replaced all the same.
+        // If an old file cannot be hard-linked under a second name, it is replaced nevertheless.
         if ended.failed != "link" || !ended.output.status.success() {
             assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
             assert!(said.contains("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
@@ -207,7 +210,7 @@ fn seeds_decide_and_their_runs_lie_beside_each_other() {
     assert_ne!(weights(&folder.join("both/seed-1")), weights(&folder.join("two")));
     succeed(&mut fit(&set, &folder.join("on"), &format!("{more} --seed 2 --init {}", folder.join("two").display())));
     assert_ne!(weights(&folder.join("on")), weights(&folder.join("two")));
-    // A budget of no time ends after no step.
+    // A time budget that is too short ends the training early.
     succeed(&mut fit(&set, &folder.join("short"), "--network basic-segnet --steps 1000 --time 1s"));
     let short = results(&folder.join("short"));
     assert!(short.ended == "time" && short.steps < 1000, "{short:?}");
@@ -231,11 +234,11 @@ fn what_cannot_be_gone_on_with_is_told() {
     child.wait().unwrap();
     let error = refuse(&mut fit(&set, &out, "--network basic-segnet --steps 100 --validate-every 2"), 2);
     assert!(
-        error.contains("another training lies in this folder") && error.contains("steps is 200 there and 100 here"),
+        error.contains("this folder contains another training") && error.contains("steps is 200 there and 100 here"),
         "{error}"
     );
     let error = refuse(&mut train(&format!("eval {} --set {}", out.display(), set.display())), 2);
-    assert!(error.contains("this training is not done"), "{error}");
+    assert!(error.contains("this training is not complete"), "{error}");
     let good = fs::read(&checkpoint).unwrap();
     let mut bad = good.clone();
     let middle = bad.len() / 2;
@@ -247,7 +250,7 @@ fn what_cannot_be_gone_on_with_is_told() {
             error.contains("checkpoint.safetensors") && error.contains("damaged") && error.contains("delete the file"),
             "{error}"
         );
-        assert_eq!(fs::read(&checkpoint).unwrap(), bytes, "a refused file stays as it is");
+        assert_eq!(fs::read(&checkpoint).unwrap(), bytes, "a refused file must not be changed");
     }
     let error = refuse(&mut train(&format!("eval {} --set {}", folder.join("none").display(), set.display())), 2);
     assert!(error.contains("no trained network"), "{error}");
@@ -264,9 +267,9 @@ fn what_cannot_be_gone_on_with_is_told() {
     let error = refuse(&mut fit(&set, &folder.join("e"), &format!("--crop-size {}x{H}", W + 1)), 2);
     assert!(error.contains("--crop-size: a crop of 65 × 48 pixels is larger than the images"), "{error}");
     let error = refuse(&mut fit(&set, &folder.join("f"), "--crop-size 32x32 --rare-crops 2"), 2);
-    assert!(error.contains("--rare-crops") && error.contains("write a share from 0 to 1"), "{error}");
+    assert!(error.contains("--rare-crops") && error.contains("write a fraction from 0 to 1"), "{error}");
     for name in ["a", "b", "c", "d", "e", "f"] {
-        assert!(!folder.join(name).exists(), "{name} was begun");
+        assert!(!folder.join(name).exists(), "{name} was created");
     }
 }
 
@@ -288,7 +291,7 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let error =
         refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
     assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
-    // Nothing is left that would be in the way of the right command.
+    // No file is left that would block the corrected command.
     assert!(!folder.join("on").exists());
     for (other, told) in
         [("--network segnet", "--network unet"), ("--network unet --normalization fixed", "--normalization band")]
@@ -296,16 +299,16 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
         let other = format!("{other} --steps 1 --init {}", three.display());
         fs::copy(&kept, three.join(run::WEIGHTS)).unwrap();
         let error = refuse(&mut fit(&set, &folder.join("on"), &other), 2);
-        assert!(error.contains("cannot begin with another") && error.contains(told), "{error}");
+        assert!(error.contains("cannot start from a run with") && error.contains(told), "{error}");
     }
-    // Cards that would take all memory, divide by nothing or lead elsewhere.
+    // Model cards that would exhaust memory, divide by zero or name files elsewhere.
     let card = two.join(run::MODEL);
     let text = fs::read_to_string(&card).unwrap();
     let forged = [
-        ("width", "\"width\": 64", "\"width\": 1000000000", "networks do not see 1000000000"),
-        ("height", "\"height\": 48", "\"height\": 0", "networks do not see"),
-        ("side", "\"height\": 48", "\"height\": 16", "networks do not see 64 × 16"),
-        ("bands", "\"green\"", "\"red\"", "are no bands of an image"),
+        ("width", "\"width\": 64", "\"width\": 1000000000", "networks do not support 1000000000"),
+        ("height", "\"height\": 48", "\"height\": 0", "networks do not support"),
+        ("side", "\"height\": 48", "\"height\": 16", "networks do not support 64 × 16"),
+        ("bands", "\"green\"", "\"red\"", "are not valid bands"),
         ("classes", "\"name\": \"plant\"", "\"name\": \"soil\"", "each class needs a name of its own"),
         ("labels", "\"crop\",", "\"soil\",", "a label belongs to one class alone"),
         ("network", "\"unet\"", "\"segnet\"", "parameters: this network"),
@@ -338,15 +341,15 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
         assert!(error.contains(words), "{what}: {error}");
     }
     fs::write(&card, &text).unwrap();
-    // Weights that no training writes, and checksums that are theirs.
+    // Weights that no training writes, with matching checksums.
     let sound = TrainedModel::open(&two).unwrap();
     for (end, value, words) in [
-        (".weight", f32::NAN, "holds values that are not finite numbers"),
-        (".running_var", -1.0, "holds variances below 0"),
+        (".weight", f32::NAN, "contains values that are not finite"),
+        (".running_var", -1.0, "contains variances below 0"),
     ] {
         let mut model = sound.clone();
         model.values.iter_mut().find(|array| array.name.ends_with(end)).unwrap().values[0] = value;
-        model.card.weights_sha256 = furrow::train::weights::hash(&model.values);
+        model.card.weights_sha256 = furrow_train::weights::hash(&model.values);
         model.write(&two).unwrap();
         let error = refuse(&mut eval(&two), 2);
         assert!(error.contains("weights.safetensors") && error.contains(words), "{error}");
@@ -385,8 +388,9 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
     assert_ne!(plain[0], plain[1]);
 }
 
-/// Rationale: several threads load images, and the first epoch's are all missing. Expected: with a budget of exactly all images, all
-/// are kept, however many threads have read the same image at the same time. Source: the sizes of the images.
+/// Rationale: several threads load images, and in the first epoch none is cached. Expected: with a memory budget of
+/// exactly all images, all are cached, however many threads read the same image at the same time. Source: the sizes of
+/// the images.
 #[test]
 fn threads_that_read_the_same_image_at_once_do_not_shrink_the_cache() {
     let scratch = tempfile::tempdir().unwrap();
@@ -414,8 +418,8 @@ fn threads_that_read_the_same_image_at_once_do_not_shrink_the_cache() {
     assert_eq!(kept, 6, "images in memory");
 }
 
-/// Rationale: a crop may lie where nothing has a label. Expected: such a batch has no loss, so it enters the loss curve neither as
-/// 0 nor as anything else; the others do. Source: the cross-entropy of a network at its start, which is nowhere near 0.
+/// Rationale: a crop may contain no labelled pixel. Expected: such a batch has no loss, so it does not enter the loss
+/// curve, not even as 0; the others do. Source: the cross-entropy of an untrained network, which is far from 0.
 #[test]
 fn a_batch_without_labels_has_no_loss() {
     let scratch = tempfile::tempdir().unwrap();
@@ -433,8 +437,9 @@ fn a_batch_without_labels_has_no_loss() {
     assert!(out.join("report.html").is_file());
 }
 
-/// Rationale: a default that stands in several places differs sooner or later. Expected: every hyper-parameter is a flag, and `--help`
-/// shows the default that the code has; an experiment file that gives none has the same ones. Source: `Plan::default`.
+/// Rationale: a default written in several places diverges sooner or later. Expected: every hyper-parameter is a flag
+/// whose `--help` shows the default in the code; an experiment file without values has the same defaults. Source:
+/// `Plan::default`.
 #[test]
 fn help_experiment_files_and_code_have_the_same_defaults() {
     let help = String::from_utf8(succeed(&mut train("fit --help")).stdout).unwrap();
@@ -444,7 +449,7 @@ fn help_experiment_files_and_code_have_the_same_defaults() {
         let flag = format!("--{} <", field.replace('_', "-"));
         let (_, about) = help.split_once(&flag).unwrap_or_else(|| panic!("no {flag} in\n{help}"));
         let about = about.split("\n      --").next().unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
-        // clap puts a default with spaces in quotes.
+        // clap quotes defaults that contain spaces.
         let shown = [format!("[default: {default}]"), format!("[default: \"{default}\"]")];
         assert!(shown.iter().any(|default| about.contains(default)), "{field}: {about}");
     }
@@ -456,7 +461,7 @@ fn help_experiment_files_and_code_have_the_same_defaults() {
     assert_eq!((experiment.plan, experiment.seeds), (Plan::default(), vec![Plan::default().seed]));
 }
 
-/// Rationale: a user looks for the words of the field. Expected: each is in the help of some subcommand, and no old name is.
+/// Rationale: users search for standard terms. Expected: each term is in the help of some subcommand.
 #[test]
 fn help_has_the_words_of_the_field() {
     let verbs = ["", "fit", "eval", "predict", "calibrate", "export", "baseline", "table"];
@@ -483,21 +488,11 @@ fn help_has_the_words_of_the_field() {
     ] {
         assert!(help.contains(word), "{word}");
     }
-    for old in
-        ["--window", "--rare ", "--balance", "--normalise", "--watch-every", "readily", "learn from", "watched by"]
-    {
-        assert!(!help.contains(old), "{old}");
-    }
-    let scratch = tempfile::tempdir().unwrap();
-    let set = set(scratch.path(), 2);
-    let done = succeed(&mut fit(&set, &scratch.path().join("old"), "--steps 1 --watch-every 1 --balance root"));
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(said.contains("warning: --watch-every is called --validate-every now"), "{said}");
-    assert!(said.contains("warning: --balance is called --class-weights now") && said.contains("`sqrt`"), "{said}");
 }
 
-/// Rationale: what a network over-predicts it draws too wide. Expected: calibrated, the mean I/U of the images looked at is higher;
-/// by `calibrate` as by `fit --calibrate`, to the bit; a network that is there already is not written over. Source: the verb's words.
+/// Rationale: a network segments the classes it over-predicts too wide. Expected: calibration increases the mean IoU of
+/// the images used for it; `calibrate` and `fit --calibrate` give the same bits; an existing network is not
+/// overwritten. Source: the command's help.
 #[test]
 fn calibrated_a_network_overlaps_better() {
     let scratch = tempfile::tempdir().unwrap();
@@ -517,7 +512,7 @@ fn calibrated_a_network_overlaps_better() {
     let scores = |run: &Path| {
         let out = folder.join("eval").join(run.file_name().unwrap());
         succeed(&mut train(&format!("eval {} --set {}@all --out {}", run.display(), set.display(), out.display())));
-        let report: furrow::train::measure::Report = run::read_json(&out.join("report.json")).unwrap();
+        let report: furrow_train::measure::Report = run::read_json(&out.join("report.json")).unwrap();
         report.scores.mean_iou.unwrap()
     };
     let (before, after) = (scores(&plain), scores(&even));
@@ -526,9 +521,9 @@ fn calibrated_a_network_overlaps_better() {
     assert!(error.contains("there is a trained model in this folder already"), "{error}");
 }
 
-/// Rationale: a network that misses plants is made to find more by its biases alone. Expected: all weights as without the adjustment, but
-/// for the biases of plants, which are higher by τ ln(soil / plants); where soil is not first, or biases are calibrated too, one error.
-/// Source: the rule.
+/// Rationale: logit adjustment makes a network that misses plants find more, by changing only its biases. Expected: all
+/// weights as without the adjustment, except that the biases of plants are higher by τ ln(soil / plants); one error if
+/// soil is not the first class or biases are calibrated as well. Source: the rule.
 #[test]
 fn adjusted_logits_are_other_biases_and_nothing_else() {
     let scratch = tempfile::tempdir().unwrap();
@@ -542,7 +537,7 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
     let selection = Selection::parse(&format!("{}@all", set.display())).unwrap();
     let store = Store::open(&[selection], Pick::All, 1, &Classes::default(), &shape, false, 1 << 30).unwrap();
     let labels: Vec<u8> = (0..4).flat_map(|place| store.get(place).unwrap().labels.clone()).collect();
-    let pixels = |classes: std::ops::Range<u8>| labels.iter().filter(|label| classes.contains(label)).count() as f64;
+    let pixels = |classes: std::ops::Range<u8>| labels.iter().filter(|&label| classes.contains(label)).count() as f64;
     let (soil, plants) = (pixels(0..1), pixels(1..3));
     let offset = (0.5 * (soil / plants).ln()) as f32;
     let both = [&plain, &adjusted].map(|run| TrainedModel::open(run).unwrap().values);
@@ -566,9 +561,10 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
     }
 }
 
-/// Rationale: outlines that people drew keep a distance from the leaf; a network that is judged by them learns it from rendered
-/// labels that are moved as far. Expected: with a margin of 2 pixels, soil whose outline is no farther is plant, all else and the
-/// photographs stay. A set with a margin is another one to learn from. Source: distances to all plants' pixels.
+/// Rationale: manual masks are dilated relative to the leaf; a network that is tested on them should learn from
+/// rendered labels dilated by the same distance. Expected: with a margin of 2 pixels, soil within 2 pixels of a plant
+/// becomes plant; all other labels and the images stay the same. A set with a margin is a different training set.
+/// Source: distances to all plant pixels.
 #[test]
 fn outlines_are_learnt_where_people_draw_them() {
     let scratch = tempfile::tempdir().unwrap();
@@ -597,9 +593,10 @@ fn outlines_are_learnt_where_people_draw_them() {
     }
 }
 
-/// Rationale: whoever trains for a night wants to see in its first hour whether anything is learnt. Expected: a row of the log stands there
-/// while the training still runs; stopped, killed and gone on with, both logs hold each step once; TensorBoard's own reader finds the
-/// same numbers, and pictures of validation images. Source: PyPI's tensorboard 2.20.0, `tests/train/check_events.py`.
+/// Rationale: users who train overnight want to see in the first hour whether the network learns. Expected: log rows
+/// are written while the training runs; after interruptions, kills and restarts both logs contain each step once;
+/// TensorBoard's own reader finds the same numbers, and the validation images. Source: PyPI's tensorboard 2.20.0,
+/// `tests/train/check_events.py`.
 #[test]
 fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
     let scratch = tempfile::tempdir().unwrap();
@@ -617,13 +614,14 @@ fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
     assert!(!out.join(run::RESULT).exists());
     let _ = Command::new("sh").arg("-c").arg(format!("kill -INT {}", child.id())).status();
     child.wait().unwrap();
-    // A page of what is known so far.
+    // A report of the results so far.
     let losses = scratch.path().join("losses");
     let mut report = Command::new(env!("CARGO_BIN_EXE_train"));
     succeed(report.arg("report").arg(&out).arg("--out").arg(&losses));
     let page = fs::read_to_string(losses.join("losses.html")).unwrap();
     assert!(page.contains("not done") && page.contains("cross-entropy + soft Dice loss"), "{page}");
-    // Gone on with and killed half a second later, in the middle of a record as it were; then to the end. The file only grows.
+    // Resumed and killed half a second later, possibly in the middle of a record; then resumed to the end. The file
+    // only grows.
     let events = out.join("training.tfevents");
     let before = fs::read(&events).unwrap();
     let mut child = fit(&set, &out, &more).stderr(Stdio::null()).spawn().unwrap();
@@ -634,14 +632,15 @@ fn logs_grow_while_it_trains_and_tensorboard_reads_them() {
     torn.write_all(&[40, 0, 0]).unwrap();
     succeed(&mut fit(&set, &out, &more));
     assert_eq!(rows(), 1 + 40);
-    assert!(fs::read(&events).unwrap().starts_with(&before), "what was there stays, for whoever reads it");
+    assert!(fs::read(&events).unwrap().starts_with(&before), "existing records must stay, for programs that read them");
     if let Some(python) = python("import tensorboard, PIL") {
         ask(&python, "train/check_events.py", &[out.to_str().unwrap()]);
     }
 }
 
-/// Rationale: freed buffers that go back to the system cost a tenth to a fifth of a step. Expected: a training runs in an environment
-/// that keeps them, unless whoever starts it says something else of the C library's memory. Source: proc(5), mallopt(3).
+/// Rationale: returning freed buffers to the operating system costs 10–20 % of a training step. Expected: the training
+/// runs with environment variables that keep them, unless the user sets the C library's memory options. Source:
+/// proc(5), mallopt(3).
 #[test]
 fn a_training_keeps_its_memory() {
     let scratch = tempfile::tempdir().unwrap();
@@ -678,7 +677,7 @@ fn the_size_of_green_regions_is_a_baseline_of_its_own() {
             "baseline {kind} --from {set}@0..4 --set {set}@4..6 --size {W}x{H} --out {}",
             out.display()
         )));
-        let report: furrow::train::measure::Report = run::read_json(&out.join("report.json")).unwrap();
+        let report: furrow_train::measure::Report = run::read_json(&out.join("report.json")).unwrap();
         report.scores
     };
     let (colour, size) = (mean("exg"), mean("exg-size"));

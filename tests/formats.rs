@@ -1,26 +1,28 @@
-//! Formats of other people's tools: each is opened by its own client, which must find what our maps say.
+//! Dataset formats of other tools: each is opened by its own client, which must agree with our maps.
 //!
-//! Rationale: a format is right when the program that it was made for reads it and finds the same pixels, boxes and points.
-//! Expected: masks, areas, boxes and keypoints equal to those of the native files, on a field and on bare soil. Source: the clients
-//! themselves, named with their versions in each format's file. The clients are Python packages; without them the tests say so and pass,
-//! with `FURROW_REQUIRE_PEERS=1` they fail.
+//! Rationale: a format is correct if the tool it was made for reads it and finds the same pixels, boxes and points.
+//! Expected: masks, areas, boxes and keypoints equal those of the native files, for a field and for bare soil. Source:
+//! the clients themselves, named with their versions in the file of each format. The clients are Python packages;
+//! without them the tests are skipped with a note, or fail with `FURROW_REQUIRE_PEERS=1`.
 
 use crate::common::program::{SMALL, small_text, trace};
 use crate::common::python::{python, torch_with};
-use furrow::dataset::format::{self, NAMES};
-use furrow::dataset::recipe::Made;
-use furrow::dataset::sample::IGNORE;
-use furrow::dataset::{Recipe, Record, Sample, Set, annotate, checksum_record, native};
-use furrow::output;
+use furrow_dataset::format::{self, NAMES};
+use furrow_dataset::model::annotate;
+use furrow_dataset::model::recipe::Made;
+use furrow_dataset::model::sample::IGNORE;
+use furrow_dataset::read::checksum_record;
+use furrow_dataset::read::native;
+use furrow_dataset::{Recipe, Record, Sample, Set};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
 
-/// A dataset of all formats, rendered once for all tests: six images to train on, three to validate and three to test.
+/// A dataset in all formats, rendered once for all tests: six training, three validation and three test images.
 static FIELD: LazyLock<PathBuf> = LazyLock::new(|| dataset("formats-field", Path::new(SMALL), 12));
 
-/// The same of ground where nothing grows, with no image to test.
+/// A dataset of bare soil in all formats, without test images.
 static BARE: LazyLock<PathBuf> = LazyLock::new(|| {
     let text = small_text();
     let bare = text.lines().filter(|l| !["crops:", "weeds:", "plants:"].iter().any(|key| l.trim().starts_with(key)));
@@ -31,7 +33,7 @@ static BARE: LazyLock<PathBuf> = LazyLock::new(|| {
     dataset("formats-bare", &page, 3)
 });
 
-/// Renders a dataset of all formats into a folder that stays until the next time.
+/// Renders a dataset in all formats into a folder that is kept until the next run.
 fn dataset(name: &str, page: &Path, count: u32) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
@@ -45,17 +47,17 @@ fn dataset(name: &str, page: &Path, count: u32) -> PathBuf {
     folder
 }
 
-/// Has a client's script look at both datasets; `probe` is a line of Python that runs where the client is installed.
+/// Runs a client's script on both datasets; `probe` is a line of Python that succeeds if the client is installed.
 fn ask(script: &str, probe: &str) {
     ask_with(python(probe), script);
 }
 
-/// The same of this Python, if there is one.
+/// Runs a client's script with this Python, if there is one.
 fn ask_with(python: Option<PathBuf>, script: &str) {
     let Some(python) = python else { return };
     for dataset in [&*FIELD, &*BARE] {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats").join(script);
-        // No stray files in the sources, nothing asked of the network.
+        // No `.pyc` files in the source tree, and no network access.
         let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_OFFLINE", "1")];
         let output = Command::new(&python).arg(script).arg(dataset).envs(quiet).output().unwrap();
         let words = String::from_utf8_lossy(&output.stderr);
@@ -139,7 +141,7 @@ fn pandas_reads_traits_that_agree_with_records_and_pixels() {
     ask("check_traits.py", "import numpy, pandas, OpenEXR, PIL");
 }
 
-/// The images of a dataset as they lie on the disk.
+/// Reads the images of a dataset from disk.
 fn samples(folder: &Path) -> (Recipe, Vec<Sample>) {
     let set = Set::open(folder).unwrap();
     let names = (0..set.recipe.count).map(Set::name);
@@ -163,7 +165,7 @@ fn every_format_writes_files_for_every_image_with_plants_and_without() {
     }
 }
 
-/// A format that is added later must be the one that would have been written with the images.
+/// Rationale: a format added later must equal the one written together with the images.
 #[test]
 fn every_format_comes_out_the_same_from_the_native_files() {
     for folder in [&*FIELD, &*BARE] {
@@ -179,15 +181,15 @@ fn every_format_comes_out_the_same_from_the_native_files() {
                 for file in files {
                     assert!(file.path.starts_with(&format!("{name}/")), "{}", file.path);
                     let written = std::fs::read(folder.join(&file.path)).unwrap();
-                    assert!(written == file.bytes, "{}: another file than was written with the image", file.path);
+                    assert!(written == file.bytes, "{}: differs from the file written with the image", file.path);
                 }
             }
         }
     }
 }
 
-/// An imported image of two plants of these numbers, with pixels without a label and vegetation of no plant, in all formats: the folder
-/// that holds the files, and itself.
+/// Writes an imported image in all formats: two plants with the given numbers, unlabelled pixels, and vegetation that
+/// belongs to no plant. Returns the temporary folder, the folder of the files, and the sample.
 fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     let (mut recipe, _) = samples(&FIELD);
     recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new(), nir: None };
@@ -245,34 +247,35 @@ fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     (folder, written, sample)
 }
 
-/// Imported images have pixels without a label, vegetation of no plant, and plants of which nothing more is known.
+/// Imported images have unlabelled pixels, vegetation that belongs to no plant, and plants without further metadata.
 #[test]
 fn every_format_takes_an_image_that_little_is_known_of() {
     let (folder, written, _) = little_known([7, 9]);
-    let gray16 = |path: &str| output::read_gray16(&written.join(path)).unwrap().2;
+    let gray16 = |path: &str| furrow_output::read_gray16(&written.join(path)).unwrap().2;
     assert_eq!(gray16("phenobench/val/semantics/000002.png"), [0, 1, 1, 255, 2, 2, 0, 1]);
     let instances = gray16("cityscapes/gtFine/val/masks/masks_000000_000002_gtFine_instanceIds.png");
     assert_eq!(instances, [0, 1000, 1000, 255, 2000, 2000, 0, 1]);
-    let (_, _, segments) = output::read_rgb(&written.join("panoptic/annotations/panoptic_val/000002.png")).unwrap();
-    // Soil and a crowd of crop behind the plants' numbers, void where there is no label.
+    let (_, _, segments) =
+        furrow_output::read_rgb(&written.join("panoptic/annotations/panoptic_val/000002.png")).unwrap();
+    // Soil and a crowd segment of crop have ids after the plants' numbers; unlabelled pixels are void.
     let (soil, crowd) = ([4, 0, 1], [1, 0, 1]);
     let plants = ([7, 0, 0], [9, 0, 0]);
     assert_eq!(segments, [soil, plants.0, plants.0, [0; 3], plants.1, plants.1, soil, crowd]);
     let (_, _, labels) =
-        output::read_gray(&written.join("cropandweed/labelIds/CropAndWeed/ave-0000-0002.png")).unwrap();
+        furrow_output::read_gray(&written.join("cropandweed/labelIds/CropAndWeed/ave-0000-0002.png")).unwrap();
     assert_eq!(labels, [0, 255, 255, 0, 255, 255, 0, 0]);
     drop(folder);
 }
 
-/// Rationale: a field may have more plants than 16 bits number. Expected: the image comes back as it was; each format tells the plants apart, by
-/// their own numbers where it can hold them: three bytes as in COCO panoptic, whose other segments come behind them; PhenoBench, of
-/// 16 bits, counts from 1.
+/// Rationale: a field may have more than 65,535 plants. Expected: the image is read back unchanged; every format
+/// distinguishes the plants, by their own numbers if it can store them. COCO panoptic has three bytes, and its other
+/// segments follow the plants; PhenoBench has 16 bits and counts from 1.
 #[test]
 fn every_format_takes_numbers_beyond_16_bits() {
     let (folder, written, sample) = little_known([7, 70_000]);
     assert_eq!(native::read(&written, "000002").unwrap(), sample);
     let plants = [0, 7, 7, 0, 70_000, 70_000, 0, 0];
-    let numbers = |path: &str| output::read_numbers(&written.join(path)).unwrap().2;
+    let numbers = |path: &str| furrow_output::read_numbers(&written.join(path)).unwrap().2;
     assert_eq!(numbers("images/000002/plants.png"), plants);
     assert_eq!(numbers("imagefolder/val/plants/000002.png"), plants);
     assert_eq!(numbers("phenobench/val/plant_instances/000002.png"), [0, 1, 1, 0, 2, 2, 0, 0]);
@@ -289,7 +292,7 @@ fn every_format_takes_numbers_beyond_16_bits() {
     drop(folder);
 }
 
-/// A photograph is written once, however many formats have it.
+/// An image is stored once on disk, whatever the number of formats that contain it.
 #[cfg(unix)]
 #[test]
 fn equal_pictures_take_space_once() {
@@ -303,7 +306,7 @@ fn equal_pictures_take_space_once() {
     }
 }
 
-/// A split without images is no folder and no list, not an empty one that a reader stumbles over.
+/// A split without images creates no folder and no list, because readers fail on empty ones.
 #[test]
 fn a_split_without_images_leaves_nothing_behind() {
     let mut todo = vec![BARE.clone()];

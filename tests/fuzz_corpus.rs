@@ -1,14 +1,15 @@
-//! The fuzzer's corpus as an ordinary test: every file of `fuzz/corpus`, as it is and cut and bent a little, is read or refused.
+//! The fuzzer's corpus as an ordinary test: every file of `fuzz/corpus`, unchanged and slightly damaged, is read or
+//! refused.
 //!
-//! Rationale: what the fuzzer found once must not come back, and nobody fuzzes before each change. Expected: no panic, no hang. Source:
-//! `fuzz/src/targets.rs`, the targets of the fuzzer itself.
+//! Rationale: faults found by the fuzzer must not return, and nobody fuzzes before each change. Expected: no panic, no
+//! hang. Source: `fuzz/src/targets.rs`, the targets of the fuzzer itself.
 
 #[path = "../fuzz/src/targets.rs"]
 mod targets;
 
-use furrow::sampling::{Purpose, Stream};
+use furrow_base::sampling::{Purpose, Stream};
 
-/// Files that are made of each.
+/// Number of damaged variants of each file.
 const BENT: u64 = 200;
 
 #[test]
@@ -29,7 +30,7 @@ fn every_file_of_the_corpus_is_read_or_refused() {
     }
 }
 
-/// Bytes with a few changed, or a piece left out, or cut short.
+/// Returns the bytes with a few of them changed, with a piece removed, or truncated.
 fn bent(bytes: &[u8], stream: &mut Stream) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if bytes.is_empty() {

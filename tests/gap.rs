@@ -1,23 +1,25 @@
-//! `trace compare --real … --synthetic …`: distances of sets are what was done to them, and what cannot be compared is told.
+//! `trace compare --real … --synthetic …`: the distances between image sets reflect known differences, and invalid
+//! input is reported.
 //!
-//! Rationale: scenes are tuned by these numbers. Expected: none between a set and itself; a known shift gives its size; sets of one kind
-//! are as far apart as halves of one; the same files whatever the threads; one clear error, exit code 2 and nothing written where folders
-//! hold no sets. Source: closed forms of what is drawn here.
+//! Rationale: scenes are tuned by these distances. Expected: zero between a set and itself; a known shift gives its
+//! size; sets drawn from the same distribution are as far apart as halves of one set; the same files with any number of
+//! threads; one clear error with exit code 2 and no output if folders contain no sets. Source: closed forms for the
+//! images generated here.
 
 use crate::common::program::{small_text, trace};
-use furrow::compare::Region;
-use furrow::compare::gap::advice::{self, Step, Way};
-use furrow::compare::gap::{Distance, FILES, Feature, Gap, Options};
-use furrow::output::{Picture as Png, read_gray, read_rgb, write_png};
-use furrow::reference::{answer, scene, species};
-use furrow::sampling::{Purpose, Stream};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_cli::reference::{answer, scene, species};
+use furrow_compare::Region;
+use furrow_compare::gap::advice::{self, Step, Way};
+use furrow_compare::gap::{Distance, FILES, Feature, Gap, Options};
+use furrow_output::{Picture as Png, read_gray, read_rgb, write_png};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Output;
 
 const SIZE: (u32, u32) = (96, 64);
 
-/// A set as people lay it out: brown ground with green squares, their number, size and colour from a stream; with labels and near infrared.
+/// Writes a set in a common folder layout: brown ground with random green squares, with labels and near infrared.
 fn set(folder: &Path, seed: u64, pictures: u64, lift: i32) {
     let (width, height) = SIZE;
     for name in ["images", "labels", "nir"] {
@@ -65,17 +67,18 @@ fn a_set_is_no_distance_from_itself() {
     set(folder.path(), 1, 4, 0);
     let gap = compared(folder.path(), folder.path());
     let measured: Vec<Feature> = gap.distances.iter().map(|d| d.feature).collect();
-    assert_eq!(measured, Feature::all(), "everything is measured where labels and near infrared are there");
+    assert_eq!(measured, Feature::all(), "labels and near infrared allow every feature to be measured");
     for Distance { feature, distance, halves } in &gap.distances {
         assert_eq!(*distance, 0.0, "{feature:?}");
         assert!(halves.is_some());
     }
     assert!(gap.advice().is_empty());
-    // Pictures alone do not tell how much ground they show.
+    // The images alone do not contain the size of a pixel on the ground.
     assert!(gap.warnings.len() == 1 && gap.warnings[0].contains("--pixel-mm"), "{:?}", gap.warnings);
 }
 
-/// L* of gray is 116 f(Y) − 16, of which ten more are a Wasserstein distance of 10 in one channel of three, and no distance in structure.
+/// The L* of gray is 116 f(Y) − 16; increasing it by ten is a Wasserstein distance of 10 in one of three channels, and
+/// no distance in structure.
 #[test]
 fn a_shift_in_lightness_is_its_distance() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,7 +101,7 @@ fn a_shift_in_lightness_is_its_distance() {
     assert!(color.is_large());
 }
 
-/// Two sets of one kind, as large as each other: halves of one are smaller, so a little further apart.
+/// Two sets of the same kind and size: halves of one set are smaller, so slightly further apart.
 #[test]
 fn sets_of_one_kind_are_as_near_as_halves() {
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +146,7 @@ fn files_say_the_same_whatever_the_threads() {
         assert_eq!(row["key"].as_str(), Some(cells[0]));
         assert_eq!(row["distance"].as_f64(), cells[2].parse().ok(), "{line}");
     }
-    // Nothing is asked of a network; a part of each picture is there, and curves.
+    // The page loads nothing from the network; it contains crops of the images, and curves.
     assert!(
         !page.contains("http")
             && page.matches("<img").count() == 2 * 8 - 2
@@ -151,7 +154,7 @@ fn files_say_the_same_whatever_the_threads() {
     );
 }
 
-/// The record of a rendered picture whose pixels see so many millimetres, with a sampling error.
+/// Record of a rendered image with the given ground size of a pixel and sampling error.
 fn record(pixel_mm: f64, error: f64) -> String {
     let camera = json!({
         "width_px": 192, "height_px": 128, "fx_px": 1000.0 / pixel_mm, "fy_px": 1000.0 / pixel_mm, "cx_px": 96.0, "cy_px": 64.0,
@@ -161,8 +164,9 @@ fn record(pixel_mm: f64, error: f64) -> String {
     json!({ "conditions": { "camera": camera }, "sampling": { "spp": 16.0, "relative_error": error } }).to_string()
 }
 
-/// Expected: pictures of twice the pixels over the same ground are, made as coarse as the others, the same pictures: no distance; as they are, they are
-/// far in the sizes of plants. Noise of few samples beside that of the real set is told, with samples that would do.
+/// Expected: images with twice the resolution over the same ground, downscaled to that of the others, are the same
+/// images, with no distance; without downscaling, the plant sizes differ strongly. Noise from few samples, compared
+/// with that of the real set, is reported with a sufficient number of samples.
 #[test]
 fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -189,7 +193,7 @@ fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
     }
     assert!(known.advice().iter().all(|advice| advice.step == Step::PixelSize && !advice.turns.is_empty()));
     let told = |gap: &Gap, words: &str| gap.warnings.iter().any(|warning| warning.contains(words));
-    assert!(told(&known, "samples a pixel") && told(&known, "--spp "), "{:?}", known.warnings);
+    assert!(told(&known, "samples per pixel") && told(&known, "--spp "), "{:?}", known.warnings);
     assert!(!told(&known, "--pixel-mm"));
     let blind = with(None);
     assert!(told(&blind, "--pixel-mm"), "{:?}", blind.warnings);
@@ -199,10 +203,11 @@ fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
     for k in 0..4 {
         std::fs::write(made.join(format!("images/{k:06}/record.json")), record(0.25, 0.001)).unwrap();
     }
-    assert!(!told(&with(Some(0.5)), "samples a pixel"));
+    assert!(!told(&with(Some(0.5)), "samples per pixel"));
 }
 
-/// Rationale: advice that names what is not there, or the wrong way, costs days. Expected: each path is one that `trace explain` explains.
+/// Rationale: advice that names a non-existent field, or the wrong direction, costs days. Expected: each advised path
+/// is one that `trace explain` knows.
 #[test]
 fn every_field_that_advice_names_exists() {
     let references = [scene(), species()];
@@ -216,8 +221,9 @@ fn every_field_that_advice_names_exists() {
     assert!(answer("sensor.exposure.Auto.lewel", &references, "trace").is_err());
 }
 
-/// Rationale: people follow advice. Expected: where fields are rendered again with half the exposure, the advice is to raise it, and first; where the same
-/// fields are wetter under the same exposure, it is to lower the moisture, and not to turn the exposure. Source: what was changed.
+/// Rationale: users follow the advice. Expected: for fields rendered with half the exposure, the first advice is to
+/// increase it; for the same fields with higher moisture and equal exposure, the advice is to reduce the moisture and
+/// leave the exposure. Source: the changes made here.
 #[test]
 fn what_was_changed_in_a_scene_file_is_advised_to_be_turned_back() {
     let folder = tempfile::tempdir().unwrap();
@@ -225,7 +231,7 @@ fn what_was_changed_in_a_scene_file_is_advised_to_be_turned_back() {
         let text = small_text()
             .replace("Field(", &format!("Field(\n    sensor: (exposure: White(level: {white}), noise: (on: false)),"))
             .replace("soil: (", &format!("soil: (moisture: (mean: {moisture}, spread: 0), "));
-        // Its paths count from the repository's folder.
+        // Relative paths start at the repository's folder.
         let text = text.replace("\"textures", &format!("\"{}/textures", env!("CARGO_MANIFEST_DIR")));
         let text = text.replace("\"scenes", &format!("\"{}/scenes", env!("CARGO_MANIFEST_DIR")));
         let file = folder.path().join(format!("{name}.ron"));
@@ -262,8 +268,8 @@ fn what_is_no_set_is_told() {
     for (real, synthetic, words) in [
         ("good", "nothing", "--synthetic nothing: there is no such folder"),
         ("empty", "good", "--real empty: there is no PNG or JPEG in this folder"),
-        ("good/images/000.png", "good", "this is no folder"),
-        ("bad", "good", "001.png: it has 8 × 8 pixels, its picture 96 × 64"),
+        ("good/images/000.png", "good", "this is not a folder"),
+        ("bad", "good", "001.png: it has 8 × 8 pixels, its image 96 × 64"),
     ] {
         let output = run(folder.path(), &["--real", real, "--synthetic", synthetic]);
         let told = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -1,8 +1,8 @@
-//! The guide, run as a reader does: files are written, commands are called, one after another, each page in a folder of its own.
+//! Runs the guide like a reader: writes its files and executes its commands in order, each page in its own folder.
 //!
-//! Rationale: a newcomer copies what the guide shows, and whatever fails there is the program's fault. Expected: every block of the pages in
-//! [`book::RUN`] works, and the files that a page names are there afterwards. Source: the pages. Commands are run in a reduced form, see
-//! [`SMALLER`] and [`reduced`]; CONTRIBUTING.md says so too.
+//! Rationale: newcomers copy the commands of the guide, so any failure there is a fault of the program. Expected: every
+//! block of the pages in [`book::RUN`] works, and the files that a page names exist afterwards. Source: the pages.
+//! Commands run in a reduced form, see [`SMALLER`] and [`reduced`]; CONTRIBUTING.md documents this.
 
 use crate::common::book::{self, blocks, commands, program, quoted, read, root, shell};
 use std::fs;
@@ -21,8 +21,8 @@ const SMALLER: [(&str, &str); 9] = [
     ("--pixel", "32,24"),
 ];
 
-/// A command in the form in which it is run: values of [`SMALLER`] are replaced; a command that renders and names no width, or no samples,
-/// gets them.
+/// Returns the reduced form of a command: values of [`SMALLER`] are replaced, and a rendering command without width or
+/// samples gets them.
 fn reduced(command: &str) -> String {
     let mut words: Vec<&str> = Vec::new();
     for word in command.split_whitespace() {
@@ -44,7 +44,7 @@ fn reduced(command: &str) -> String {
     words.join(" ")
 }
 
-/// Runs a page in a folder that sees scene files and textures under their names.
+/// Runs a page in a folder that contains links to the scene files and textures.
 fn run(page: &str) {
     let keep = tempfile::tempdir().expect("a folder");
     let folder = keep.path();
@@ -58,7 +58,7 @@ fn run(page: &str) {
             let path = folder.join(path);
             assert!(
                 path.parent().is_some_and(Path::is_dir),
-                "{page}: nothing has made the folder of {}",
+                "{page}: no command has created the folder of {}",
                 path.display()
             );
             fs::write(&path, block.text).expect("a file");
@@ -72,9 +72,9 @@ fn run(page: &str) {
             }
         }
     }
-    assert!(called > 0, "{page} calls nothing");
+    assert!(called > 0, "{page} runs no command");
     for name in quoted(&text).into_iter().filter(|name| name.starts_with("out/") || name.starts_with("data/")) {
-        assert!(folder.join(&name).exists(), "{page} names {name}, and it is not there");
+        assert!(folder.join(&name).exists(), "{page} names {name}, which does not exist");
     }
 }
 

@@ -1,22 +1,24 @@
-//! Other people's data: what goes in comes out as they drew it, and what cannot be read is told by its file.
+//! Import of other people's datasets: labels come in unchanged, and unreadable files are reported by name.
 //!
-//! Rationale: real images judge what synthetic ones teach; a label that changes on the way in judges wrongly. Expected: made-up
-//! images come in pixel by pixel; what we wrote in a format of others comes back as it was; a second import makes the same bytes;
-//! every fault is one sentence with a file in it and exit code 2. Source: the layouts in `src/dataset/import/`.
+//! Rationale: real images evaluate networks trained on synthetic ones, and a label that changes during import falsifies
+//! the evaluation. Expected: synthetic test images are imported pixel by pixel; datasets written in a foreign format
+//! are imported unchanged; a second import produces the same bytes; every fault is one sentence with a file name and
+//! exit code 2. Source: the layouts in `crates/dataset/src/import/`.
 
 use crate::common::dataset::{fail, succeed, verb};
 use crate::common::program::{SMALL, scratch, trace};
 use crate::common::python::python;
-use furrow::compare::{Pairs, gap};
-use furrow::dataset::checksum_record::ChecksumRecord;
-use furrow::dataset::classes::Classes;
-use furrow::dataset::recipe::{FILE, Made};
-use furrow::dataset::record::Record;
-use furrow::dataset::split::Split;
-use furrow::dataset::{Sample, Set, native};
-use furrow::output::{Picture, encode_jpeg, write_png};
-use furrow::scene::tag::Class;
-use furrow::train::data::{Band, Example};
+use furrow_compare::{Pairs, gap};
+use furrow_dataset::model::classes::Classes;
+use furrow_dataset::model::recipe::{FILE, Made};
+use furrow_dataset::model::record::Record;
+use furrow_dataset::model::split::Split;
+use furrow_dataset::read::checksum_record::ChecksumRecord;
+use furrow_dataset::read::native;
+use furrow_dataset::{Sample, Set};
+use furrow_output::{Picture, encode_jpeg, write_png};
+use furrow_render::scene::tag::Class;
+use furrow_train::data::{Band, Example};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -26,12 +28,12 @@ const W: u32 = 13;
 const H: u32 = 9;
 const N: usize = (W * H) as usize;
 
-/// A picture of its own for each seed.
+/// A different image for each seed.
 fn photo(seed: u8) -> Vec<[u8; 3]> {
     (0..N).map(|i| [(i * 7) as u8, (i * 3) as u8 ^ seed, seed]).collect()
 }
 
-/// Classes of a made-up field: a crop block, a weed column, a patch without a label.
+/// Classes of a test field: a block of crop, a column of weed, an unlabelled patch.
 fn classes() -> Vec<u8> {
     let class = |x: u32, y: u32| match (x, y) {
         (2..=5, 2..=6) => 1,
@@ -47,7 +49,7 @@ fn import(out: &Path, arguments: &[&str]) -> Output {
     command.args(arguments).output().unwrap()
 }
 
-/// Imports what must succeed; the dataset must pass `verify`.
+/// Runs an import that must succeed; the dataset must pass `verify`.
 fn imported(out: &Path, arguments: &[&str]) -> (Set, Vec<Sample>) {
     let output = import(out, arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -58,7 +60,7 @@ fn imported(out: &Path, arguments: &[&str]) -> (Set, Vec<Sample>) {
     (set, samples)
 }
 
-/// Imports what must fail with exit code 2, and returns what it said.
+/// Runs an import that must fail with exit code 2; returns its error message.
 fn refused(out: &Path, arguments: &[&str]) -> String {
     let output = import(out, arguments);
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -70,7 +72,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Every file of a folder by its path, without the timing log, which has clock times.
+/// Reads every file of a folder by its path, except the timing log, which has clock times.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut todo = vec![folder.to_path_buf()];
@@ -88,7 +90,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// Images and masks of numbers in splits: `images/train/a.png`, `masks/train/a_mask.png`.
+/// Writes images with masks of class numbers in splits: `images/train/a.png`, `masks/train/a_mask.png`.
 fn numbered(root: &Path) {
     for (k, (split, name)) in [("train", "b"), ("train", "a"), ("val", "c")].into_iter().enumerate() {
         let (image, mask) = (photo(k as u8), classes());
@@ -126,14 +128,17 @@ fn masks_of_numbers_come_in_pixel_by_pixel() {
         assert!(sample.record.plants.is_empty() && sample.coverage.is_empty());
     }
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(report.contains("no plant is told from another") && !report.contains("0 weeds"), "masks know classes only");
+    assert!(
+        report.contains("no plant is told from another") && !report.contains("0 weeds"),
+        "masks contain only classes"
+    );
     assert!(out.join("manifest.json").is_file());
-    // Another format of ours from the same images.
+    // Another format written from the imported images.
     let finished = trace(&["dataset", "finish", text(&out), "--format", "imagefolder", "--quiet"]).output().unwrap();
     assert!(finished.status.success(), "{}", String::from_utf8_lossy(&finished.stderr));
     assert!(out.join("imagefolder/val/masks/000002.png").is_file());
     let film = trace(&["dataset", "finish", text(&out), "--format", "layers", "--quiet"]).output().unwrap();
-    assert_eq!(film.status.code(), Some(2), "what only the renderer knows cannot be made of imported images");
+    assert_eq!(film.status.code(), Some(2), "layers need renderer data, which imported images lack");
     assert!(String::from_utf8_lossy(&film.stderr).contains("layers"));
 }
 
@@ -171,21 +176,21 @@ fn what_cannot_be_read_is_told_by_its_file() {
     let [images, masks] = ["images", "masks"].map(|name| root.join(name));
     let base = ["--format", "masks", "--images", text(&images), "--masks", text(&masks)];
     let all = |more: &[&'static str]| [&base[..], more].concat();
-    assert!(refused(&out, &base).contains("--mask-suffix"), "no mask has an image's name");
+    assert!(refused(&out, &base).contains("--mask-suffix"), "no mask has the name of an image");
     let words = refused(&out, &all(&["--mask-suffix", "_mask", "--classes", "0=soil,1=crop,2=weed"]));
     assert!(words.contains("a_mask.png") && words.contains("pixel 11,7 has the number 255"), "{words}");
     assert!(refused(&out, &all(&["--mask-suffix", "_mask", "--from", "x"])).contains("--from"));
     assert!(refused(&out, &["--format", "coco"]).contains("--from"));
     assert!(refused(&out, &["--format", "phenobench", "--from", text(root)]).contains("train/images"));
     assert!(refused(&out, &all(&["--colors", "0,0=crop"])).contains("no colour"));
-    // A mask of another size, and one that is cut short.
+    // A mask of another size, and one that is truncated.
     let mask = masks.join("val/c_mask.png");
     write_png(&mask, 1, 1, &Picture::Gray(&[0]), "").unwrap();
     assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("it has 1 × 1 pixels"));
     std::fs::write(&mask, b"\x89PNG\r\n\x1a\n").unwrap();
     assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("c_mask.png"));
-    assert!(!out.exists(), "a refused import has written something");
-    // Nothing of the user's is written over.
+    assert!(!out.exists(), "a refused import has written files");
+    // No file of the user is overwritten.
     let full = root.join("full");
     std::fs::create_dir_all(&full).unwrap();
     std::fs::write(full.join("mine.txt"), "mine").unwrap();
@@ -202,19 +207,19 @@ fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
     let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
     imported(&out, &arguments);
     let whole = files(&out);
-    // One image gone, one damaged, the lists not written.
+    // One image missing, one damaged, the lists not written.
     std::fs::remove_dir_all(out.join("images/000001")).unwrap();
     std::fs::write(out.join("images/000002/rgb.png"), "damaged").unwrap();
     std::fs::remove_file(out.join("manifest.json")).unwrap();
     imported(&out, &arguments);
-    assert!(whole == files(&out), "other bytes after going on");
-    // Other images do not go into the same folder.
+    assert!(whole == files(&out), "other bytes after resuming");
+    // Other images cannot be imported into the same folder.
     let other = [&arguments[..], &["--others", "ignore"]].concat();
     assert!(refused(&out, &other).contains("another dataset lies in this folder"));
-    assert!(whole == files(&out), "a refused import has changed something");
+    assert!(whole == files(&out), "a refused import has changed files");
 }
 
-/// Whether a set's recipe says that its images came with near infrared.
+/// Returns whether the recipe of a set states that its images came with near infrared.
 fn says_nir(set: &Set) -> Option<bool> {
     match &set.recipe.made {
         Made::Imported { nir, .. } => *nir,
@@ -222,9 +227,10 @@ fn says_nir(set: &Set) -> Option<bool> {
     }
 }
 
-/// Rationale: who compares two sets may copy pictures of one into the other, and no image may get a band that its source did not have. Expected: the
-/// recipe says whether images came with near infrared; where they did not, library, formats, comparisons, training and Python read none that
-/// somebody puts beside them, and `verify` names it, and nothing else, until it is gone. Source: the same images imported with it.
+/// Rationale: users may copy images between sets to compare them, and no image may gain a band that its source did not
+/// have. Expected: the recipe states whether the images came with near infrared. If not, the library, formats,
+/// comparisons, training and Python ignore near-infrared files added later, and `verify` reports exactly these files
+/// until they are removed. Source: the same images imported with near infrared.
 #[test]
 fn near_infrared_that_did_not_come_in_is_not_read() {
     const READ: &str = "
@@ -272,8 +278,9 @@ assert ['nir' in furrow.Dataset(folder)[0] for folder in sys.argv[1:]] == [False
     succeed(verb("verify", &out, &["--quiet"]));
 }
 
-/// Rationale: recipes of earlier builds do not say whether there is near infrared, and the program may be a newer one when an import goes on. Expected:
-/// such a set keeps its recipe, is whole, and goes on with the same command to the same bytes; near infrared that lies there is read, as ever.
+/// Rationale: recipes of earlier versions do not state whether there is near infrared, and an import may be resumed
+/// with a newer program. Expected: such a set keeps its recipe, passes `verify`, and is resumed by the same command
+/// with the same bytes; its near-infrared files are still read.
 #[test]
 fn an_import_of_an_earlier_build_goes_on() {
     let (kept, out) = scratch();
@@ -299,12 +306,12 @@ fn an_import_of_an_earlier_build_goes_on() {
     std::fs::remove_dir_all(out.join("images/000001")).unwrap();
     std::fs::remove_file(out.join("manifest.json")).unwrap();
     imported(&out, &arguments);
-    assert!(whole == files(&out), "other bytes after going on");
+    assert!(whole == files(&out), "other bytes after resuming");
     std::fs::copy(root.join("nir/train/a.png"), out.join("images/000000/nir.png")).unwrap();
     assert_eq!(set.sample(0).unwrap().nir.len(), N);
 }
 
-/// A rendered dataset in other people's formats.
+/// Renders a dataset in foreign formats.
 fn rendered(out: &Path, formats: &str) -> Vec<Sample> {
     let mut command =
         trace(&["dataset", "--scene", SMALL, "--spp", "4", "--count", "5", "--split", "2,2,1", "--quiet"]);
@@ -313,12 +320,12 @@ fn rendered(out: &Path, formats: &str) -> Vec<Sample> {
     (0..5).map(|k| native::read(out, &Set::name(k)).unwrap()).collect()
 }
 
-/// The image of a dataset that has this name in its source.
+/// Returns the image of a dataset whose source has this name.
 fn named<'a>(samples: &'a [Sample], name: &str) -> Option<&'a Sample> {
     samples.iter().find(|s| s.record.source.as_deref().unwrap().trim_end_matches(".png") == name)
 }
 
-/// Checks that two maps of leaves draw the same borders on every plant of these classes, whatever the numbers.
+/// Checks that two leaf maps have the same borders on every plant of these classes, whatever the numbers.
 fn same_leaves(name: &str, before: &Sample, after: &Sample, classes: &[Class]) {
     let mut pairs: BTreeSet<((u32, u16), (u32, u16))> = BTreeSet::new();
     for i in 0..before.pixels() {
@@ -328,9 +335,9 @@ fn same_leaves(name: &str, before: &Sample, after: &Sample, classes: &[Class]) {
     }
     let one_way: BTreeMap<_, _> = pairs.iter().copied().collect();
     let other_way: BTreeMap<_, _> = pairs.iter().map(|(a, b)| (*b, *a)).collect();
-    assert_eq!((one_way.len(), other_way.len()), (pairs.len(), pairs.len()), "{name}: leaves were merged or cut");
-    assert!(pairs.iter().all(|((_, a), (_, b))| (*a == 0) == (*b == 0)), "{name}: leaves came or went");
-    assert!(pairs.len() > 5, "{name}: {} plants and leaves are no test", pairs.len());
+    assert_eq!((one_way.len(), other_way.len()), (pairs.len(), pairs.len()), "{name}: leaves were merged or split");
+    assert!(pairs.iter().all(|((_, a), (_, b))| (*a == 0) == (*b == 0)), "{name}: leaves appeared or vanished");
+    assert!(pairs.len() > 5, "{name}: only {} plants and leaves", pairs.len());
 }
 
 #[test]
@@ -339,10 +346,10 @@ fn phenobench_comes_back_as_it_was_written() {
     let before = rendered(&out.join("ours"), "phenobench");
     let from = out.join("ours/phenobench");
     let (set, after) = imported(&out.join("back"), &["--format", "phenobench", "--from", text(&from)]);
-    // The original's test images have no labels, and so ours.
+    // The test images of the original dataset have no labels, and so neither have ours.
     assert_eq!((set.names(Split::Train).len(), set.names(Split::Val).len(), set.names(Split::Test).len()), (2, 2, 0));
     for sample in before.iter().filter(|s| s.record.split != Split::Test) {
-        let back = named(&after, &sample.record.name).expect("an image that came back");
+        let back = named(&after, &sample.record.name).expect("the imported image");
         assert_eq!((&back.rgb, &back.semantics, &back.plants), (&sample.rgb, &sample.semantics, &sample.plants));
         assert_eq!(back.record.split, sample.record.split);
         same_leaves(&sample.record.name, sample, back, &[Class::Crop]);
@@ -350,7 +357,7 @@ fn phenobench_comes_back_as_it_was_written() {
         eprintln!("{}: {} plants, partial ones: {partial}", sample.record.name, sample.record.seen().count());
     }
     let partial = before.iter().flat_map(|s| s.record.seen()).filter(|p| p.seen.inside_fraction() < 0.5);
-    assert!(partial.count() > 0, "no plant was written as partial, which is what 3 and 4 are for");
+    assert!(partial.count() > 0, "no plant was written as partial, so labels 3 and 4 are not tested");
 }
 
 #[test]
@@ -362,19 +369,19 @@ fn coco_comes_back_as_it_was_written() {
     assert_eq!(after.len(), before.len());
     let mut points = 0;
     for sample in &before {
-        let back = named(&after, &sample.record.name).expect("an image that came back");
+        let back = named(&after, &sample.record.name).expect("the imported image");
         assert_eq!((&back.rgb, &back.semantics, &back.plants), (&sample.rgb, &sample.semantics, &sample.plants));
         assert_eq!(back.record.split, sample.record.split);
         same_leaves(&sample.record.name, sample, back, &[Class::Crop, Class::Weed]);
         let stems = |r: &Record| -> Vec<(u32, i64)> {
-            let stem = |p: &furrow::dataset::record::Plant| Some((p.number, (p.stem?.x * 100.0).round() as i64));
+            let stem = |p: &furrow_dataset::model::record::Plant| Some((p.number, (p.stem?.x * 100.0).round() as i64));
             r.seen().filter_map(stem).collect()
         };
         let inside: Vec<_> = stems(&sample.record).into_iter().filter(|(_, x)| (0..9600).contains(x)).collect();
         points += inside.iter().filter(|stem| stems(&back.record).contains(stem)).count();
         let tips = |r: &Record| {
             r.leaves()
-                .filter(|(_, l)| l.tip.is_some_and(|t| t.state != furrow::dataset::record::PointState::Outside))
+                .filter(|(_, l)| l.tip.is_some_and(|t| t.state != furrow_dataset::model::record::PointState::Outside))
                 .count()
         };
         assert_eq!(tips(&sample.record), tips(&back.record), "{}: tips of leaves", sample.record.name);
@@ -382,8 +389,8 @@ fn coco_comes_back_as_it_was_written() {
     assert!(points > 3, "{points} stems came back");
 }
 
-/// Rationale: plants of large fields have numbers beyond 16 bits. Expected: those that COCO's attributes tell come in, through the formats that hold them
-/// and back.
+/// Rationale: plants of large fields have numbers beyond 16 bits. Expected: those in COCO's attributes are imported,
+/// and survive a round trip through the formats that can hold them.
 #[test]
 fn plants_beyond_16_bits_come_in_and_back() {
     let (kept, out) = scratch();
@@ -403,7 +410,7 @@ fn plants_beyond_16_bits_come_in_and_back() {
     let file = root.join("a.json");
     std::fs::write(&file, document.to_string()).unwrap();
     let (_, samples) = imported(&out, &["--format", "coco", "--from", text(&file)]);
-    // 4464 is what 16 bits leave of 70,000.
+    // 70,000 truncated to 16 bits is 4464.
     let shown: BTreeSet<u32> = samples[0].plants.iter().copied().collect();
     assert_eq!(shown, [0, 4464, 70_000].into());
     let formats = "coco,imagefolder,panoptic,phenobench,yolo";
@@ -429,7 +436,7 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let root = kept.path();
     write_png(&root.join("x.png"), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
     let polygon = |x0: u32, y0: u32, x1: u32, y1: u32| json!([[x0, y0, x1, y0, x1, y1, x0, y1]]);
-    // A column of nine pixels at x = 9, in runs down the columns.
+    // A column of nine pixels at x = 9, as run lengths in column order.
     let runs = json!({ "size": [H, W], "counts": [9 * H, H, (W - 10) * H] });
     let document = |category: &str| {
         json!({
@@ -461,7 +468,7 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let another = root.join("another");
     let words = refused(&another, &["--format", "coco", "--from", text(&file)]);
     assert!(words.contains("`maize`") && words.contains("--classes"), "{words}");
-    // What it names lies below the folder of its images.
+    // Named files must be below the image folder.
     let inner = root.join("inner");
     std::fs::create_dir_all(&inner).unwrap();
     for name in ["../x.png", text(&root.join("x.png")), "../no such.png"] {

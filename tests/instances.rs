@@ -1,26 +1,29 @@
-//! Plants that share their meshes are plants like any other.
+//! Instances: plants that share meshes behave like any other plants.
 //!
-//! Rationale: a hectare fits into memory only where its plants share meshes, and a label, a shadow or a trait of one that is wrong is not seen
-//! among a hundred thousand. Expected: rays meet the same parts at the same distances as on copies of the meshes in the world; a field of instances
-//! has the plants, places, rows and cover of one whose plants have shapes of their own; nothing depends on threads or on what else is in view.
-//! Source: `accel::brute`, Möller & Trumbore 1997 in double precision, over the copies; the same scene file in other detail.
+//! Rationale: a hectare fits into memory only if plants share meshes, and a wrong label, shadow or trait of one among a
+//! hundred thousand goes unnoticed.
+//!
+//! Expected: rays hit the same parts at the same distances as on copies of the meshes in world space; a field of
+//! instances has the plants, positions, rows and cover of a field whose plants have individual shapes; nothing depends
+//! on threads or on other objects in view. Source: `accel::brute`, Möller & Trumbore 1997 in double precision, over the
+//! copies; the same scene file with another detail setting.
 
 use crate::common::program::{field, hash, shoot};
 use crate::common::scenes::{point, square, unit};
-use furrow::accel::{Brute, EmbreeAccel, Surface};
-use furrow::bsdf::{Bsdf, Leaf};
-use furrow::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
-use furrow::material::Material;
-use furrow::math::{Mat3, Spectrum, Vec3, Vec4, vec2, vec3};
-use furrow::optics::{LeafOptics, Pigments};
-use furrow::output;
-use furrow::plant::OrganKind;
-use furrow::ron_file::Num;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble::Options;
-use furrow::scene::tag::Class;
-use furrow::scene::traits::Traits;
-use furrow::scene::{Field, Instance, Part, PartKind, PlantRecord};
+use furrow_base::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Placement, Ray};
+use furrow_base::math::{Mat3, Spectrum, Vec3, Vec4, vec2, vec3};
+use furrow_base::ron_file::Num;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_field::assemble::Options;
+use furrow_field::traits::Traits;
+use furrow_field::{Field, PartKind, PlantRecord};
+use furrow_grow::plant::OrganKind;
+use furrow_optics::bsdf::{Bsdf, Leaf};
+use furrow_optics::optics::{LeafOptics, Pigments};
+use furrow_render::accel::{Brute, EmbreeAccel, Surface};
+use furrow_render::material::Material;
+use furrow_render::scene::tag::Class;
+use furrow_render::scene::{Instance, Part};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -28,10 +31,10 @@ fn stream(index: u64) -> Stream {
     Stream::of(23, 0, Purpose::Test, index)
 }
 
-/// One organ: its mesh and mask.
+/// An organ: its mesh and mask.
 type Organ = (Arc<Mesh>, Option<Arc<AlphaMask>>);
 
-/// Two plants of three and two organs: bent sheets with a mask of stripes, and without.
+/// Builds two plants with three and two organs: bent sheets, with and without a striped mask.
 fn plants() -> [Vec<Organ>; 2] {
     let stripes = Arc::new(AlphaMask::new(32, 32, |x, y| x % 8 < 5 && y % 16 < 11));
     let mut s = stream(0);
@@ -56,11 +59,12 @@ fn plants() -> [Vec<Organ>; 2] {
     [vec![sheet(Some(&stripes)), sheet(None), sheet(Some(&stripes))], vec![sheet(None), sheet(Some(&stripes))]]
 }
 
-/// Parts of a stand: a sheet of its own, seven instances of the two plants in turn, another sheet; and the same as copies in the world.
+/// Builds a stand as instances and as world-space copies: a separate sheet, seven instances of the two plants in turn,
+/// and another sheet.
 fn stand() -> (Vec<Part>, Vec<Part>) {
     let mut s = stream(1);
     let part = |mesh: Arc<Mesh>, mask: Option<Arc<AlphaMask>>, instance: Option<Arc<Placement>>| {
-        let tag = furrow::scene::tag::Tag { class: Class::Crop, plant: 1, leaf: 1 };
+        let tag = furrow_render::scene::tag::Tag { class: Class::Crop, plant: 1, leaf: 1 };
         let instance = instance.map(|placement| Instance { placement, tint: Vec3::ONE });
         Part { mesh, mask, material: 0, tag, instance }
     };
@@ -82,14 +86,14 @@ fn surfaces(parts: &[Part]) -> Vec<Surface<'_>> {
     parts.iter().map(Part::surface).collect()
 }
 
-/// A ray from anywhere toward the stand or anywhere.
+/// Samples a ray from a random point, toward the stand or in a random direction.
 fn ray(s: &mut Stream, toward: bool) -> Ray {
     let origin = point(s, 1.6);
     Ray::new(origin, if toward { (point(s, 0.9) - origin).normalize() } else { unit(s) })
 }
 
-/// Expected: the same part and triangle at the same distance, the same shadow, place and normals, but where a ray that is moved by what single
-/// precision loses in a rotation answers otherwise.
+/// Expected: the same part and triangle at the same distance, and the same shadow, position and normals, except where a
+/// ray moved by the single-precision error of a rotation gives another result.
 #[test]
 fn instances_meet_what_their_copies_meet() {
     let (parts, copies) = stand();
@@ -114,25 +118,28 @@ fn instances_meet_what_their_copies_meet() {
                 assert!(at.p.distance(copy.p) < 5e-5, "{ray:?}: {} and {}", at.p, copy.p);
                 assert!(at.p.distance(ray.origin + ray.direction * g.t) < 5e-5);
                 assert!(at.ng.dot(copy.ng) > 0.99999 && at.ns.dot(copy.ns) > 0.99999);
-                // A ray that leaves it does not meet it again at once.
+                // A ray that leaves the surface does not hit it again at once.
                 let away = at.ray(at.ng, 1e-3);
-                assert!(instanced.closest(&away).is_none_or(|h| h.part != g.part), "{away:?} meets what it leaves");
+                assert!(
+                    instanced.closest(&away).is_none_or(|h| h.part != g.part),
+                    "{away:?} hits the surface that it leaves"
+                );
             }
             (None, None) => {}
             _ => {
-                let frame = furrow::math::Frame::about(ray.direction);
+                let frame = furrow_base::math::Frame::about(ray.direction);
                 let moved = |angle: u32| {
                     let (sin, cos) = (angle as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
                     Ray { origin: ray.origin + (frame.x * cos + frame.y * sin) * 4e-6, ..ray }
                 };
                 let excusable = (0..8).any(|k| brute.closest(&moved(k)).map(|h| h.part) == got.map(|h| h.part));
-                assert!(excusable, "{ray:?}: instances {got:?}, every triangle {expected:?}");
+                assert!(excusable, "{ray:?}: instances {got:?}, oracle {expected:?}");
                 close += 1;
             }
         }
     }
-    assert!(met > 12_000 && masked > 3_000, "{met} hits, {masked} of them masked: that tests little");
-    assert!(close <= 30, "{close} rays too close to an edge: single precision is not that bad");
+    assert!(met > 12_000 && masked > 3_000, "{met} hits, {masked} of them masked: too few to test anything");
+    assert!(close <= 30, "{close} rays too close to an edge: more than single precision explains");
 }
 
 #[test]
@@ -157,10 +164,10 @@ fn packets_meet_instances_as_single_rays_do() {
             dark += usize::from(shadow);
         }
     }
-    assert!(met > 10_000 && dark > 10_000, "{met} met, {dark} dark");
+    assert!(met > 10_000 && dark > 10_000, "{met} hits, {dark} shadowed");
 }
 
-/// A field from 14 m: pixels of more than 4 mm, plants of two populations.
+/// Builds a field seen from 14 m: pixels of more than 4 mm, plants of two populations.
 fn meadow(detail: &str, x: f32) -> Field {
     let text = format!(
         r#"Field(
@@ -184,8 +191,9 @@ fn distinct(field: &Field) -> usize {
     field.scene.parts.iter().map(|part| Arc::as_ptr(&part.mesh)).collect::<BTreeSet<_>>().len()
 }
 
-/// Expected: plants of the same identities at the same places, as high, as wide and with as many leaves in the mean; pixels of crop and of weed as
-/// many as where plants have own shapes within a tenth; each labelled pixel within its plant's radius; fewer meshes.
+/// Expected: plants with the same identities at the same positions, on average as tall, as wide and with as many
+/// leaves; the number of crop and weed pixels within 10 % of that with individual plant shapes; each labelled pixel
+/// within its plant's radius; fewer meshes.
 #[test]
 fn a_field_of_instances_has_the_plants_of_the_field() {
     let [own, shared] = ["ByPixel", "Instanced"].map(|detail| meadow(detail, 0.0));
@@ -194,7 +202,7 @@ fn a_field_of_instances_has_the_plants_of_the_field() {
     let places = |field: &Field| field.plants.iter().map(|p| (p.id, p.position)).collect::<BTreeMap<_, _>>();
     let (a, b) = (places(&own), places(&shared));
     let both: Vec<u32> = a.keys().filter(|id| b.contains_key(id)).copied().collect();
-    // Those whose shadows alone reach the view may differ with their heights.
+    // Plants that only cast shadows into the view may differ, because their heights do.
     assert!(
         both.len() > 150 && both.len() * 20 > 19 * a.len().max(b.len()),
         "{} of {} and {}",
@@ -215,7 +223,7 @@ fn a_field_of_instances_has_the_plants_of_the_field() {
     assert!(distinct(&shared) < distinct(&own), "{} and {}", distinct(&shared), distinct(&own));
 
     let [(_, own_labels), (_, labels)] = [&own, &shared].map(|field| shoot(field, 1, 2));
-    let pixels = |labels: &furrow::render::LabelMap, class: Class| {
+    let pixels = |labels: &furrow_render::render::LabelMap, class: Class| {
         labels.tags.iter().filter(|tag| tag.class == class).count() as f32
     };
     for class in [Class::Crop, Class::Weed] {
@@ -228,7 +236,7 @@ fn a_field_of_instances_has_the_plants_of_the_field() {
     for (k, tag) in labels.tags.iter().enumerate().filter(|(_, tag)| tag.plant > 0) {
         let at = vec2((k % 240) as f32 - 119.5, 119.5 - (k / 240) as f32) * pixel;
         let p = plant[&tag.plant];
-        // What lies h over the ground is seen up to h · tan 11° farther out.
+        // A point at height h above the ground appears up to h · tan 11° farther out.
         let off = at.distance(p.position.truncate());
         assert!(
             off < 1.05 * p.radius + 0.2 * p.height + 2.0 * pixel,
@@ -238,8 +246,8 @@ fn a_field_of_instances_has_the_plants_of_the_field() {
     }
 }
 
-/// Expected: the same bits on one and on two threads; the plants that two views share have as many organs in the same tints, turned in the same way but for the
-/// ground that they stand on.
+/// Expected: the same bits with one and with two threads; plants common to two views have equal numbers of organs with
+/// the same tints and the same headings, except for the tilt of the ground below them.
 #[test]
 fn instances_do_not_depend_on_threads_or_the_view() {
     let field = meadow("Instanced", 0.0);
@@ -265,7 +273,8 @@ fn instances_do_not_depend_on_threads_or_the_view() {
     for id in both {
         let ((tints, at), (tints_there, at_there)) = (&here[&id], &there[&id]);
         assert_eq!(tints, tints_there, "plant {id}");
-        // The heights of the ground are drawn on the grid of its view, and plants lean as it does: their headings are the same.
+        // Ground heights are sampled on a grid that depends on the view, and plants tilt with the ground; their
+        // headings are the same.
         let [heading, heading_there] = [at, at_there].map(|at| at.rotation.x_axis.truncate().normalize());
         let turned = heading.distance(heading_there);
         assert!(turned < 0.1, "plant {id}: {turned} apart");
@@ -274,13 +283,14 @@ fn instances_do_not_depend_on_threads_or_the_view() {
     }
 }
 
-/// Expected: instances of one plant have sizes of their own; heights, radii and lengths of leaves go with them, leaf areas with their squares.
+/// Expected: instances of one plant differ in size; heights, radii and leaf lengths scale with it, leaf areas with its
+/// square.
 #[test]
 fn instances_have_sizes_of_their_own() {
     let field = meadow("Instanced", 0.0);
     let traits = Traits::of(&field);
     let plants: BTreeMap<u32, &PlantRecord> = field.plants.iter().map(|p| (p.number, p)).collect();
-    // Who has the same first mesh is an instance of the same plant.
+    // Plants with the same first mesh are instances of the same plant.
     let (mut worn, mut known) = (BTreeMap::<*const Mesh, Vec<(f32, u32)>>::new(), BTreeSet::new());
     for part in &field.scene.parts {
         if let Some(at) = part.placement().filter(|_| known.insert(part.tag.plant)) {
@@ -307,7 +317,7 @@ fn instances_have_sizes_of_their_own() {
     assert!(compared > 100, "{compared}");
 }
 
-/// Expected: leaf area, height and cover of a field of instances are those of its copies in the world.
+/// Expected: leaf area, height and cover of a field of instances equal those of its copies in world space.
 #[test]
 fn traits_of_instances_are_those_of_their_copies() {
     let field = meadow("Instanced", 0.0);
@@ -324,7 +334,7 @@ fn traits_of_instances_are_those_of_their_copies() {
     }
 }
 
-/// A part in the middle of one of its triangles, seen from above.
+/// Evaluates the BSDF of a part at one of its middle triangles, seen from above; `tinted` may change the interaction.
 fn sheet(field: &Field, k: usize, tinted: impl Fn(Interaction) -> Interaction) -> Leaf {
     let part = &field.scene.parts[k];
     let hit = Hit { part: k as u32, triangle: part.mesh.triangles.len() as u32 / 2, u: 0.3, v: 0.3, t: 1.0 };
@@ -335,7 +345,7 @@ fn sheet(field: &Field, k: usize, tinted: impl Fn(Interaction) -> Interaction) -
     }
 }
 
-/// Parts that are stalks of beets, with the numbers of the plants: their material has no picture and no age.
+/// Returns the petioles of beets with the numbers of their plants; their material has no texture and no age.
 fn stalks(field: &Field) -> Vec<(usize, u32)> {
     let beets: BTreeSet<u32> = field.plants.iter().filter(|p| p.eppo == "BEAVX").map(|p| p.number).collect();
     let parts = field.scene.parts.iter().enumerate().filter(|(_, part)| !part.mesh.triangles.is_empty());
@@ -343,13 +353,13 @@ fn stalks(field: &Field) -> Vec<(usize, u32)> {
     stalks.map(|(k, part)| (k, part.tag.plant)).filter(|(_, plant)| beets.contains(plant)).collect()
 }
 
-/// Reflectance of the stalks of beets by the plants' identities.
+/// Reflectance of the beets' petioles, by plant identity.
 fn colors(field: &Field) -> BTreeMap<u32, Spectrum> {
     let ids: BTreeMap<u32, u32> = field.plants.iter().map(|p| (p.number, p.id)).collect();
     stalks(field).into_iter().map(|(k, plant)| (ids[&plant], sheet(field, k, |at| at).reflectance(1.0))).collect()
 }
 
-/// Chlorophyll over that of the species file, told from the reflectance of a beet's stalk in green.
+/// Chlorophyll content relative to the species file, computed from a petiole's reflectance in green.
 fn chlorophyll(optics: &LeafOptics, seen: Spectrum) -> f64 {
     let green = |s: Spectrum| s.to_array()[1];
     let model = |factor: f32| green(optics.with_chlorophyll(36.0 * factor).reflectance);
@@ -357,15 +367,16 @@ fn chlorophyll(optics: &LeafOptics, seen: Spectrum) -> f64 {
     let (mut lo, mut hi) = (0.4, 1.8);
     for _ in 0..40 {
         let middle = 0.5 * (lo + hi);
-        // The more chlorophyll, the darker.
+        // More chlorophyll makes a leaf darker.
         (lo, hi) = if model(middle) > wanted { (middle, hi) } else { (lo, middle) };
     }
     f64::from(lo)
 }
 
-/// Rationale: far plants must differ in colour as near ones do, no less and no more. Expected: stalks of an instance reflect in all bands what they reflect
-/// where the same plant grows, within 0.1 %; their chlorophyll is 1 on the mean with a standard deviation of 12 %, the default of `chlorophyll_sd`, both
-/// within six standard errors (one false alarm in 10⁸ seeds). Source: the field with `ByPixel`; the leaf model read backwards.
+/// Rationale: distant plants must vary in colour exactly as near ones do. Expected: the petiole of an instance has the
+/// same reflectance in all bands as the same plant with an individual shape, within 0.1 %. The mean relative
+/// chlorophyll content is 1 and its standard deviation 12 %, the default of `chlorophyll_sd`, both within six standard
+/// errors (one false alarm in 10⁸ seeds). Source: the field with `ByPixel`; the inverted leaf model.
 #[test]
 fn instances_have_the_chlorophyll_that_their_plants_have() {
     let [own, shared] = ["ByPixel", "Instanced"].map(|detail| meadow(detail, 0.0));
@@ -374,9 +385,9 @@ fn instances_have_the_chlorophyll_that_their_plants_have() {
     assert!(both.len() > 100, "{}", both.len());
     for id in &both {
         let off = (seen[id].0 / grown[id].0 - 1.0).abs().max_element();
-        assert!(off < 1e-3, "plant {id}: {:?} as an instance, {:?} grown", seen[id], grown[id]);
+        assert!(off < 1e-3, "plant {id}: {:?} as an instance, {:?} with its own shape", seen[id], grown[id]);
     }
-    // The stalk of `scenes/species/sugar_beet.ron`.
+    // The petiole of `scenes/species/sugar_beet.ron`.
     let stalk = Pigments {
         n: Num::new(2.0),
         chlorophyll: Num::new(36.0),
@@ -395,8 +406,8 @@ fn instances_have_the_chlorophyll_that_their_plants_have() {
     assert!((sd / 0.12 - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{sd} of {n}");
 }
 
-/// Expected: two instances of one plant of the bank differ in tint; no organ returns more than it receives, on neither side and in no band, nor would it in a
-/// tint ten times as bright.
+/// Expected: two instances of one plant differ in tint; no organ reflects and transmits more light than it receives, on
+/// either side and in any band, even with a tint ten times as bright.
 #[test]
 fn tints_differ_and_keep_energy() {
     let field = meadow("Instanced", 0.0);
@@ -430,8 +441,9 @@ fn tints_differ_and_keep_energy() {
     assert!(passes > 1000, "{passes}");
 }
 
-/// Rationale: documents that share a picture hold a tint as factors. Expected: the mean place of a healthy leaf is that of the leaf in this tint, but
-/// for what is nearly black; a scene whose levels are fixed for Mitsuba, where each tint is a material, reflects what it did.
+/// Rationale: exported documents share textures and store tints as factors. Expected: the mean colour of a healthy leaf
+/// is that of the tinted leaf, except where it is nearly black; a scene with fixed mip levels for Mitsuba, in which
+/// each tint is a material, has the same reflectance as before.
 #[test]
 fn exports_have_the_tints_of_instances() {
     let mut field = meadow("Instanced", 0.0);
@@ -443,11 +455,11 @@ fn exports_have_the_tints_of_instances() {
             let (dye, own) = (material.swatch().dyed(material.tint_factors(tint)), tinted.swatch());
             assert!(off(dye.mean.reflectance, own.mean.reflectance) < 1e-4, "{dye:?} {:?}", own.mean);
             assert!(off(dye.mean.transmittance, own.mean.transmittance) < 1e-4, "{dye:?} {:?}", own.mean);
-            assert!(off(material.swatch().mean.reflectance, own.mean.reflectance) > 1e-4, "a tint that does nothing");
+            assert!(off(material.swatch().mean.reflectance, own.mean.reflectance) > 1e-4, "the tint has no effect");
         }
     }
     let before = colors(&field);
-    output::mitsuba::fix_levels(&mut field.scene);
+    furrow_output::mitsuba::fix_levels(&mut field.scene);
     assert!(field.scene.parts.iter().all(|part| part.tint() == Vec3::ONE));
     assert_eq!(colors(&field), before);
 }

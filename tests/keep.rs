@@ -1,52 +1,54 @@
-//! `--keep rgb,semantics`: datasets whose images go without label maps that their records tell.
+//! `--keep rgb,semantics`: datasets without the label maps that can be restored from the records.
 //!
-//! Rationale: who trains semantic segmentation wants photographs and classes on the disk and nothing else; that must cost neither checks nor a
-//! format. Expected: what is kept has the bytes that it has beside everything else; what is not kept comes back from the record value by value;
-//! formats are, byte for byte, those of the dataset that keeps all. Source: that dataset.
+//! Rationale: users who train semantic segmentation need only images and class maps on disk; leaving out the rest must
+//! cost neither checks nor formats. Expected: the kept files have the same bytes as in a full dataset; the others are
+//! restored from the record value by value; formats are byte-identical to those of a full dataset. Source: the full
+//! dataset.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::python;
-use furrow::compare::{Pairs, gap};
-use furrow::dataset::checksum::Checksum;
-use furrow::dataset::checksum_record::ChecksumRecord;
-use furrow::dataset::classes::Classes;
-use furrow::dataset::{Set, native};
-use furrow::output::{Picture, write_png};
-use furrow::train::data::{Band, Example, Shape};
-use furrow::train::deploy::pictures;
+use furrow_compare::{Pairs, gap};
+use furrow_dataset::Set;
+use furrow_dataset::model::classes::Classes;
+use furrow_dataset::read::checksum::Checksum;
+use furrow_dataset::read::checksum_record::ChecksumRecord;
+use furrow_dataset::read::native;
+use furrow_output::{Picture, write_png};
+use furrow_train::data::{Band, Example, Shape};
+use furrow_train::deploy::pictures;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Formats that are made of native files, and hold nothing that depends on which label maps are kept.
+/// Formats that are written from native files and do not depend on which label maps are kept.
 const FORMATS: &str = "cityscapes,coco,cropandweed,mots,panoptic,phenobench,voc,yolo,yolo-pose";
 
-/// Classes that `species.png` tells apart.
+/// Classes that `species.png` distinguishes.
 const CLASSES: [&str; 2] = ["--classes", "soil; beet=BEAVX; weed"];
 
-/// The command that makes `count` small images.
+/// Returns the command that generates `count` small images.
 fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
     let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(folder)]);
     command.args(["--count", &count.to_string(), "--width", "96", "--spp", "2", "--split", "2,1,1"]).args(more);
     command
 }
 
-/// Checks a dataset and renders two of its images again.
+/// Verifies a dataset and renders two of its images again.
 fn verify(folder: &Path) {
     let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
     let said = String::from_utf8_lossy(&said);
     assert!(said.contains("2 rendered again and the same; 0 faults"), "{said}");
 }
 
-/// The files of a tree of which the path fits.
+/// Returns the files whose path satisfies a condition.
 fn those(tree: &BTreeMap<String, Vec<u8>>, fits: impl Fn(&str) -> bool) -> BTreeMap<String, Vec<u8>> {
     tree.iter().filter(|(name, _)| fits(name)).map(|(name, bytes)| (name.clone(), bytes.clone())).collect()
 }
 
-/// Files that formats and tables consist of, but for those of `imagefolder`.
+/// Returns whether a file belongs to a format or is a table, except the files of `imagefolder`.
 fn of_formats(name: &str) -> bool {
     name.ends_with(".parquet") || FORMATS.split(',').any(|format| name.starts_with(&format!("{format}/")))
 }
@@ -70,13 +72,13 @@ fn photographs_and_classes_alone_are_as_good_as_all_maps() {
     let mut most = (0, 0);
     for name in (0..4).map(Set::name) {
         let [with, without] = [&full, &bare].map(|folder| native::read(folder, &name).expect("an image"));
-        assert!(with == without, "image {name} comes back from its record");
+        assert!(with == without, "image {name} differs when restored from its record");
         most.0 = most.0.max(with.leaves.iter().copied().max().unwrap_or(0));
         most.1 = most.1.max(with.species.iter().copied().max().unwrap_or(0));
     }
-    assert!(most.0 > 1 && most.1 > 1, "there are leaves and species to tell apart");
+    assert!(most.0 > 1 && most.1 > 1, "too few leaves or species to test anything");
 
-    // Formats and classes that are asked for later.
+    // Formats and classes requested later.
     succeed(verb("finish", &bare, &[&["--quiet"][..], &asked].concat()));
     verify(&bare);
     same(&those(&tree(&bare), of_formats), &those(&all, of_formats));
@@ -91,7 +93,7 @@ fn photographs_and_classes_alone_are_as_good_as_all_maps() {
     assert!(lines.contains("mask_file_name") && !lines.contains("plants_file_name"), "{lines}");
     let report = fs::read_to_string(bare.join("report.html")).expect("a report");
     assert!(report.contains("semantics.png") && !report.contains("plants.png") && !report.contains("leaves.png"));
-    // Asked for at once, and told by whoever asks how far it is.
+    // The same requested from the start; and the output of `status`.
     succeed(make(&early, 4, &[&["--keep", "semantics,rgb"][..], &asked].concat()));
     same(&tree(&early), &tree(&bare));
     let said = String::from_utf8_lossy(&succeed(verb("status", &bare, &[])).stdout).into_owned();
@@ -105,7 +107,8 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
     succeed(make(&bare, 1, &["--keep", "plants,depth"]));
     let files = ["geometry.exr", "plants.png", "record.json", "rgb.png", "semantics.png"];
     assert_eq!(names(&bare.join("images/000000")), files);
-    let recipe: Value = serde_json::from_slice(&fs::read(bare.join("dataset.json")).expect("it")).expect("a recipe");
+    let recipe: Value =
+        serde_json::from_slice(&fs::read(bare.join("dataset.json")).expect("a file")).expect("a recipe");
     assert_eq!(recipe["made"]["rendered"]["omit"], json!(["species", "leaves"]));
     succeed(make(&bare, 3, &[]));
     assert_eq!(names(&bare.join("images/000002")), files);
@@ -134,12 +137,12 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
         let words = fail(make(&other, 1, more), 2);
         assert!(words.contains(part) && !other.join("dataset.json").exists(), "{more:?}: {words}");
     }
-    // What it would take is told as well.
+    // A dry run also reports the cost.
     let said = succeed(make(&other, 5, &["--keep", "rgb,semantics", "--dry-run"]));
     assert!(said.status.success() && !other.exists());
 }
 
-/// Expected: labels alone may be classes alone; a photograph that nobody draws cannot be kept.
+/// Expected: with `--labels-only`, classes alone may be kept; an image cannot be kept, because none is rendered.
 #[test]
 fn labels_alone_may_be_classes_alone() {
     let (_keep, data) = scratch();
@@ -153,12 +156,12 @@ fn labels_alone_may_be_classes_alone() {
     succeed(make("semantics"));
     assert_eq!(names(&data.join("images/000001")), ["record.json", "semantics.png"]);
     verify(&data);
-    // A photograph that somebody puts beside them is none of theirs.
+    // An image added to the folder later is not part of the dataset.
     let before = native::read(&data, "000001").expect("an image");
     let (width, height) = before.size();
     let photograph = vec![[90_u8; 3]; before.pixels()];
     let file = data.join("images/000001/rgb.png");
-    write_png(&file, width, height, &Picture::Rgb(&photograph), "").expect("a picture");
+    write_png(&file, width, height, &Picture::Rgb(&photograph), "").expect("an image");
     assert!(native::read(&data, "000001").expect("an image") == before);
     assert_eq!(fail(verb("verify", &data, &["--quiet"]), 1), stray("000001", "rgb.png"));
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
@@ -166,13 +169,14 @@ fn labels_alone_may_be_classes_alone() {
     assert!(error.to_string().contains("it holds labels alone"), "{error}");
 }
 
-/// What `verify` says of a file that does not belong to an image.
+/// Expected output of `verify` for a file that does not belong to an image.
 fn stray(image: &str, file: &str) -> String {
     format!("error: images/{image}/{file} does not belong here: the recipe leaves it out; remove it\n")
 }
 
-/// Rationale: a label map that somebody puts into a dataset that goes without must not win over the record. Expected: library and Python read what
-/// they read before, whatever it holds; `verify` names it, and nothing else, until it is gone.
+/// Rationale: a label map added to a dataset that leaves it out must not override the record. Expected: the library and
+/// Python read the same values as before, whatever the map contains; `verify` reports exactly this file until it is
+/// removed.
 #[test]
 fn label_maps_that_were_left_out_are_not_read() {
     const READ: &str = "
@@ -187,7 +191,7 @@ assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
     let [plants, leaves] = ["plants.png", "leaves.png"].map(|map| data.join("images/000000").join(map));
     let (width, height) = before.size();
     let numbers = vec![7_u32; before.plants.len()];
-    write_png(&plants, width, height, &Picture::Numbers(&numbers), "").expect("a picture");
+    write_png(&plants, width, height, &Picture::Numbers(&numbers), "").expect("an image");
     fs::write(&leaves, "no picture").expect("a file");
     assert!(set.sample(0).expect("an image") == before);
     assert!(native::read(&data, "000000").expect("an image") == before);
@@ -203,9 +207,9 @@ assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
     verify(&data);
 }
 
-/// Rationale: who compares two sets may copy pictures of one into the other, and none may become part of a set that was made without it.
-/// Expected: library, report, formats, comparisons, training, prediction and Python read what they read before; `verify` names each such
-/// file, and nothing else, until it is gone. Source: the pictures of a set that keeps them.
+/// Rationale: users may copy images between sets to compare them, and none may become part of a set made without it.
+/// Expected: library, report, formats, comparisons, training, prediction and Python read the same as before; `verify`
+/// reports exactly these files until they are removed. Source: the images of a set that keeps them.
 #[test]
 fn maps_that_are_not_kept_are_not_read() {
     const READ: &str = "
@@ -234,18 +238,18 @@ assert sorted(sample) == ['image', 'leaves', 'plants', 'record', 'semantics'], s
     assert!(data.join("imagefolder/train/images/000000.png").is_file() && !data.join("imagefolder/train/nir").exists());
     let report = fs::read_to_string(data.join("report.html")).expect("a report");
     assert!(!["nir.png", "coverage.png", "geometry.exr"].iter().any(|file| report.contains(file)));
-    assert!(gap::photos(&full, "--real").expect("pictures").iter().all(gap::Photo::has_nir));
-    assert!(!gap::photos(&data, "--synthetic").expect("pictures").iter().any(gap::Photo::has_nir));
+    assert!(gap::photos(&full, "--real").expect("images").iter().all(gap::Photo::has_nir));
+    assert!(!gap::photos(&data, "--synthetic").expect("images").iter().any(gap::Photo::has_nir));
     for below in ["", "images", "images/000000"] {
         let pairs = |other: &Path| Pairs::find(&full.join(below), &other.join(below), None).expect("pairs").pairs;
         assert!(pairs(&full).iter().all(|pair| pair.nir.is_some()), "{below}");
         assert!(pairs(&data).iter().all(|pair| pair.nir.is_none()), "{below}");
     }
     cannot_be_seen(&set, "nir");
-    // A band of another name is the user's own.
+    // A band with another name belongs to the user.
     let (width, height) = before.size();
     let gray = vec![90_u8; before.pixels()];
-    write_png(&at(&data, "thermal.png"), width, height, &Picture::Gray(&gray), "").expect("a picture");
+    write_png(&at(&data, "thermal.png"), width, height, &Picture::Gray(&gray), "").expect("an image");
     assert_eq!(seen(&set, "thermal").expect("a band"), [gray]);
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
@@ -257,14 +261,14 @@ assert sorted(sample) == ['image', 'leaves', 'plants', 'record', 'semantics'], s
     verify(&data);
 }
 
-/// What a training sees of one band of the first image.
-fn seen(set: &Set, band: &str) -> furrow::Result<Vec<Vec<u8>>> {
+/// Reads one band of the first image like a training.
+fn seen(set: &Set, band: &str) -> furrow_base::Result<Vec<Vec<u8>>> {
     let map = Classes::default().of(&set.recipe.species, &[])?;
     let bands = [Band::Gray(band.into())];
     Example::read_whole(set, 0, &map, 0.0, &bands, false).map(|(_, example)| example.planes)
 }
 
-/// Neither training nor prediction has a band that a set goes without.
+/// Checks that neither training nor prediction reads a band that the set leaves out.
 fn cannot_be_seen(set: &Set, band: &str) {
     let error = seen(set, band).expect_err("no band");
     assert!(error.to_string().contains(&format!("no band `{band}`: its dataset was made without")), "{error}");
@@ -273,7 +277,7 @@ fn cannot_be_seen(set: &Set, band: &str) {
     assert!(error.to_string().contains(&format!("the network sees the band `{band}`")), "{error}");
 }
 
-/// Writes a file of the first image with the checksum that it has then.
+/// Writes a file of the first image and updates its checksum.
 fn forge(data: &Path, file: &str, bytes: &[u8]) {
     let path = format!("images/000000/{file}");
     fs::write(data.join(&path), bytes).expect("a file");
@@ -282,8 +286,9 @@ fn forge(data: &Path, file: &str, bytes: &[u8]) {
     checksums.write(data).expect("checksums");
 }
 
-/// Rationale: a script tells damage from a wrong command by the exit code. Expected: 1 and the file's name, whether `verify`, `finish` or a training
-/// meets it: run lengths of a mask that are none, a label map that is no picture; once it is mended, all is well.
+/// Rationale: scripts distinguish damage from a wrong command by the exit code. Expected: exit code 1 and the file's
+/// name, whether `verify`, `finish` or a training finds the damage: invalid run lengths of a mask, or a label map that
+/// is not an image; after repair, all succeed.
 #[test]
 fn damage_is_damage_whoever_meets_it() {
     let (_keep, data) = scratch();
@@ -306,7 +311,7 @@ fn damage_is_damage_whoever_meets_it() {
     verify(&data);
 }
 
-/// A training that meets a damaged file of the first image.
+/// Checks that training reports a damaged file of the first image.
 fn cannot_be_learnt(set: &Set, file: &str) {
     let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
     let error = Example::read_whole(set, 0, &map, 0.0, &Band::RGB, true).expect_err("damage");
@@ -314,7 +319,8 @@ fn cannot_be_learnt(set: &Set, file: &str) {
     assert!(error.to_string().contains(file), "{error}");
 }
 
-/// Expected: archives hold what folders would; formats come from them later; Python reads both, and says what a sample does not have.
+/// Expected: archives hold the same files as folders; formats can be made from them later; Python reads both, and
+/// reports which entries a sample lacks.
 #[test]
 fn archives_and_python_go_without_as_well() {
     const READ: &str = "
@@ -336,12 +342,14 @@ for folder in sys.argv[1:]:
     succeed(make(&packed, 3, &["--keep", "rgb,semantics", "--pack", "2"]));
     verify(&packed);
     let set = Set::open(&packed).expect("a dataset");
-    assert!((0..3).all(|k| set.sample(k).expect("an image") == native::read(&folders, &Set::name(k)).expect("it")));
+    assert!(
+        (0..3).all(|k| set.sample(k).expect("an image") == native::read(&folders, &Set::name(k)).expect("an image"))
+    );
     succeed(verb("finish", &packed, &["--quiet", "--format", "panoptic"]));
     succeed(verb("verify", &packed, &["--quiet"]));
     let of_panoptic = |name: &str| name.starts_with("panoptic/");
     same(&those(&tree(&packed), of_panoptic), &those(&tree(&folders), of_panoptic));
-    // What somebody puts beside an archive is read as little as what lies beside files.
+    // Files added beside an archive are ignored like files added to an image folder.
     for folder in [&folders, &packed] {
         let image = folder.join("images/000000");
         fs::create_dir_all(&image).expect("a folder");
@@ -351,7 +359,7 @@ for folder in sys.argv[1:]:
     let packs = Set::open(&packed).expect("a dataset");
     assert!(packs.sample(0).expect("an image") == native::read(&folders, "000000").expect("an image"));
     let shape = Shape { bands: Band::RGB.to_vec(), width: 96, height: 96 };
-    let found = pictures::find(std::slice::from_ref(&packed), &shape, &[]).expect("pictures");
+    let found = pictures::find(std::slice::from_ref(&packed), &shape, &[]).expect("images");
     assert!(found.len() == 3 && found.iter().all(|picture| picture.read().is_ok()));
     let Some(python) = python("import numpy, PIL") else { return };
     let mut read = Command::new(python);

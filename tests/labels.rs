@@ -1,33 +1,34 @@
 //! Labels are exact, pixel by pixel.
 //!
-//! Rationale: a network learns whatever the labels say. A label must be what lies at the pixel's centre: not near it, not mostly,
-//! and not what light or material make of it.
-//! Expected: for a quadrilateral the label is the point-in-polygon test of the pixel's centre, for a masked leaf the mask's value
-//! there, for a whole field the nearest of all triangles, all worked out in double precision without Embree; where the centre
-//! lies within a thousandth of a pixel of an edge either side may win. Lights, materials and samples change nothing. Files hold
-//! the same numbers.
-//! Source: geometry; OpenCV's camera model for distorted images.
+//! Rationale: networks learn the labels as they are. A label must be the object at the pixel's centre: not a neighbour,
+//! not the majority of the pixel, and independent of light and material.
+//!
+//! Expected: for a quadrilateral, the label is the point-in-polygon test of the pixel's centre; for a masked leaf, the
+//! mask's value there; for a whole field, the nearest of all triangles, all computed in double precision without
+//! Embree. If the centre is within a thousandth of a pixel of an edge, either side may win. Lights, materials and
+//! samples change nothing. Files hold the same numbers. Source: geometry; OpenCV's camera model for distorted images.
 
 use crate::common::pictures;
 use crate::common::program::{self, SMALL};
 use crate::common::scenes::{sphere, square};
-use furrow::accel::{Brute, EmbreeAccel};
-use furrow::film::{Film, Filter, Pixel};
-use furrow::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};
-use furrow::material::Material;
-use furrow::math::{Mat3, Vec3, vec3};
-use furrow::output::{self, Provenance, Spp};
-use furrow::render::label::NONE;
-use furrow::render::{LabelMap, label};
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble::Options;
-use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Field, Part, Scene, assemble};
-use furrow::sensor::{Camera, Distortion, Pose};
+use furrow_base::geometry::{AlphaMask, Intersect, Mesh, Ray, Window};
+use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_field::assemble::Options;
+use furrow_field::{Field, assemble};
+use furrow_optics::sensor::{Camera, Distortion, Pose};
+use furrow_output::{Provenance, Spp};
+use furrow_render::accel::{Brute, EmbreeAccel};
+use furrow_render::film::{Film, Filter, Pixel};
+use furrow_render::material::Material;
+use furrow_render::render::label::NONE;
+use furrow_render::render::{LabelMap, label};
+use furrow_render::scene::tag::{Class, Tag};
+use furrow_render::scene::{Part, Scene};
 use std::path::Path;
 use std::sync::Arc;
 
-/// How near to an edge single precision may fail, pixels.
+/// Distance to an edge, in pixels, within which single precision may fail.
 const DOUBT: f64 = 1e-3;
 
 fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
@@ -43,12 +44,12 @@ fn labels_of(scene: &Scene) -> LabelMap {
     label(&geometry, &scene.parts, &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
 }
 
-/// Part + 1 of each pixel, 0 for none.
+/// Returns part + 1 for each pixel, 0 for no part.
 fn ids(parts: &[u32]) -> Vec<u32> {
     parts.iter().map(|p| p.wrapping_add(1)).collect()
 }
 
-/// Undoes a distortion by halving steps towards it: nothing is shared with the renderer's Newton steps but the model itself.
+/// Inverts a distortion by step halving; it shares only the distortion model with the renderer's Newton iteration.
 fn undistort(d: &Distortion, to: [f64; 2]) -> [f64; 2] {
     let model = |[x, y]: [f64; 2]| {
         let r2 = x * x + y * y;
@@ -66,13 +67,13 @@ fn undistort(d: &Distortion, to: [f64; 2]) -> [f64; 2] {
     at
 }
 
-/// The pixel's centre on the plane z = 1 of the camera, by the pinhole model.
+/// Returns the pixel's centre on the camera's plane z = 1, by the pinhole model.
 fn centre(camera: &Camera, x: u32, y: u32) -> [f64; 2] {
     let [fx, fy, cx, cy] = camera.intrinsics();
     undistort(&camera.distortion(), [(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy])
 }
 
-/// A world point on that plane.
+/// Projects a world point onto that plane.
 fn onto_plane(camera: &Camera, p: Vec3) -> [f64; 2] {
     let pose = camera.pose();
     let d = p.as_dvec3() - pose.position.as_dvec3();
@@ -82,7 +83,7 @@ fn onto_plane(camera: &Camera, p: Vec3) -> [f64; 2] {
     [along(pose.axes.x_axis) / depth, along(pose.axes.y_axis) / depth]
 }
 
-/// Whether the point lies in the convex polygon, and its distance to the polygon's outline.
+/// Returns whether a point is in a convex polygon, and its distance to the polygon's outline.
 fn in_polygon(polygon: &[[f64; 2]], p: [f64; 2]) -> (bool, f64) {
     let mut sides = [false; 2];
     let mut distance = f64::INFINITY;
@@ -131,9 +132,9 @@ fn a_quadrilaterals_label_is_the_point_in_polygon_test_of_every_pixel_centre() {
                 expected.push(if doubt { is } else { u32::from(inside) });
             }
             let count: u32 = expected.iter().sum();
-            assert!(count > 500 && count < 160 * 120, "lens {k}, {round}: {count} pixels inside test little");
+            assert!(count > 500 && count < 160 * 120, "lens {k}, {round}: {count} pixels inside are too few");
             pictures::same(&format!("quadrilateral-{k}-{round}"), 160, &ids(&map.parts), &expected);
-            assert!(doubtful <= 2, "lens {k}, {round}: {doubtful} pixels in doubt");
+            assert!(doubtful <= 2, "lens {k}, {round}: {doubtful} ambiguous pixels");
             for (part, tag_there) in map.parts.iter().zip(&map.tags) {
                 assert_eq!(*tag_there, if *part == NONE { Tag::default() } else { tag });
             }
@@ -141,8 +142,8 @@ fn a_quadrilaterals_label_is_the_point_in_polygon_test_of_every_pixel_centre() {
     }
 }
 
-/// Rationale: most label edges are mask edges. Expected: the texel under the pixel's centre, the centre carried to the leaf's
-/// plane in double precision.
+/// Rationale: most label edges are mask edges. Expected: the mask's value at the texel under the pixel's centre,
+/// projected onto the leaf's plane in double precision.
 #[test]
 fn a_masked_leafs_label_is_its_masks_value_under_every_pixel_centre() {
     const SIZE: (u32, u32) = (97, 61);
@@ -161,7 +162,7 @@ fn a_masked_leafs_label_is_its_masks_value_under_every_pixel_centre() {
         let mut mesh = square(Vec3::ZERO, 0.6);
         mesh.transform(Mat3::from_rotation_z(0.7) * Mat3::from_rotation_x(0.3), vec3(0.01, 0.02, 0.0));
         let corners: Vec<glam::DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        // uv (0, 1), (1, 1), (0, 0) at corners 0, 1, 3.
+        // Texture coordinates (0, 1), (1, 1), (0, 0) are at corners 0, 1, 3.
         let (origin, along_u, against_v) = (corners[3], corners[1] - corners[0], corners[0] - corners[3]);
         let normal = along_u.cross(against_v);
         let map = labels_of(&scene(vec![part(mesh, Some(mask.clone()), Tag::default())], camera));
@@ -180,7 +181,7 @@ fn a_masked_leafs_label_is_its_masks_value_under_every_pixel_centre() {
             };
             let inside = at(direction);
             let is = u32::from(map.parts[i as usize] != NONE);
-            // In doubt: a thousandth of a pixel to the side the answer is the other.
+            // Ambiguous: a thousandth of a pixel to the side the result differs.
             let step = DOUBT / camera.intrinsics()[0];
             let sides = [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)];
             let doubt = sides.iter().any(|(dx, dy)| {
@@ -191,12 +192,12 @@ fn a_masked_leafs_label_is_its_masks_value_under_every_pixel_centre() {
         }
         assert!(expected.iter().sum::<u32>() > 1500, "lens {k} sees too little of the leaf");
         pictures::same(&format!("masked-leaf-{k}"), 160, &ids(&map.parts), &expected);
-        assert!(doubtful <= 2, "lens {k}: {doubtful} pixels in doubt");
+        assert!(doubtful <= 2, "lens {k}: {doubtful} ambiguous pixels");
     }
 }
 
-/// The nearest part at every pixel's centre and its distance, from triangles alone: each is tested at the pixels that its corners
-/// span. Nothing is shared with Embree but the rays.
+/// Returns the nearest part at every pixel's centre and its distance, by testing each triangle at the pixels that its
+/// corners span. It shares only the rays with Embree.
 fn every_triangle(scene: &Scene) -> (Vec<u32>, Vec<f32>) {
     let camera = &scene.camera;
     let (w, h) = (camera.width(), camera.height());
@@ -222,7 +223,7 @@ fn every_triangle(scene: &Scene) -> (Vec<u32>, Vec<f32>) {
             if let [Some(a), Some(b), Some(c)] = corners.map(|i| image[i]) {
                 for axis in 0..2 {
                     let (least, most) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
-                    // A lens bends straight edges outward, by less than half the triangle's size.
+                    // A lens bends straight edges outward by less than half the triangle's size.
                     let margin = if straight { 0.05 } else { 0.05 + 0.5 * (most - least) };
                     (lo[axis], hi[axis]) = (least - margin, most + margin);
                 }
@@ -244,8 +245,8 @@ fn every_triangle(scene: &Scene) -> (Vec<u32>, Vec<f32>) {
     (parts, distances)
 }
 
-/// Compares Embree's label map with that of all triangles. A pixel may differ only where the two answers lie equally far, or where
-/// a ray a thousandth of a pixel aside gets Embree's answer from the triangles too.
+/// Compares Embree's label map with that of all triangles. A pixel may differ only if both hits are equally far, or if
+/// a ray a thousandth of a pixel to the side gives Embree's result for the triangles too.
 fn check_every_pixel(name: &str, scene: &Scene) {
     let map = labels_of(scene);
     let (parts, distances) = every_triangle(scene);
@@ -280,9 +281,14 @@ fn check_every_pixel(name: &str, scene: &Scene) {
     let mut seen = map.parts.clone();
     seen.sort_unstable();
     seen.dedup();
-    eprintln!("{name}: {} pixels show {} of {} parts, {doubtful} in doubt", parts.len(), seen.len(), scene.parts.len());
+    eprintln!(
+        "{name}: {} pixels show {} of {} parts, {doubtful} ambiguous",
+        parts.len(),
+        seen.len(),
+        scene.parts.len()
+    );
     pictures::same(&format!("every-triangle-{name}"), camera.width(), &ids(&map.parts), &ids(&expected));
-    assert!(doubtful * 4000 <= parts.len(), "{name}: {doubtful} of {} pixels in doubt", parts.len());
+    assert!(doubtful * 4000 <= parts.len(), "{name}: {doubtful} of {} pixels are ambiguous", parts.len());
 }
 
 fn open(page: &Path, options: &Options) -> Field {
@@ -310,11 +316,11 @@ fn every_pixel_of_the_teaching_scenes_shows_the_nearest_of_all_triangles() {
     }
 }
 
-/// Rationale: flowers are told from leaves by the kind of the part that a pixel shows. Expected: at BBCH 65 the lesson's pixels show
-/// flowers, buds, heads and pods, all of them of a plant and of no leaf; at 19 none of these.
+/// Rationale: the kind of the part at a pixel distinguishes flowers from leaves. Expected: at BBCH 65, the tutorial
+/// scene shows flowers, buds, heads and pods, all of them part of a plant but of no leaf; at BBCH 19 none of these.
 #[test]
 fn flowers_are_labelled_as_the_organs_that_they_are() {
-    use furrow::plant::OrganKind::{Bud, Flower, Head, Pod};
+    use furrow_grow::plant::OrganKind::{Bud, Flower, Head, Pod};
     let kinds = [Flower, Bud, Head, Pod];
     let counts = |text: &str| {
         let field = program::field(text, &Options { width: Some(480), ..Options::default() });
@@ -336,7 +342,7 @@ fn flowers_are_labelled_as_the_organs_that_they_are() {
     assert_eq!(counts(&text.replace("Bbch(65)", "Bbch(19)")), [0; 4]);
 }
 
-/// Rationale: a test that cannot fail proves nothing. Expected: the field half a pixel aside is another label map.
+/// Rationale: a test must be able to fail. Expected: the field shifted by half a pixel has another label map.
 #[test]
 fn the_test_itself_finds_labels_that_are_half_a_pixel_off() {
     let mut field = program::field(&program::small_text(), &Options::default());
@@ -349,7 +355,7 @@ fn the_test_itself_finds_labels_that_are_half_a_pixel_off() {
     assert!(differ > 50, "only {differ} pixels differ");
 }
 
-/// Whether leaf lies in plant and plant in class, everywhere and as the records say.
+/// Checks that every leaf belongs to a plant and every plant to a class, consistent with the records.
 fn check_tags(field: &Field, map: &LabelMap) {
     for tag in &map.tags {
         assert_eq!(tag.plant > 0, tag.class != Class::Soil, "{tag:?}: only plants are crop or weed");
@@ -370,14 +376,14 @@ fn light_and_material_change_no_label() {
     let mut field = program::field(&program::small_text(), &Options::default());
     let before = labels_of(&field.scene);
     check_tags(&field, &before);
-    assert!(before.tags.iter().filter(|t| t.leaf > 0).count() > 100, "too little of a leaf to test anything");
+    assert!(before.tags.iter().filter(|t| t.leaf > 0).count() > 100, "too few leaf pixels to test anything");
     field.scene.lights.clear();
     for material in &mut field.scene.materials {
-        *material = Material::Plain(furrow::bsdf::Bsdf::examples()[0].1);
+        *material = Material::Plain(furrow_optics::bsdf::Bsdf::examples()[0].1);
     }
     field.scene.filter = Filter::Box.footprint();
     assert_eq!(before, labels_of(&field.scene));
-    // The same asked of the page: another sky, another sensor.
+    // The same with changes in the scene file: no lights, another filter.
     let text = program::small_text();
     let from = text.find("lights: [").unwrap();
     let to = from + text[from..].find("],\n").unwrap() + 1;
@@ -419,8 +425,8 @@ fn palette(path: &Path) -> Vec<u8> {
     decoder.read_info().unwrap().info().palette.as_ref().expect("a palette").to_vec()
 }
 
-/// Expected: files hold the numbers of the map; the palette is black, green, red for soil, crop and weed, as Di Cicco et al. 2017
-/// paint them; class areas add up to the image.
+/// Expected: files hold the numbers of the map; the palette is black, green and red for soil, crop and weed, as in Di
+/// Cicco et al. 2017; class areas add up to the image.
 #[test]
 fn label_files_read_back_as_the_label_map() {
     let field = program::field(&program::small_text(), &Options::default());
@@ -438,26 +444,27 @@ fn label_files_read_back_as_the_label_map() {
         kernels: "none".into(),
     };
     let (_keep, out) = program::scratch();
-    output::write_files(&out, &output::image_files(&film, &map, &photograph, &provenance).unwrap()).unwrap();
-    let (sw, sh, classes) = output::read_indexed(&out.join("semantics.png")).unwrap();
+    furrow_output::write_files(&out, &furrow_output::image_files(&film, &map, &photograph, &provenance).unwrap())
+        .unwrap();
+    let (sw, sh, classes) = furrow_output::read_indexed(&out.join("semantics.png")).unwrap();
     assert_eq!((sw, sh), (w, h));
     let of = |f: fn(&Tag) -> u32| map.tags.iter().map(f).collect::<Vec<u32>>();
     assert_eq!(classes.iter().map(|c| u32::from(*c)).collect::<Vec<_>>(), of(|t| t.class as u32));
     assert_eq!(palette(&out.join("semantics.png")), [0, 0, 0, 0, 255, 0, 255, 0, 0]);
-    assert_eq!(output::read_numbers(&out.join("plants.png")).unwrap(), (w, h, of(|t| t.plant)));
-    assert_eq!(output::read_numbers(&out.join("leaves.png")).unwrap(), (w, h, of(|t| u32::from(t.leaf))));
+    assert_eq!(furrow_output::read_numbers(&out.join("plants.png")).unwrap(), (w, h, of(|t| t.plant)));
+    assert_eq!(furrow_output::read_numbers(&out.join("leaves.png")).unwrap(), (w, h, of(|t| u32::from(t.leaf))));
     let areas = Class::ALL.map(|c| map.tags.iter().filter(|t| t.class == c).count());
     assert_eq!(areas.iter().sum::<usize>(), (w * h) as usize, "{areas:?}");
     assert!(areas.iter().all(|a| *a > 20), "{areas:?}: a class is missing");
-    // A plant has one class, a leaf one plant: numbers alone tell them apart.
+    // A plant has one class: the plant numbers are unique across classes.
     let mut class_of = std::collections::BTreeMap::new();
     for tag in &map.tags {
         assert_eq!(*class_of.entry(tag.plant).or_insert(tag.class), tag.class, "plant {} has two classes", tag.plant);
     }
 }
 
-/// Expected: of a plane, the depth at which the ray through the pixel's centre meets it, worked out in double precision, and the
-/// plane's normal on the side that is seen; nothing where nothing is.
+/// Expected: for a plane, the depth at which the ray through the pixel's centre hits it, computed in double precision,
+/// and the plane's normal on the visible side; no value where there is no surface.
 #[test]
 fn depth_and_normals_are_those_of_a_plane_through_any_lens_and_from_both_sides() {
     let mut s = Stream::of(9, 0, Purpose::Test, 0);
@@ -480,7 +487,7 @@ fn depth_and_normals_are_those_of_a_plane_through_any_lens_and_from_both_sides()
                 }
                 hits += 1;
                 let [x, y] = centre(&camera, i % 160, i / 160);
-                // At unit depth the ray has this direction, so its length to the plane is the depth.
+                // The ray has this direction at unit depth, so the distance along it to the plane is the depth.
                 let through = right * x + down * y + forward;
                 let expected = upper.dot(a - pose.position.as_dvec3()) / upper.dot(through);
                 assert!((f64::from(depth) - expected).abs() < 1e-5, "{depth} for {expected}");
@@ -492,8 +499,9 @@ fn depth_and_normals_are_those_of_a_plane_through_any_lens_and_from_both_sides()
     }
 }
 
-/// Expected: on a sphere, smooth normals, exact but for the angle that a mesh of 60 bands leaves, up to its outline; in a field,
-/// unit normals that face the camera wherever there is something, and depths that agree with the distances of all triangles.
+/// Expected: on a sphere, smooth normals up to its outline, exact except for the angular error of a mesh with 60 bands.
+/// In a field, unit normals that face the camera wherever there is a surface, and depths that agree with the distances
+/// of all triangles.
 #[test]
 fn normals_are_smooth_and_face_the_camera_everywhere() {
     let camera = eye(Distortion::default(), vec3(0.2, -0.6, 0.9), Vec3::ZERO);
@@ -507,7 +515,7 @@ fn normals_are_smooth_and_face_the_camera_everywhere() {
         let p = origin
             + direction
                 * (map.depth[i as usize] / camera.axis_cosine([f64::from(i % 160) + 0.5, f64::from(i / 160) + 0.5]));
-        // Where the outline is near, the triangle's own normal stands in.
+        // Near the outline, the triangle's geometric normal is used instead.
         let limit = if normal.dot(direction) < -0.1 { 0.005 } else { 0.06 };
         assert!(normal.distance(p.normalize()) < limit, "{normal} at {p}");
         seen += 1;
@@ -528,7 +536,7 @@ fn normals_are_smooth_and_face_the_camera_everywhere() {
         }
         if map.parts[i] == parts[i] && parts[i] != NONE {
             let expected = distances[i] * camera.axis_cosine([f64::from(x) + 0.5, f64::from(y) + 0.5]);
-            // Within a thousandth of a pixel of an edge another layer of the same part may win.
+            // Within a thousandth of a pixel of an edge, another layer of the same part may win.
             compared += usize::from((map.depth[i] - expected).abs() < 2e-5);
         }
     }

@@ -1,21 +1,23 @@
-//! `trace dataset --labels-only`: labels and records of fields that nobody lights.
+//! `trace dataset --labels-only`: labels and records of fields without rendering images.
 //!
-//! Rationale: who counts, measures or plans wants labels of thousands of fields and no photograph; they must be those of the photographed
-//! fields. Expected: maps and records equal to those of an ordinary dataset of the same scene, value by value; files of photographs missing and
-//! nothing else; formats that need photographs, and everything else that needs samples, refused in words. Source: the ordinary dataset.
+//! Rationale: users who count, measure or plan need labels of thousands of fields and no images; the labels must equal
+//! those of rendered fields. Expected: maps and records equal to those of an ordinary dataset of the same scene, value
+//! by value; only the image files are missing; formats that need images, and all other options that need samples, are
+//! refused with a message. Source: the ordinary dataset.
 
 use crate::common::dataset::{fail, path, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, trace};
 use crate::common::python::python;
-use furrow::dataset::{Set, native};
-use furrow::job::{Field, SceneFile};
+use furrow_dataset::Set;
+use furrow_dataset::read::native;
+use furrow_job::{Field, SceneFile};
 use std::path::Path;
 use std::process::Command;
 
-/// Images in each dataset.
+/// Number of images in each dataset.
 const COUNT: u64 = 3;
 
-/// Makes a dataset of the small scene.
+/// Returns the command that generates a dataset of the small scene.
 fn make(folder: &Path, more: &[&str]) -> Command {
     let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--out", path(folder)]);
     command.args(["--count", &COUNT.to_string()]).args(more);
@@ -46,12 +48,13 @@ fn labels_are_those_of_the_photographed_fields() {
     let expected: Vec<String> = names(&lit).into_iter().filter(|name| !name.ends_with("rgb.png")).collect();
     assert_eq!(names(&unlit), expected);
     succeed(verb("verify", &unlit, &["--rerender", "2"]));
-    // Begun as what it is, it is nothing else.
+    // A dataset keeps the mode it was started with.
     assert!(fail(make(&unlit, &["--spp", "1", "--keep", "depth32,normals16"]), 2).contains("labels_only"));
 }
 
-/// Rationale: a plan grows its first field for what is told of it, and every run of a dataset begins with one. Expected: hash, files, warnings, species,
-/// plants and conditions of the whole field, from fewer triangles and on the same random numbers. Source: the whole field.
+/// Rationale: a plan builds its first field for the metadata, and every run of a dataset starts with one. Expected:
+/// hash, files, warnings, species, plants and conditions of the full field, from fewer triangles and with the same
+/// random numbers. Source: the full field.
 #[test]
 fn a_field_that_is_only_told_of_tells_the_same() {
     for page in [SMALL, "scenes/synthetic-d.ron"] {
@@ -77,7 +80,7 @@ fn formats_without_photographs_are_written_and_others_refused() {
         assert!(files.contains_key(name), "{name}");
     }
     assert!(!files.keys().any(|name| name.ends_with("geometry.exr") || name.ends_with("coverage.png")));
-    // The same command goes on with it.
+    // The same command continues it.
     succeed(make(&data, &["--labels-only"]));
     let later = fail(verb("finish", &data, &["--format", "yolo"]), 2);
     assert!(later.contains("--format yolo holds photographs"), "{later}");

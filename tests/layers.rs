@@ -1,24 +1,25 @@
-//! Multi-layer EXR with Cryptomattes: other people's readers find every object's coverage and every id.
+//! Multi-layer EXR with Cryptomattes: independent readers find every object's coverage and every id.
 //!
-//! Rationale: a matte is right when the programs that composite with it decode it to the shares of the samples that were drawn.
-//! Expected: exact equality in single precision for every object and pixel; 32-bit ids up to 4 × 10⁹; equal bytes in every run.
-//! Source: cryptomatte-api 1.0.0, OpenEXR 3.5.3 (Python); without them the tests say so and pass, with `FURROW_REQUIRE_PEERS=1` they fail.
+//! Rationale: a matte is correct if compositing programs decode it to the fractions of the rendered samples. Expected:
+//! exact equality in single precision for every object and pixel; 32-bit ids up to 4 × 10⁹; equal bytes in every run.
+//! Source: cryptomatte-api 1.0.0, OpenEXR 3.5.3 (Python); without them the tests are skipped with a note, or fail with
+//! `FURROW_REQUIRE_PEERS=1`.
 
 use crate::common::program::{field, shoot, small_text};
 use crate::common::python::python;
-use furrow::film::{Film, Pixel, Tally};
-use furrow::geometry::Window;
-use furrow::math::Vec3;
-use furrow::output::encode_layers;
-use furrow::render::LabelMap;
-use furrow::scene::assemble::Options;
-use furrow::scene::tag::{Class, Tag};
+use furrow_base::geometry::Window;
+use furrow_base::math::Vec3;
+use furrow_field::assemble::Options;
+use furrow_output::encode_layers;
+use furrow_render::film::{Film, Pixel, Tally};
+use furrow_render::render::LabelMap;
+use furrow_render::scene::tag::{Class, Tag};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-/// What each object of a set is called, told here once more.
+/// Names of the objects in each matte, defined here independently.
 fn names(tags: &[Tag]) -> BTreeMap<&'static str, Vec<String>> {
     let of = |f: fn(&Tag) -> String| tags.iter().map(f).collect();
     let plant = |t: &Tag| if t.plant == 0 { "ground".into() } else { format!("plant_{}", t.plant) };
@@ -64,7 +65,7 @@ fn expected(film: &Film, labels: &LabelMap, tags: &[Tag]) -> Value {
     })
 }
 
-/// Has the readers compare a file with what is expected of it.
+/// Lets the readers compare a file with the expected values.
 fn ask(name: &str, film: &Film, labels: &LabelMap, tags: &[Tag]) {
     let Some(python) = python("import OpenEXR, cryptomatte_api") else { return };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("layers").join(name);
@@ -81,7 +82,8 @@ fn tag(class: Class, plant: u32, leaf: u16) -> Tag {
     Tag { class, plant, leaf }
 }
 
-/// A row of pixels, each with the parts that its samples met; parts 0 is ground, then each a leaf of a plant of its own.
+/// Builds a row of pixels, given the parts hit by their samples; part 0 is ground, each other part a leaf of its own
+/// plant.
 fn row(pixels: &[&[(u32, u32)]]) -> (Film, LabelMap, Vec<Tag>) {
     let pixel = |met: &&[(u32, u32)]| {
         let mut tally = Tally::default();
@@ -93,7 +95,7 @@ fn row(pixels: &[&[(u32, u32)]]) -> (Film, LabelMap, Vec<Tag>) {
     let mut tags = vec![tag(Class::Soil, 0, 0)];
     tags.extend((1..=12).map(|k| tag(if k % 2 == 0 { Class::Crop } else { Class::Weed }, k, k as u16 % 3)));
     let n = pixels.len();
-    // Ids as large as 32 bits hold them, beside "no part".
+    // The largest ids that 32 bits hold, including "no part".
     let parts = (0..n).map(|k| if k == 0 { u32::MAX } else { 3_999_999_990 + k as u32 }).collect();
     let tags_seen = (0..n).map(|k| tags[k % tags.len()]).collect();
     let labels = LabelMap { window, parts, tags: tags_seen, depth: vec![1.0; n], normals: vec![Vec3::Z; n] };
@@ -103,7 +105,8 @@ fn row(pixels: &[&[(u32, u32)]]) -> (Film, LabelMap, Vec<Tag>) {
 #[test]
 fn an_edge_pixel_is_three_quarters_of_one_plant_and_a_quarter_of_the_other() {
     let crowd: Vec<(u32, u32)> = (0..9).map(|part| (part, 7)).collect();
-    // 48 of 64 and 16 of 64; nothing at all; nine objects, more than the six that every file has room for; half of nothing.
+    // 48 of 64 and 16 of 64 samples; no hits; nine objects, more than the six for which every file has room; half of
+    // the samples without a hit.
     let (film, labels, tags) = row(&[&[(1, 48), (2, 16)], &[], &crowd, &[(0, 32)], &[(3, 64)]]);
     let found = expected(&film, &labels, &tags);
     assert_eq!(found["mattes"]["CryptoPlant"]["plant_1"][0], 0.75);
@@ -118,7 +121,7 @@ fn every_object_of_a_field_is_decoded_with_its_coverage() {
     let (film, labels) = shoot(&field, 8, 2);
     let tags = field.scene.tags();
     let mixed = film.pixels.iter().filter(|p| p.tally.iter().count() > 1).count();
-    assert!(mixed > 100, "{mixed} pixels show more than one part: an edge is hardly tested");
+    assert!(mixed > 100, "{mixed} pixels show more than one part: too few edges");
     ask("field", &film, &labels, &tags);
 }
 
@@ -127,6 +130,9 @@ fn equal_films_are_equal_bytes() {
     let (film, labels, tags) = row(&[&[(1, 48), (2, 16)]]);
     let first = encode_layers(&film, &labels, &tags, "").unwrap();
     for _ in 0..20 {
-        assert!(encode_layers(&film, &labels, &tags, "").unwrap() == first, "another order of the header's attributes");
+        assert!(
+            encode_layers(&film, &labels, &tags, "").unwrap() == first,
+            "the order of the header's attributes varies"
+        );
     }
 }

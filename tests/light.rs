@@ -1,11 +1,13 @@
-//! Lights keep their promise, and the sun and the sky are where and as bright as published models say.
+//! Lights sample what they state, and the sun and sky have the positions and radiances of published models.
 
 use crate::common::chi2::check_sphere;
-use furrow::light::clearsky::{clear_sky, optical_depth};
-use furrow::light::hosek::HosekWilkie;
-use furrow::light::{Emitter, HALF_ANGLE_DEG, Lamp, Light, LightDesc, Outline, Sun, Utc, daylight, sun_position};
-use furrow::math::{Frame, Spectrum, Vec2, Vec3, direction, vec3};
-use furrow::sampling::{Purpose, Stream};
+use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, direction, vec3};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_optics::light::clearsky::{clear_sky, optical_depth};
+use furrow_optics::light::hosek::HosekWilkie;
+use furrow_optics::light::{
+    Emitter, HALF_ANGLE_DEG, Lamp, Light, LightDesc, Outline, Sun, Utc, daylight, sun_position,
+};
 
 const POINTS: [Vec3; 3] = [Vec3::ZERO, Vec3::new(0.3, -0.2, 0.1), Vec3::new(-0.6, 0.4, 0.05)];
 
@@ -19,14 +21,14 @@ fn normals() -> Vec<Vec3> {
     drawn.chain([Vec3::Z, -Vec3::Z, Vec3::X, -Vec3::Y]).collect()
 }
 
-/// Rationale: next-event estimation divides by the density that a light states. Expected: the directions drawn have that
-/// density, which integrates to one. Source: χ² test, common/chi2.rs.
+/// Rationale: next-event estimation divides by the density that a light states. Expected: the sampled directions have
+/// that density, which integrates to one. Source: χ² test, common/chi2.rs.
 #[test]
 fn every_light_draws_directions_by_its_density() {
     for (name, light) in Light::examples() {
         for (i, p) in POINTS.into_iter().enumerate() {
             if i > 0 && light.is_infinite() {
-                continue; // The same everywhere.
+                continue; // Independent of the position.
             }
             let sample = |u: [f32; 3]| light.sample_li(p, [u[0], u[1]]).map(|s| s.wi);
             check_sphere(&format!("{name} at {p}"), 60_000, sample, |wi| light.pdf_li(p, wi));
@@ -34,8 +36,8 @@ fn every_light_draws_directions_by_its_density() {
     }
 }
 
-/// Rationale: multiple importance sampling asks the same question twice, once of the sample and once of the direction.
-/// Expected: both answers agree but where rounding moves a direction over an edge.
+/// Rationale: multiple importance sampling evaluates a light twice, for the sample and for the direction. Expected:
+/// both agree except where rounding moves a direction across an edge.
 #[test]
 fn a_sampled_light_and_a_met_light_are_the_same() {
     for (name, light) in Light::examples() {
@@ -65,8 +67,8 @@ fn a_sampled_light_and_a_met_light_are_the_same() {
     }
 }
 
-/// Rationale: the mean of radiance × cosine / density must be the irradiance. Expected: within four standard errors of the
-/// integral of what rays see. Source: that integral over a fine grid about the light, f64.
+/// Rationale: the mean of radiance × cosine / density must be the irradiance. Expected: within four standard errors of
+/// the integral of the radiance seen by rays. Source: that integral on a fine grid around the light, f64.
 #[test]
 fn every_light_gives_its_irradiance() {
     for (name, light) in Light::examples() {
@@ -95,7 +97,7 @@ fn every_light_gives_its_irradiance() {
     }
 }
 
-/// ∫ L cos dω of what rays see, over a grid about +z for wide lights and about the disc for the sun.
+/// ∫ L cos dω of the radiance seen by rays, on a grid around +z for wide lights and around the disc for the sun.
 fn seen_irradiance(light: &Light, p: Vec3, n: Vec3) -> f64 {
     let (axis, reach) = match light {
         Light::Sun(sun) => (sun.direction(), f64::from(HALF_ANGLE_DEG).to_radians() * 1.01),
@@ -121,8 +123,9 @@ fn seen_irradiance(light: &Light, p: Vec3, n: Vec3) -> f64 {
     sum * top * std::f64::consts::TAU / f64::from(side * side)
 }
 
-/// Rationale: a light that is never chosen where it shines makes the image dark without a sign. Expected: importance above zero
-/// wherever a sample contributes, on tilted planes and both sides of leaves; and of the right size, so that the choice is good.
+/// Rationale: a light that is never selected where it shines makes the image dark without a warning. Expected:
+/// importance above zero wherever a sample contributes, on tilted planes and both sides of leaves, and of the right
+/// magnitude for an efficient choice.
 #[test]
 fn importance_overlooks_nothing() {
     for (name, light) in Light::examples() {
@@ -173,8 +176,9 @@ fn lights_far_away_are_nowhere_and_lamps_are_not_in_the_sky() {
     }
 }
 
-/// Rationale: the sun's disc is 10⁻⁵ of the sphere, where f32 has few digits left. Expected: direct normal irradiance to 10⁻³ in
-/// every band, limb darkened or not, and the edge where the disc ends. Source: E = L₀ π sin²α (1 − u/3).
+/// Rationale: the sun's disc covers 10⁻⁵ of the sphere, where f32 has few digits left. Expected: direct normal
+/// irradiance within 10⁻³ in every band, with and without limb darkening, and a sharp edge of the disc. Source: E = L₀
+/// π sin²α (1 − u/3).
 #[test]
 fn the_sun_gives_its_direct_normal_irradiance() {
     let given = Spectrum::new(1.293, 1.326, 1.231, 0.872);
@@ -205,7 +209,7 @@ fn the_sun_gives_its_direct_normal_irradiance() {
     }
 }
 
-/// Site, latitude, longitude, time, geometric zenith, apparent zenith, azimuth; degrees.
+/// Site, latitude, longitude, time, geometric zenith, apparent zenith, azimuth; angles in degrees.
 const SUNS: [(&str, f64, f64, &str, f64, f64, f64); 20] = [
     ("Bonn Klein-Altendorf", 50.625, 6.988, "2016-05-02T10:00:00Z", 39.372793, 39.359263, 144.906821),
     ("Bonn Klein-Altendorf", 50.625, 6.988, "2016-05-27T14:30:00Z", 45.686148, 45.669272, 247.362476),
@@ -229,8 +233,9 @@ const SUNS: [(&str, f64, f64, &str, f64, f64, f64); 20] = [
     ("Greenwich", 51.4779, 0.0, "2030-01-01T12:00:00Z", 74.454687, 74.396112, 179.14547),
 ];
 
-/// Rationale: shadows in a dated field must fall where they fell. Expected: 0.001° in zenith, and in azimuth where the sun is not
-/// overhead; apparent positions within what air pressure at the sites' altitudes changes. Source: NREL's SPA by pvlib 0.16.1.
+/// Rationale: shadows in a dated field must have the true direction. Expected: within 0.001° in zenith, and in azimuth
+/// unless the sun is overhead; apparent positions within the effect of air pressure at the sites' altitudes. Source:
+/// NREL's SPA by pvlib 0.16.1.
 #[test]
 fn the_sun_stands_where_nrel_says() {
     for (site, latitude, longitude, utc, zenith, apparent, azimuth) in SUNS {
@@ -248,7 +253,7 @@ fn the_sun_stands_where_nrel_says() {
     }
 }
 
-/// Sun's elevation, turbidity, zenith angle, angle to the sun (degrees), R, G, B. Ground albedo 0.2.
+/// Solar elevation, turbidity, zenith angle, angle to the sun (degrees), R, G, B. Ground albedo 0.2.
 const HOSEK: [(f32, f32, f32, f32, [f32; 3]); 20] = [
     (20.0, 2.0, 0.0, 70.0, [1.103092, 2.406863, 4.789660]),
     (20.0, 2.0, 40.0, 110.0, [1.730370, 3.482065, 6.409989]),
@@ -272,12 +277,13 @@ const HOSEK: [(f32, f32, f32, f32, [f32; 3]); 20] = [
     (85.0, 3.0, 80.0, 75.0, [9.944087, 15.593354, 23.473393]),
 ];
 
-/// Rationale: a camera that looks at the sky must not see the table's steps, nor another sky than the one that lights. Expected: no step between neighbouring
-/// directions above 2 % away from the sun, where the table has larger ones; the mean over the hemisphere within 0.5 % of the table's; the
-/// horizon's haze below it.
+/// Rationale: a camera that sees the sky must see neither the steps of the sky table nor another sky than the one that
+/// lights the scene. Expected: away from the sun, neighbouring directions differ by at most 2 %, although the table has
+/// larger steps; the mean over the hemisphere is within 0.5 % of the table's; below the horizon the haze of the horizon
+/// continues.
 #[test]
 fn the_sky_that_a_camera_sees_is_smooth() {
-    let (_, sky) = furrow::light::daylight(40.0, 150.0, 3.0, 0.2);
+    let (_, sky) = furrow_optics::light::daylight(40.0, 150.0, 3.0, 0.2);
     let sky = sky.expect("a sky");
     let at = |azimuth: f32, elevation: f32| {
         vec3(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin())
@@ -295,9 +301,12 @@ fn the_sky_that_a_camera_sees_is_smooth() {
     assert!(sky.le(below).is_black());
 }
 
-/// Rationale: the table is folded at the azimuths of the axes, and what is interpolated across a fold is a streak in the sky: it was 4 % darker in blue,
-/// and 1° wide, low in the north, east, south and west. Expected: no direction is 0.2 % brighter or darker than the mean of those 1.5° to its left and
-/// right, on a fold or not; and a clear sky is the model's times one number for each band. Source: the model, whose curvature there is below 0.1 %.
+/// Rationale: the table is mirrored at the azimuths of the axes, and interpolation across them made streaks in the sky:
+/// 4 % darker in blue and 1° wide, low in the north, east, south and west.
+///
+/// Expected: no direction is 0.2 % brighter or darker than the mean of the directions 1.5° to its left and right, at
+/// these azimuths or elsewhere; a clear sky is the model times one factor per band. Source: the model, whose curvature
+/// there is below 0.1 %.
 #[test]
 fn the_sky_that_a_camera_sees_has_no_streaks() {
     let (elevation, azimuth, turbidity) = (34.0_f64, 225.0_f64, 3.0_f64);
@@ -320,19 +329,19 @@ fn the_sky_that_a_camera_sees_has_no_streaks() {
     }
 }
 
-/// Rationale: the dome's shape is that of the published model or it is our invention. Expected: relative 10⁻⁴. Source: the authors'
-/// C code.
+/// Rationale: the shape of the sky dome must be that of the published model. Expected: within 10⁻⁴ relative. Source:
+/// the authors' C code.
 #[test]
 fn the_clear_dome_has_the_shape_of_hosek_and_wilkie() {
     for (elevation, turbidity, theta, gamma, rgb) in HOSEK {
         let sun = direction((90.0 - elevation).to_radians(), 0.0);
-        // The azimuth at which a direction of that zenith angle is that far from the sun.
+        // Azimuth at which a direction with that zenith angle has that angle to the sun.
         let (sun_zenith, theta, gamma) = ((90.0 - elevation).to_radians(), theta.to_radians(), gamma.to_radians());
         let cos = (gamma.cos() - theta.cos() * sun_zenith.cos()) / (theta.sin() * sun_zenith.sin()).max(1e-9);
         let dir = direction(theta, cos.clamp(-1.0, 1.0).acos());
         let got = HosekWilkie::new(sun, turbidity).radiance(dir).to_array();
         for band in 0..3 {
-            // The angle of a direction in f32 carries an error that the steep glow around the sun magnifies.
+            // The f32 error of a direction's angle is magnified by the steep gradient around the sun.
             assert!(
                 (got[band] / rgb[band] - 1.0).abs() < 1e-4,
                 "{elevation} {turbidity} {theta} {gamma}: {got:?} {rgb:?}"
@@ -341,21 +350,23 @@ fn the_clear_dome_has_the_shape_of_hosek_and_wilkie() {
     }
 }
 
-/// Rationale: NIR is not in the sky model; it is continued from blue and red. Expected: before any scaling the diffuse NIR is
-/// 0.25 to 0.65 of R (SPCTRL2: 0.36 clear, 0.42 hazy), and haze raises it. Source: SPCTRL2, Ångström's law.
+/// Rationale: the sky model has no NIR band; it is extrapolated from blue and red. Expected: before any scaling, the
+/// diffuse NIR is 0.25 to 0.65 of R (SPCTRL2: 0.36 clear, 0.42 hazy), and haze increases it. Source: SPCTRL2,
+/// Ångström's law.
 #[test]
 fn nir_of_the_dome_follows_the_slope_from_blue_to_red() {
     let ratio = |turbidity: f32| {
         let model = HosekWilkie::new(direction(30.0_f32.to_radians(), 0.0), turbidity);
-        let e = furrow::light::Dome::clear(model).irradiance().to_array();
+        let e = furrow_optics::light::Dome::clear(model).irradiance().to_array();
         e[3] / e[0]
     };
     let (clear, hazy) = (ratio(3.0), ratio(6.0));
     assert!((0.25..0.4).contains(&clear) && (0.4..0.65).contains(&hazy), "{clear} {hazy}");
 }
 
-/// Rationale: exposure, shadow depth and NIR contrast hang on the split between sun and sky. Expected: horizontal irradiance of
-/// both lights per band as the SPCTRL2 table says, at turbidities and suns on and off its nodes. Source: clearsky.rs.
+/// Rationale: exposure, shadow depth and NIR contrast depend on the split between sun and sky. Expected: horizontal
+/// irradiance of both lights per band as in the SPCTRL2 table, at turbidities and solar elevations on and between its
+/// nodes. Source: clearsky.rs.
 #[test]
 fn a_clear_day_has_the_irradiance_of_spctrl2() {
     for turbidity in [2.0, 3.0, 4.7, 6.0] {
@@ -399,11 +410,11 @@ fn clouds_dim_the_sun_first_and_end_in_a_grey_dome_without_one() {
     let [r, _, b, nir] = dome.to_array();
     assert!((b / r - 1.04).abs() < 1e-3 && (nir / r - 0.6).abs() < 1e-3);
     let clear = steps[0].0 + steps[0].1;
-    assert!((dome.mean() / clear.mean() - 0.25).abs() < 0.01, "a quarter passes thick cloud");
+    assert!((dome.mean() / clear.mean() - 0.25).abs() < 0.01, "thick cloud transmits a quarter");
 }
 
-/// Rationale: rigs are given by the irradiance they make. Expected: that irradiance at that distance. Source: for the disc the
-/// closed form E = π L a²/(a² + d²).
+/// Rationale: light rigs are specified by the irradiance they produce. Expected: that irradiance at that distance.
+/// Source: for the disc, the closed form E = π L a²/(a² + d²).
 #[test]
 fn lamps_give_the_irradiance_they_were_asked_for() {
     let build = |page: &str| {
@@ -454,8 +465,9 @@ fn pages_that_cannot_be_lit_say_why() {
     }
 }
 
-/// Rationale: a photographed sky is named by a page and belongs to the field. Expected: E = πL of an even one, times what the page says; its
-/// file among the field's; faults at their places. Source: closed form.
+/// Rationale: a scene file names an environment map, which is part of the field. Expected: E = πL for a uniform map,
+/// times the factor in the scene file; its file is listed among the field's files; faults are reported at their
+/// positions. Source: closed form.
 #[test]
 fn a_page_may_name_a_picture_of_all_directions() {
     let folder = tempfile::tempdir().unwrap();
@@ -471,23 +483,13 @@ fn a_page_may_name_a_picture_of_all_directions() {
     let field = |light: &str| {
         let camera = "Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1))";
         std::fs::write(&page, format!("Field(\n  camera: {camera},\n  lights: [{light}],\n)")).unwrap();
-        furrow::scene::assemble::field(&page, &furrow::scene::assemble::Options::default()).map_err(|e| e.to_string())
+        furrow_field::assemble::field(&page, &furrow_field::assemble::Options::default()).map_err(|e| e.to_string())
     };
     let lit =
         field(r#"EnvironmentMap(file: "even.hdr", scale: 3, rotate_deg: Uniform(0, 360), nir: OfRed(0.8))"#).unwrap();
     assert_eq!(lit.warnings, Vec::<String>::new());
-    // Its former name is read for one version, with a warning.
-    let old =
-        field(r#"Environment(file: "even.hdr", scale: 3, rotate_deg: Uniform(0, 360), nir: OfRed(0.8))"#).unwrap();
-    assert_eq!(old.conditions, lit.conditions);
-    assert_eq!(old.warnings.len(), 1);
-    assert!(
-        old.warnings[0].starts_with("page.ron:3:12: `Environment` is now called `EnvironmentMap`"),
-        "{:?}",
-        old.warnings
-    );
-    let message = field("Environmant()").err().unwrap_or_default();
-    assert!(message.contains("did you mean `EnvironmentMap`?") && !message.contains("Environment,"), "{message}");
+    let message = field("EnvironmentMop()").err().unwrap_or_default();
+    assert!(message.contains("did you mean `EnvironmentMap`?"), "{message}");
     let [r, g, b, nir] = lit.scene.lights[0].horizontal_irradiance().to_array();
     let pi = std::f32::consts::PI;
     for (found, expected) in [(r, 1.5 * pi), (g, 3.0 * pi), (b, 3.0 * pi), (nir, 1.2 * pi)] {

@@ -1,6 +1,7 @@
-//! All tests that see the library and the programs from outside, a module a subject: `cargo test --test all labels::`.
+//! All integration tests of the library and the programs, one module per subject: `cargo test --test all labels::`.
 //!
-//! One program, for 70 would each be linked with all of the library, libtorch and Embree: that takes minutes more.
+//! They form a single test binary. 70 separate binaries would each link the whole library, libtorch and Embree, which
+//! takes minutes longer.
 
 mod ablation;
 mod accel;
@@ -31,7 +32,6 @@ mod detail;
 mod determinism;
 mod documents;
 mod drive;
-mod embree;
 mod error_control;
 mod estimate;
 mod examples;

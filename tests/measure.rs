@@ -1,19 +1,20 @@
-//! Numbers from truth and prediction: worked out by hand, by brute force, and by other people's programs.
+//! Metrics from truth and prediction: computed by hand, by brute force, and by other programs.
 //!
-//! Rationale: a wrong score is believed. Expected: hand-made matrices and maps give the values worked out beside them; random maps give
-//! what scikit-learn and SciPy say, to 1e-12; outlines what a search over all pairs of pixels says; an interval of 95 % covers the truth
-//! in about 95 % of simulated sets. Source: the definitions in `src/train/measure`, the programs named in `tests/requirements.txt`.
+//! Rationale: nobody questions a wrong score. Expected: hand-made matrices and maps give the values computed beside
+//! them; random maps give the values of scikit-learn and SciPy within 1e-12; boundaries match a search over all pairs
+//! of pixels; a 95 % interval covers the truth in about 95 % of simulated sets. Source: the definitions in
+//! `crates/train/src/measure`, the programs named in `tests/requirements.txt`.
 
 use crate::common::python::python;
-use furrow::report::{Cell, Table};
-use furrow::sampling::rng::{Purpose, Stream};
-use furrow::train::baseline::{Baseline, Cut, Example, Kind, SizeRule};
-use furrow::train::measure::bootstrap;
-use furrow::train::measure::boundary::{Boundary, TOLERANCE};
-use furrow::train::measure::components::Components;
-use furrow::train::measure::report::Report;
-use furrow::train::measure::size::{SizeBin, Sizes};
-use furrow::train::measure::{Confusion, Evaluation, Prediction, Scores};
+use furrow_base::sampling::rng::{Purpose, Stream};
+use furrow_report::{Cell, Table};
+use furrow_train::baseline::{Baseline, Cut, Example, Kind, SizeRule};
+use furrow_train::measure::bootstrap;
+use furrow_train::measure::boundary::{Boundary, TOLERANCE};
+use furrow_train::measure::components::Components;
+use furrow_train::measure::report::Report;
+use furrow_train::measure::size::{SizeBin, Sizes};
+use furrow_train::measure::{Confusion, Evaluation, Prediction, Scores};
 use proptest::prelude::*;
 use std::path::Path;
 use std::process::Command;
@@ -25,7 +26,7 @@ fn close(a: Option<f64>, b: f64) -> bool {
     a.is_some_and(|a| (a - b).abs() < 1e-12)
 }
 
-/// Pixels from rows of digits; `x` has no label.
+/// Parses pixels from rows of digits; `x` is unlabelled.
 fn map(rows: &[&str]) -> Vec<u8> {
     rows.concat().bytes().map(|c| if c == b'x' { 255 } else { c - b'0' }).collect()
 }
@@ -35,7 +36,7 @@ fn answer<'a>(width: u32, truth: &'a [u8], predicted: &'a [u8]) -> Prediction<'a
     Prediction { name: "a", width, height, truth, predicted, plants: None, seconds: None }
 }
 
-/// A random map of three classes in blobs, some of it without a label.
+/// Builds a random map of three classes in blobs, partly unlabelled.
 fn random_map(stream: &mut Stream, width: usize, height: usize, ignore: bool) -> Vec<u8> {
     let mut map = vec![0; width * height];
     for _ in 0..stream.index(12) {
@@ -51,14 +52,14 @@ fn random_map(stream: &mut Stream, width: usize, height: usize, ignore: bool) ->
     map
 }
 
-/// The same with another opinion on some of it.
+/// Builds a prediction that deviates from the truth in some pixels.
 fn random_answer(stream: &mut Stream, truth: &[u8]) -> Vec<u8> {
     truth.iter().map(|t| if *t > 2 || stream.chance(0.15) { stream.index(3) as u8 } else { *t }).collect()
 }
 
 #[test]
 fn scores_of_a_matrix_are_those_worked_out_by_hand() {
-    // Rows are soil, crop, weed as they are; columns as they were taken.
+    // Rows are true soil, crop and weed; columns are the predicted classes.
     let matrix = Confusion::from_rows(&[vec![80, 3, 1], vec![2, 8, 2], vec![1, 2, 1]]).unwrap();
     let s = Scores::of(&matrix, &PLANTS);
     assert!(close(s.global_accuracy, 89.0 / 100.0));
@@ -68,14 +69,14 @@ fn scores_of_a_matrix_are_those_worked_out_by_hand() {
     let crop = &s.classes[1];
     assert!(close(crop.iou, 8.0 / 17.0) && close(crop.precision, 8.0 / 13.0) && close(crop.recall, 8.0 / 12.0));
     assert!(close(crop.f1, 16.0 / 25.0));
-    // Crop taken for weed is vegetation all the same: 8 + 2 + 2 + 1 hits, 4 false, 3 missed.
+    // Crop predicted as weed is still vegetation: 8 + 2 + 2 + 1 hits, 4 false positives, 3 missed.
     assert!(close(s.vegetation.precision, 13.0 / 17.0) && close(s.vegetation.recall, 13.0 / 16.0));
     assert!(close(s.vegetation.iou, 13.0 / 20.0));
 }
 
 #[test]
 fn what_is_of_nothing_is_unknown_and_left_out_of_means() {
-    // No weed anywhere.
+    // No weed in truth or prediction.
     let s = Scores::of(&Confusion::from_rows(&[vec![6, 2, 0], vec![1, 1, 0], vec![0, 0, 0]]).unwrap(), &PLANTS);
     let weed = &s.classes[2];
     assert_eq!((weed.iou, weed.precision, weed.recall, weed.f1), (None, None, None, None));
@@ -83,7 +84,7 @@ fn what_is_of_nothing_is_unknown_and_left_out_of_means() {
         close(s.mean_iou, f64::midpoint(6.0 / 9.0, 1.0 / 4.0))
             && close(s.class_accuracy, f64::midpoint(6.0 / 8.0, 0.5))
     );
-    // No weed in the truth, but in the prediction: it costs I/U, not accuracy.
+    // No weed in the truth, but in the prediction: this reduces IoU, not accuracy.
     let s = Scores::of(&Confusion::from_rows(&[vec![8, 0, 2], vec![0, 5, 0], vec![0, 0, 0]]).unwrap(), &PLANTS);
     assert_eq!((s.classes[2].iou, s.classes[2].recall, s.classes[2].precision), (Some(0.0), None, Some(0.0)));
     assert!(close(s.mean_iou, (0.8 + 1.0 + 0.0) / 3.0) && close(s.class_accuracy, f64::midpoint(0.8, 1.0)));
@@ -165,7 +166,7 @@ proptest! {
     #[test]
     fn outlines_match_what_a_search_over_all_pairs_finds(seed in any::<u64>()) {
         let mut stream = Stream::of(seed, 0, Purpose::Test, 2);
-        // The tolerance is 0.9 to 3.2 pixels: a search for too few columns or rows shows.
+        // The tolerance is 0.9 to 3.2 pixels, so a search over too few columns or rows is detected.
         let (w, h) = (20 + stream.index(200), 12 + stream.index(20));
         let (w, h) = if stream.chance(0.5) { (w, h) } else { (h, w) };
         let truth = random_map(&mut stream, w, h, true);
@@ -202,7 +203,7 @@ proptest! {
 
 #[test]
 fn an_outline_that_is_off_by_less_than_the_tolerance_is_right() {
-    // 400 × 300: half a thousand pixels across, tolerance 3.75.
+    // 400 × 300 pixels: a diagonal of 500, tolerance 3.75.
     let (w, h) = (400, 300);
     let square = |shift: usize| -> Vec<u8> {
         (0..w * h)
@@ -212,7 +213,7 @@ fn an_outline_that_is_off_by_less_than_the_tolerance_is_right() {
     let score = |shift| Boundary::of(3, w, h, &square(0), &square(shift))[1];
     assert_eq!((score(0).truth, score(0).f_score()), (396, Some(1.0)));
     assert_eq!(score(3).f_score(), Some(1.0));
-    // Six pixels aside: the upper and lower sides still match but for their ends, the other two do not.
+    // Shifted by six pixels: the upper and lower sides still match except for their ends; the other two do not.
     let far = score(6);
     assert!(far.truth_matched > 180 && far.truth_matched < 210, "{far:?}");
     let none = Boundary::of(3, w, h, &square(0), &vec![0; w * h]);
@@ -221,7 +222,7 @@ fn an_outline_that_is_off_by_less_than_the_tolerance_is_right() {
 
 #[test]
 fn small_plants_and_large_ones_are_told_apart() {
-    // A crop of 16 pixels with a frayed edge, a weed of 3 that is missed, a speck of weed in bare soil.
+    // A crop plant of 16 pixels with a frayed edge, a missed weed of 3, and a speck of predicted weed on bare soil.
     let truth = map(&["0000000000", "0111100000", "0111100220", "0111100200", "0111100000", "0000000000"]);
     let answer = map(&["0000000000", "0111110000", "0111110000", "0111100000", "0110000000", "0000000020"]);
     let sizes = Sizes::of(&PLANTS, (10, 6), &truth, &answer, None);
@@ -238,15 +239,15 @@ fn small_plants_and_large_ones_are_told_apart() {
 fn plants_that_touch_are_told_apart_by_their_numbers() {
     let truth = map(&["11111111", "11111111"]);
     let numbers: Vec<u32> = (0..16).map(|at| if at % 8 < 2 { 7 } else { 3 }).collect();
-    // The small plant of 4 is found; of the one of 12, five.
+    // The small plant of 4 pixels is detected; of the one with 12, five pixels are found.
     let answer = map(&["11110000", "11111000"]);
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, Some(&numbers)).bins(1);
     let [both] = &bins[..] else { panic!("{bins:?}") };
     assert_eq!((both.from_pixels, both.plants, both.detected, both.found, both.pixels), (4, 2, 1, 9, 16));
-    // Without numbers they are one plant.
+    // Without plant numbers they are one plant.
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, None).bins(1);
     assert_eq!((bins[0].from_pixels, bins[0].plants, bins[0].detected), (16, 1, 1));
-    // What bears no number hangs together as far as it does.
+    // Pixels without a number form plants by connected components.
     let mixed: Vec<u32> = numbers.iter().map(|n| if *n == 7 { 7 } else { 0 }).collect();
     let bins = Sizes::of(&PLANTS, (8, 2), &truth, &answer, Some(&mixed)).bins(1);
     assert_eq!(bins[0].plants, 2);
@@ -254,7 +255,8 @@ fn plants_that_touch_are_told_apart_by_their_numbers() {
 
 #[test]
 fn a_halo_counts_against_the_plant_it_surrounds() {
-    // Two plants, 1 and 9 pixels, under one blob of the prediction: what is too much goes with the one it covers most.
+    // Two plants of 1 and 9 pixels under one predicted blob: the false positives count for the plant that it covers
+    // most.
     let truth = map(&["1000000", "0000111", "0000111", "0000111"]);
     let answer = map(&["1100000", "1111111", "0000111", "0000111"]);
     let bins = Sizes::of(&PLANTS, (7, 4), &truth, &answer, None).bins(1);
@@ -280,8 +282,9 @@ fn regions_are_numbered_in_the_order_of_their_first_pixels() {
     assert_eq!(found.areas, [spiral.iter().map(|c| u32::from(*c)).sum::<u32>()]);
 }
 
-/// Matrices of images of soil and plants, of which a share is found that strays from image to image. The share of all images of the kind is
-/// 0.7: the mean of uniform from 0.5 to 0.9 with plants of any number, independent of it.
+/// Simulates confusion matrices of images with soil and plants; the found fraction of the plants varies between images.
+/// The true fraction over all images is 0.7: the mean of a uniform distribution from 0.5 to 0.9, independent of the
+/// number of plant pixels.
 fn simulated(stream: &mut Stream, images: usize) -> Vec<Confusion> {
     let one = |stream: &mut Stream| {
         let plants = 500.0 + 1000.0 * stream.uniform();
@@ -302,9 +305,9 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
             interval.low <= 0.7 && 0.7 <= interval.high
         })
         .count();
-    // Percentile intervals of 40 images cover about 94 %; four standard errors of 300 trials are 5.5 %.
+    // Percentile intervals from 40 images cover about 94 %; four standard errors of 300 trials are 5.5 %.
     let share = covered as f64 / f64::from(trials);
-    assert!((0.885..0.995).contains(&share), "{share} of the intervals hold the truth");
+    assert!((0.885..0.995).contains(&share), "{share} of the intervals contain the truth");
 }
 
 #[test]
@@ -314,19 +317,19 @@ fn intervals_are_the_same_every_time_and_narrow_with_more_images() {
     let width = |n: usize| bootstrap::intervals(&images[..n], 0, score)[0].map(|i| i.high - i.low).unwrap();
     assert_eq!(bootstrap::intervals(&images, 3, score), bootstrap::intervals(&images, 3, score));
     assert_ne!(bootstrap::intervals(&images, 3, score), bootstrap::intervals(&images, 4, score));
-    // By the square root of their number: a quarter.
+    // By the square root of the number of images: a factor of four.
     let ratio = width(10) / width(160);
     assert!((2.0..8.0).contains(&ratio), "{ratio}");
     assert_eq!(bootstrap::intervals(&images[..1], 0, score), [None]);
-    // A score that most resamples do not have has no interval.
+    // A score that is undefined in most resamples has no interval.
     let mut rare = vec![Confusion::from_rows(&[vec![5, 0], vec![0, 0]]).unwrap(); 20];
     rare[0] = Confusion::from_rows(&[vec![5, 0], vec![1, 1]]).unwrap();
-    assert!(bootstrap::intervals(&rare, 0, score)[0].is_some(), "one in twenty is in 64 % of resamples");
+    assert!(bootstrap::intervals(&rare, 0, score)[0].is_some(), "one image in twenty is in 64 % of the resamples");
     rare[0] = rare[1].clone();
     assert_eq!(bootstrap::intervals(&rare, 0, score), [None]);
 }
 
-/// An evaluation of some random images.
+/// Evaluates some random images.
 fn evaluated(order: impl Iterator<Item = u64>) -> Report {
     let mut evaluation = Evaluation::new(NAMES);
     for k in order {
@@ -392,7 +395,7 @@ fn a_table_is_read_back_from_each_of_its_forms() {
     assert_eq!(json["columns"][1], "a, b");
 }
 
-/// Maps and what we make of them, for another program to judge.
+/// Truth maps, predictions and our metrics, for another program to check.
 fn cases() -> serde_json::Value {
     let case = |k: u64| {
         let mut stream = Stream::of(11, k, Purpose::Test, 6);
@@ -422,7 +425,8 @@ fn scikit_learn_and_scipy_find_the_same_numbers() {
     assert!(said.contains("40 cases agree"), "{said}");
 }
 
-/// A picture of brown soil and green leaves by their classes, with noise of so many steps.
+/// Image of brown soil and green plants by their classes, with normal noise of standard deviation `noise` (8-bit
+/// levels).
 fn field(stream: &mut Stream, truth: &[u8], noise: f64) -> Vec<[u8; 3]> {
     truth
         .iter()
@@ -433,7 +437,7 @@ fn field(stream: &mut Stream, truth: &[u8], noise: f64) -> Vec<[u8; 3]> {
         .collect()
 }
 
-/// Fields with squares of crop 12 pixels wide and of weed 4 pixels wide, on 80 × 60.
+/// Fields of 80 × 60 pixels with crop squares 12 pixels wide and weed squares 4 pixels wide.
 fn fields(seed: u64, noise: f64) -> Vec<Example> {
     let one = |k: u64| {
         let mut stream = Stream::of(seed, k, Purpose::Test, 7);
@@ -458,7 +462,7 @@ fn fit(kind: Kind, cut: Cut, images: &[Example]) -> Baseline {
     Baseline::fit(kind, cut, || images.iter().cloned().map(Ok)).unwrap()
 }
 
-/// Mean I/U and I/U of the vegetation.
+/// Returns the mean IoU and the IoU of the vegetation.
 fn judged(baseline: &Baseline, images: &[Example]) -> (f64, f64) {
     let mut matrix = Confusion::new(3);
     for image in images {
@@ -474,7 +478,7 @@ fn colour_and_size_tell_clean_squares_apart() {
     for cut in [Cut::Otsu, Cut::Fitted] {
         let colour = fit(Kind::Exg, cut, &train);
         assert_eq!(judged(&colour, &test).1, 1.0, "{colour:?}");
-        assert!(judged(&colour, &test).0 < 0.67, "without sizes no weed is found");
+        assert!(judged(&colour, &test).0 < 0.67, "without sizes, no weed can be found");
         let size = fit(Kind::ExgSize, cut, &train);
         assert_eq!(judged(&size, &test), (1.0, 1.0), "{size:?}");
         let rule = size.sizes.unwrap();
@@ -489,17 +493,17 @@ fn colour_and_size_tell_clean_squares_apart() {
 fn what_is_fitted_beats_what_is_not_where_there_is_noise() {
     let (train, test) = (fields(3, 28.0), fields(4, 28.0));
     let [otsu, fitted] = [Cut::Otsu, Cut::Fitted].map(|cut| fit(Kind::Exg, cut, &train));
-    assert!(fitted.blur > 0.0, "noise is blurred: {fitted:?}");
+    assert!(fitted.blur > 0.0, "noise must be blurred: {fitted:?}");
     let (without, with) = (judged(&otsu, &test).1, judged(&fitted, &test).1);
     assert!(with > without + 0.05 && with > 0.6, "{with} against {without}");
-    // On its own images no threshold of the same index and blur is better.
+    // On the training images, no other threshold with the same index and blur is better.
     let best = judged(&fitted, &train).1;
     for step in -20..20 {
         let threshold = fitted.threshold.map(|t| t + 0.01 * f64::from(step));
         let other = Baseline { threshold, ..fitted.clone() };
         assert!(judged(&other, &train).1 <= best + 1e-12, "{other:?}");
     }
-    // Nor are other sizes.
+    // Neither are other sizes.
     let size = fit(Kind::ExgSize, Cut::Fitted, &train);
     let best = judged(&size, &train).0;
     for factor in [0.3, 0.5, 0.8, 1.25, 2.0, 3.0] {
@@ -528,8 +532,8 @@ fn baselines_say_what_they_cannot_learn_from() {
     assert!(said(Kind::Exg, Cut::Fitted, &[strange]).contains("has the class 3"));
     let short = Example { truth: vec![0], ..bare.clone() };
     assert!(said(Kind::ExgSize, Cut::Otsu, &[short]).contains("2 × 1 pixels has 2 colours and 1 labels"));
-    // A flat picture holds nothing that stands out, and Otsu's threshold asks no image.
-    let never = || -> Vec<furrow::Result<Example>> { panic!("nothing is to be learned") };
+    // A uniform image has no outliers, and Otsu's threshold uses no training images.
+    let never = || -> Vec<furrow_base::Result<Example>> { panic!("no training image is needed") };
     let otsu = Baseline::fit(Kind::Exg, Cut::Otsu, never).unwrap();
     assert_eq!(otsu.predict(2, 1, &bare.rgb), [0, 0]);
 }

@@ -1,41 +1,43 @@
-//! Method 12: another renderer. Fields are written for Mitsuba 3 and both programs render them.
+//! Method 12: comparison with another renderer. Fields are exported for Mitsuba 3, and both programs render them.
 //!
-//! Rationale: two programs that share no code of light transport, sampling or traversal do not make the same mistake. Expected:
-//! the same mean over each class and plant within noise, the same pixels, the same labels. Source: Mitsuba 3.9.
+//! Rationale: two programs that share no code for light transport, sampling or traversal do not make the same mistake.
+//! Expected: the same mean over each class and plant within noise, the same pixels, the same labels. Source: Mitsuba
+//! 3.9.
 //!
-//! What Mitsuba holds with its own plugins (Lambert, bare sheets, masks, sun, sky, lamps, camera) is compared without any
-//! tolerance. Fields have rough soil, wet films and coats; for those `tests/mitsuba/bsdfs.py` gives Mitsuba the formulas, written a
-//! second time. Mitsuba reads a picture on one mip level, so here ours does as well (`fix_levels`): the level of a leaf's relief
-//! decides how rough its gloss is, several percent of a leaf under lamps. Their tolerance is 0.3 %: Mitsuba starts rays 30 µm off
-//! surfaces, interpolates reflectance where ours interpolates colour, and has the grain of stones at corners only.
+//! Features that Mitsuba's own plugins support (Lambertian surfaces, bare sheets, masks, sun, sky, lamps, camera) are
+//! compared without any tolerance. Fields have rough soil, wet films and coats; for those `tests/mitsuba/bsdfs.py`
+//! provides an independent implementation of the formulas.
 //!
-//! `tests/mitsuba/check.py` says what is estimated, from what the errors follow, and how seldom it fails without a fault: once
-//! in 10⁵ for each scene.
+//! Mitsuba reads a texture at one mip level, so here our renderer does as well (`fix_levels`): the mip level of a
+//! leaf's relief determines its gloss, several percent of a leaf under lamps. The tolerance of fields is 0.3 %: Mitsuba
+//! offsets ray origins by 30 µm, interpolates reflectance where our renderer interpolates colour, and has the texture
+//! of stones only at vertices.
+//!
+//! `tests/mitsuba/check.py` documents the estimates, their errors, and the false-alarm rate: one in 10⁵ for each scene.
 
 use crate::common::program::{names, scratch, trace};
 use crate::common::python::python;
 use crate::common::scenes::{camera, shoot};
-use furrow::accel::EmbreeAccel;
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
-use furrow::film::{Film, Filter};
-use furrow::geometry::{AlphaMask, Hit, Interaction, Mesh, Window};
-use furrow::integrator::PathTracer;
-use furrow::light::{Constant, Lamp, Light, Outline, daylight};
-use furrow::material::{LeafDesc, LeafMaterial, Material, Picture};
-use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec2, vec3};
-use furrow::output;
-use furrow::render;
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Part, Scene};
-use furrow::sensor::{Camera, Distortion, Pose};
-use furrow::texture::{ColorSpace, HeightFromBrightness, Maps, Texture};
+use furrow_base::geometry::{AlphaMask, Hit, Interaction, Mesh, Window};
+use furrow_base::math::{Frame, Mat3, Spectrum, Vec3, vec2, vec3};
+use furrow_field::assemble::{self, Options};
+use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar};
+use furrow_optics::light::{Constant, Lamp, Light, Outline, daylight};
+use furrow_optics::sensor::{Camera, Distortion, Pose};
+use furrow_optics::texture::{ColorSpace, HeightFromBrightness, Maps, Texture};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::{Film, Filter};
+use furrow_render::integrator::PathTracer;
+use furrow_render::material::{LeafDesc, LeafMaterial, Material, Picture};
+use furrow_render::render;
+use furrow_render::scene::tag::{Class, Tag};
+use furrow_render::scene::{Part, Scene};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-/// A square of side 2 · `half` in z = 0, seen from above.
+/// Builds a square of side 2 · `half` in the plane z = 0, facing up.
 fn square(half: f32) -> Mesh {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let positions = corners.map(|(x, y)| vec3(x, y, 0.0) * half).to_vec();
@@ -43,7 +45,7 @@ fn square(half: f32) -> Mesh {
     Mesh::smooth(positions, uvs, vec![[0, 1, 2], [0, 2, 3]])
 }
 
-/// A mask that tells left from right and top from bottom.
+/// A mask without left-right or top-bottom symmetry.
 fn mask() -> Arc<AlphaMask> {
     Arc::new(AlphaMask::new(96, 64, |x, y| {
         let p = vec2(x as f32 / 96.0, y as f32 / 64.0) - 0.5;
@@ -51,7 +53,7 @@ fn mask() -> Arc<AlphaMask> {
     }))
 }
 
-/// Lambert soil, four tilted sheets cut by a mask over it and over one another, sun and sky.
+/// A scene of Lambertian soil with four tilted, masked sheets above it that overlap, under sun and sky.
 fn sheets() -> Scene {
     let soil = Bsdf::OrenNayar(OrenNayar::new(Spectrum::new(0.3, 0.2, 0.12, 0.4), 0.0));
     let green = Bsdf::Leaf(Leaf::bare(Spectrum::new(0.1, 0.2, 0.05, 0.45), Spectrum::new(0.08, 0.25, 0.03, 0.5)));
@@ -83,7 +85,7 @@ fn sheets() -> Scene {
     Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }
 
-/// A ball on a plane under two lamps, the optical axis far from the image's middle.
+/// A scene of a ball on a plane under two lamps, with the principal point far from the image's centre.
 fn lamps() -> Scene {
     let plane = Bsdf::OrenNayar(OrenNayar::new(Spectrum::new(0.6, 0.5, 0.4, 0.8), 0.0));
     let ball = Bsdf::OrenNayar(OrenNayar::new(Spectrum::new(0.8, 0.3, 0.3, 0.5), 0.0));
@@ -115,17 +117,17 @@ fn lamps() -> Scene {
     }
 }
 
-/// A folder below cargo's own for temporary files, emptied.
+/// Returns an emptied folder below cargo's temporary folder.
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mitsuba").join(name);
     let _ = fs::remove_dir_all(&folder);
     folder
 }
 
-/// Exports a scene, renders it, and leaves `ours.bin` as `check.py` reads it.
+/// Exports a scene, renders it with our renderer, and writes `ours.bin` in the format of `check.py`.
 fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
     let folder = folder(name);
-    output::mitsuba::write(&folder, scene, name).unwrap_or_else(|e| panic!("{name}: {e}"));
+    furrow_output::mitsuba::write(&folder, scene, name).unwrap_or_else(|e| panic!("{name}: {e}"));
     let film: Film = shoot(scene, &PathTracer::default(), spp, 5);
     let pool = render::pool(2).expect("a pool");
     let labels = pool.install(|| {
@@ -142,16 +144,17 @@ fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
     folder
 }
 
-/// One field of a page, its camera's point spread left out, its pictures read on the levels that are written.
+/// Builds a field of a scene file without the camera's point spread function, with textures read at the exported mip
+/// levels.
 fn field(page: &str, width: u32) -> Scene {
     let options = Options { width: Some(width), ..Options::default() };
     let mut field = assemble::field(Path::new(page), &options).unwrap_or_else(|e| panic!("{e}"));
     field.scene.filter = Filter::Box.footprint();
-    output::mitsuba::fix_levels(&mut field.scene);
+    furrow_output::mitsuba::fix_levels(&mut field.scene);
     field.scene
 }
 
-/// Lets Mitsuba render these scenes and compare them; `tolerance` is a share of each region's mean.
+/// Lets Mitsuba render these scenes and compare them; `tolerance` is a fraction of each region's mean.
 fn agree(python: &Path, name: &str, tolerance: f32, scenes: &[PathBuf]) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mitsuba/check.py");
     let mut command = Command::new(python);
@@ -187,16 +190,16 @@ fn mitsuba_agrees_on_fields_when_it_is_given_their_scattering() {
     agree(&python, "mitsuba-fields", 0.003, &scenes);
 }
 
-/// The text of `scene.xml` and the folder of an exported scene.
+/// Exports a scene; returns the folder and the text of `scene.xml`.
 fn exported(scene: &Scene) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().expect("a folder");
-    output::mitsuba::write(folder.path(), scene, "a test -- of <words>").expect("files");
+    furrow_output::mitsuba::write(folder.path(), scene, "a test -- of <words>").expect("files");
     let text = fs::read_to_string(folder.path().join("scene.xml")).expect("scene.xml");
     (folder, text)
 }
 
-/// Rationale: an element left open, or a quote inside a value, makes the whole scene unreadable. Expected: every element closes
-/// in order, every file named is there and no other.
+/// Rationale: an unclosed element, or a quote inside a value, makes the whole scene unreadable. Expected: every element
+/// is closed in order, and the named files are exactly those that exist.
 #[test]
 fn the_documents_are_well_formed_and_name_files_that_are_there() {
     let (folder, _) = exported(&sheets());
@@ -236,8 +239,8 @@ fn the_documents_are_well_formed_and_name_files_that_are_there() {
     assert_eq!(named, there);
 }
 
-/// Rationale: a header that promises another number of corners than follow shifts every byte behind it. Expected: header and
-/// length agree; all triangles of the scene are there.
+/// Rationale: a header with a wrong number of vertices shifts every byte after it. Expected: header and length agree;
+/// all triangles of the scene are present.
 #[test]
 fn meshes_hold_every_triangle_once() {
     let scene = sheets();
@@ -259,7 +262,7 @@ fn meshes_hold_every_triangle_once() {
     assert_eq!(triangles, scene.triangles());
 }
 
-/// Expected: white where the mask is opaque, black where not, row 0 at v = 0; parts that share a mask share a file.
+/// Expected: white where the mask is opaque, black where not, row 0 at v = 0; parts with the same mask share a file.
 #[test]
 fn masks_are_pictures_of_their_bits() {
     let (folder, text) = exported(&sheets());
@@ -276,7 +279,7 @@ fn masks_are_pictures_of_their_bits() {
     }
 }
 
-/// A large and a small leaf of one material and plant, 1 m below the camera.
+/// A large and a small leaf of the same material and plant, 1 m below the camera.
 fn large_and_small() -> Scene {
     let texels: Vec<u8> = (0..64 * 64_u32).flat_map(|i| [(i * 37 % 101) as u8 + 40, 120, 30, 255]).collect();
     let color = Texture::from_rgba8(64, 64, &texels, ColorSpace::Srgb);
@@ -299,9 +302,9 @@ fn large_and_small() -> Scene {
     Scene { parts, materials: vec![Material::Leaf(leaf)], lights, camera, filter: Filter::Box.footprint() }
 }
 
-/// Rationale: the relief of a small leaf that is written as finely as a large one's makes another gloss than the camera sees: 5 %
-/// in blue on leaves under lamps. Expected: a quarter of the size, two levels coarser: 16 texels where the large leaf has 64 / 2
-/// (a pixel covers 6 mm, a texel 3 mm).
+/// Rationale: if the relief of a small leaf is exported at the resolution of a large one, its gloss differs from that
+/// seen by the camera: 5 % in blue on leaves under lamps. Expected: at a quarter of the size, two mip levels coarser:
+/// the large leaf has 64 / 2 = 32 texels (a pixel covers 6 mm, a texel 3 mm), the small one 8.
 #[test]
 fn pictures_are_written_on_the_level_of_each_organ() {
     let (folder, _) = exported(&large_and_small());
@@ -310,10 +313,10 @@ fn pictures_are_written_on_the_level_of_each_organ() {
         .iter()
         .filter(|name| name.ends_with("-normal.exr"))
         .map(|name| {
-            let bytes = fs::read(folder.path().join("textures").join(name)).expect("a picture");
+            let bytes = fs::read(folder.path().join("textures").join(name)).expect("an image");
             let at = bytes.windows(11).position(|w| w == b"dataWindow\0").expect("a window");
             let number = |i: usize| i32::from_le_bytes(bytes[at + i..at + i + 4].try_into().expect("four bytes"));
-            // Behind the name: type, length, then x0, y0, x1, y1.
+            // After the name: type, length, then x0, y0, x1, y1.
             let begin = 11 + b"box2i\0".len() + 4;
             [number(begin + 8) - number(begin) + 1, number(begin + 12) - number(begin + 4) + 1].map(|n| n as u32)
         })
@@ -321,7 +324,7 @@ fn pictures_are_written_on_the_level_of_each_organ() {
     assert_eq!(sizes, [[32, 32], [8, 8]], "{pictures:?}");
 }
 
-/// Expected: what `fix_levels` changes for our rays is what is written anyway; it leaves them one level whatever their width.
+/// Expected: `fix_levels` does not change the export; our rays then use one mip level, whatever their width.
 #[test]
 fn fixed_levels_are_those_that_are_written() {
     let mut fixed = large_and_small();
@@ -332,12 +335,12 @@ fn fixed_levels_are_those_that_are_written() {
         scene.materials[part.material as usize].scatter(&at, Vec3::Z).1.z
     };
     assert_ne!(normal(&fixed, 1e-4), normal(&fixed, 0.05));
-    output::mitsuba::fix_levels(&mut fixed);
+    furrow_output::mitsuba::fix_levels(&mut fixed);
     assert_eq!(normal(&fixed, 1e-4), normal(&fixed, 0.05));
-    assert!(files(free.path()) == files(exported(&fixed).0.path()), "fixing the levels changed what is written");
+    assert!(files(free.path()) == files(exported(&fixed).0.path()), "fixing the mip levels changed the export");
 }
 
-/// Names and bytes of the files of an exported scene.
+/// Names and contents of the files of an exported scene.
 fn files(of: &Path) -> Vec<(String, Vec<u8>)> {
     ["", "meshes", "textures"]
         .iter()
@@ -354,11 +357,11 @@ fn equal_exports_are_equal_bytes() {
     assert!(files(a.path()) == files(b.path()), "two exports of one scene differ");
 }
 
-/// Expected: what Mitsuba cannot hold is said; what it can is not complained about.
+/// Expected: features that Mitsuba does not support are reported, and supported ones cause no warning.
 #[test]
 fn what_is_lost_is_said() {
     let (folder, _) = exported(&sheets());
-    let quiet = output::mitsuba::write(folder.path(), &sheets(), "").expect("files").warnings;
+    let quiet = furrow_output::mitsuba::write(folder.path(), &sheets(), "").expect("files").warnings;
     assert_eq!(quiet, Vec::<String>::new());
     let mut scene = sheets();
     let distortion = Distortion { k1: -0.05, ..Distortion::default() };
@@ -366,12 +369,12 @@ fn what_is_lost_is_said() {
         Camera::new((60, 40), [80.0, 81.0], [30.0, 20.0], distortion, *scene.camera.pose()).expect("a camera");
     scene.materials[0] = Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(0.3), 0.4)));
     scene.filter = Filter::Gaussian(0.4).footprint();
-    let warnings = output::mitsuba::write(folder.path(), &scene, "").expect("files").warnings.join("\n");
+    let warnings = furrow_output::mitsuba::write(folder.path(), &scene, "").expect("files").warnings.join("\n");
     for word in ["distortion", "square", "Gaussian", "Oren–Nayar"] {
         assert!(warnings.contains(word), "{word} in {warnings}");
     }
     let text = fs::read_to_string(folder.path().join("scene.xml")).expect("scene.xml");
-    assert!(text.contains("distortion"), "the file says it too");
+    assert!(text.contains("distortion"), "the file must mention it too");
 }
 
 #[test]
@@ -411,8 +414,9 @@ fn exports_that_cannot_work_end_with_code_2_and_write_nothing() {
     assert_eq!(fs::read_to_string(&out).expect("the file"), "a file");
 }
 
-/// Rationale: people look at `scene.xml` in Mitsuba and time it there; what its own plugins lack must not make it darker or brighter. Expected: the mean
-/// of an image within 1 % of that of `scene-exact.xml`, whose scattering is ours. Source: Mitsuba, with and without our plugins.
+/// Rationale: users view and benchmark `scene.xml` in Mitsuba; the limits of its own plugins must not change the
+/// brightness. Expected: the mean of an image within 1 % of that of `scene-exact.xml`, which uses our BSDFs. Source:
+/// Mitsuba, with and without our plugins.
 #[test]
 fn scenes_with_mitsubas_own_plugins_are_as_bright() {
     let Some(python) = python(PROBE) else { return };

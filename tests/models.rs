@@ -1,23 +1,25 @@
-//! Models: what is exported as glTF comes back, what others wrote is read, what is broken is refused.
+//! Models: exported glTF files are read back, files of other programs are read, and broken files are refused.
 //!
-//! Rationale: labels and geometry that change on their way through a file are worse than none, and files from the wild hold
-//! anything. Expected: corners, normals, texture coordinates, triangles, masks and labels of an exported field are equal bit for
-//! bit after reading, and so is its label map; colours are within the steps of eight bits; no bytes make the reader panic.
-//! Source: glTF 2.0 specification; Wavefront OBJ as its writers write it. The `gltf` crate, which shares no code with the
-//! program, checks what is written.
+//! Rationale: labels and geometry that change on their way through a file are worse than none, and files from other
+//! sources may contain anything.
+//!
+//! Expected: vertices, normals, texture coordinates, triangles, masks and labels of an exported field, and its label
+//! map, are bit-identical after reading; colours are within the precision of eight bits; no bytes make the reader
+//! panic. Source: glTF 2.0 specification; Wavefront OBJ as common programs write it. The `gltf` crate, which shares no
+//! code with the program, checks the exported files.
 
 use crate::common::pictures;
 use crate::common::program::{self, hash, scratch, shoot, small_text, trace};
-use furrow::error::Kind;
-use furrow::geometry::Mesh;
-use furrow::light::Light;
-use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
-use furrow::model::{Model, Up, glb};
-use furrow::output;
-use furrow::render::LabelMap;
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::tag::Class;
-use furrow::scene::{Field, Part};
+use furrow_base::error::Kind;
+use furrow_base::geometry::Mesh;
+use furrow_base::math::{Spectrum, Vec2, Vec3, vec2, vec3};
+use furrow_field::Field;
+use furrow_field::assemble::{self, Options};
+use furrow_grow::model::{Model, Up, glb};
+use furrow_optics::light::Light;
+use furrow_render::render::LabelMap;
+use furrow_render::scene::Part;
+use furrow_render::scene::tag::Class;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use sha2::Digest;
@@ -26,18 +28,18 @@ use std::sync::OnceLock;
 
 const CAMERA: &str = "Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.45, yaw_deg: 12, pitch_deg: 6))";
 
-/// The small page's field, and its file.
+/// The field of the small scene file, and its exported file.
 fn small() -> &'static (Field, Vec<u8>) {
     static SMALL: OnceLock<(Field, Vec<u8>)> = OnceLock::new();
     SMALL.get_or_init(|| {
         let field = program::field(&small_text(), &Options::default());
-        let (bytes, _) = output::gltf::encode(&field.scene, &[], &field.provenance()).unwrap();
+        let (bytes, _) = furrow_output::gltf::encode(&field.scene, &[], &field.provenance()).unwrap();
         (field, bytes)
     })
 }
 
-/// A field of nothing but what `models` says, on a page in `folder`.
-fn placed(folder: &Path, models: &str) -> furrow::Result<Field> {
+/// Builds a field that contains only `models`, from a scene file in `folder`.
+fn placed(folder: &Path, models: &str) -> furrow_base::Result<Field> {
     let page = folder.join("page.ron");
     let text =
         format!("Field(seed: 3, camera: {CAMERA}, lights: [Constant(radiance: (1, 1, 1, 1))], models: [{models}])");
@@ -64,23 +66,24 @@ fn an_exported_field_reads_back_bit_for_bit_with_the_same_label_map() {
     let again = placed(&folder, "(file: \"scene.glb\")").unwrap_or_else(|e| panic!("{e}"));
     let there: Vec<&Part> = field.scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()).collect();
     assert_eq!(there.len(), again.scene.parts.len());
-    assert!(there.iter().any(|p| p.mask.is_some()), "a field with masks tests more");
+    assert!(there.iter().any(|p| p.mask.is_some()), "the field must contain masks");
     for (i, (a, b)) in there.iter().zip(&again.scene.parts).enumerate() {
-        assert!(bits(&a.mesh) == bits(&b.mesh), "the mesh of part {i} has changed");
+        assert!(bits(&a.mesh) == bits(&b.mesh), "mesh of part {i} changed");
         assert_eq!(a.tag, b.tag, "part {i}");
-        assert!(a.mask == b.mask, "the mask of part {i} has changed");
+        assert!(a.mask == b.mask, "mask of part {i} changed");
     }
     let (before, after) = (shoot(field, 1, 2).1, shoot(&again, 1, 2).1);
     pictures::same("gltf-labels", before.window.width(), &numbers(&after), &numbers(&before));
     assert_eq!(hash(numbers(&before)), hash(numbers(&after)));
-    assert!(numbers(&after).iter().any(|n| *n > 0), "nothing was labelled");
-    // Its plants are known by the numbers that they had.
+    assert!(numbers(&after).iter().any(|n| *n > 0), "no pixel is labelled");
+    // Its plants keep their numbers.
     let seen: Vec<u32> = again.plants.iter().map(|p| p.number).collect();
     assert_eq!(seen, field.plants.iter().map(|p| p.number).collect::<Vec<_>>());
 }
 
-/// Expected: reflectance and transmittance of the texels that are there within 2 % and a step of eight bits, in one of a hundred within a fifth: the brightest
-/// ones of a picture that plants of many tints wear, whose parts of light that pass and come back glTF holds beside each other; near infrared exactly.
+/// Expected: the reflectance and transmittance of visible texels within 2 % and one 8-bit step; for up to one in a
+/// hundred within 20 %, the brightest texels of a texture shared by plants of many tints, because glTF stores reflected
+/// and transmitted light together; near infrared exactly.
 #[test]
 fn colours_and_transmission_survive_the_way_through_the_file() {
     let (field, bytes) = small();
@@ -111,7 +114,7 @@ fn colours_and_transmission_survive_the_way_through_the_file() {
             texels += 1;
             passed += usize::from(transmitted.max_element() > 0.05);
         }
-        let nir = |m: furrow::material::swatch::Tone| vec2(m.reflectance.0.w, m.transmittance.0.w);
+        let nir = |m: furrow_render::material::swatch::Tone| vec2(m.reflectance.0.w, m.transmittance.0.w);
         assert!((nir(a.mean) - nir(b.mean)).length() < 0.01, "{:?} became {:?}", a.mean, b.mean);
     }
     assert!(texels > 1000 && passed > 300 && 100 * cut < texels, "{texels} {passed} {cut}");
@@ -120,11 +123,11 @@ fn colours_and_transmission_survive_the_way_through_the_file() {
 #[test]
 fn the_exported_file_is_the_same_bytes_every_time() {
     let again = program::field(&small_text(), &Options::default());
-    let (bytes, _) = output::gltf::encode(&again.scene, &[], &again.provenance()).unwrap();
-    assert!(bytes == small().1, "addresses or hash maps have found their way into the file");
+    let (bytes, _) = furrow_output::gltf::encode(&again.scene, &[], &again.provenance()).unwrap();
+    assert!(bytes == small().1, "the file depends on addresses or hash order");
 }
 
-/// Expected: another reader finds it valid, and in it our camera, sun, labels and cut-out materials.
+/// Expected: another reader accepts the file, and finds our camera, sun, labels and masked materials in it.
 #[test]
 fn another_reader_finds_camera_sun_labels_and_masks() {
     let (field, bytes) = small();
@@ -135,7 +138,7 @@ fn another_reader_finds_camera_sun_labels_and_masks() {
     let (w, h) = (96.0, 72.0);
     assert!((f64::from(lens.yfov()) - 2.0 * (h / 2.0 / fy).atan()).abs() < 1e-6);
     assert!((f64::from(lens.aspect_ratio().unwrap()) - w * fy / (h * fx)).abs() < 1e-6);
-    // In the file y is up: the camera hangs at (x, height, −y), looking down along its own −z.
+    // The file's up axis is y: the camera is at (x, height, −y) and looks along its own −z.
     let root = file.default_scene().unwrap().nodes().next().unwrap();
     let up = |v: Vec3| vec3(v.x, v.z, -v.y);
     let to = |m: [[f32; 4]; 4], v: [f32; 4]| {
@@ -154,14 +157,14 @@ fn another_reader_finds_camera_sun_labels_and_masks() {
     let shines = to(node.transform().matrix(), [0.0, 0.0, -1.0, 0.0]);
     assert!((shines + sun.direction()).length() < 1e-6);
     let lux = node.light().unwrap().intensity();
-    assert!((30_000.0..120_000.0).contains(&lux), "{lux} lx is no sun");
+    assert!((30_000.0..120_000.0).contains(&lux), "{lux} lx is not the illuminance of the sun");
     // Labels and masks.
     let extras: Value = serde_json::from_str(root.children().next().unwrap().extras().as_ref().unwrap().get()).unwrap();
     assert_eq!(extras, json!({ "class": "soil", "plant": 0, "leaf": 0 }));
     let cut = file.materials().filter(|m| m.alpha_mode() == gltf::material::AlphaMode::Mask);
     for material in cut {
         assert!(material.double_sided() && material.alpha_cutoff() == Some(0.5));
-        assert!(material.extension_value("KHR_materials_diffuse_transmission").is_some(), "leaves let light through");
+        assert!(material.extension_value("KHR_materials_diffuse_transmission").is_some(), "leaves must transmit light");
         let texture = material.pbr_metallic_roughness().base_color_texture().unwrap().texture();
         assert_eq!(texture.sampler().mag_filter(), Some(gltf::texture::MagFilter::Nearest));
     }
@@ -182,7 +185,7 @@ fn the_program_exports_a_scene_and_says_what_is_missing() {
     assert!(said.contains("no sky"), "{said}");
 }
 
-/// A square of two triangles in OBJ: corners at y = 0 and 1, so that what is up shows.
+/// An OBJ square of two triangles with corners at y = 0 and 1, so that the up axis is visible.
 const SQUARE: &str = "mtllib square.mtl\no square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
     usemtl leaf\nf 1/1 2/2 3/3 4/4\n";
 
@@ -193,9 +196,9 @@ fn write(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
     path
 }
 
-/// A grey picture of 2 × 2, white in the top row only.
+/// Writes a grey 2 × 2 image whose top row is white.
 fn picture(folder: &Path, name: &str) {
-    output::write_png(&folder.join(name), 2, 2, &output::Picture::Gray(&[255, 255, 0, 0]), "").unwrap();
+    furrow_output::write_png(&folder.join(name), 2, 2, &furrow_output::Picture::Gray(&[255, 255, 0, 0]), "").unwrap();
 }
 
 #[test]
@@ -210,11 +213,11 @@ fn an_obj_file_is_read_with_its_materials_and_masks() {
         assert_eq!(sha2::Sha256::digest(std::fs::read(file).unwrap()).as_slice(), digest, "{}", file.display());
     }
     let part = &model.parts[0];
-    // v runs up in the file: the corner at its (0, 1) is our (0, 0), the picture's top left.
+    // v increases upwards in the file: its (0, 1) is our (0, 0), the top left of the image.
     let corner = |uv: Vec2| part.mesh.uvs.iter().position(|t| *t == uv).map(|i| part.mesh.positions[i]);
     assert_eq!(corner(vec2(0.0, 0.0)), Some(vec3(0.0, 0.0, 1.0)));
     assert_eq!(corner(vec2(1.0, 1.0)), Some(vec3(1.0, 0.0, 0.0)));
-    // Without normals of its own it faces as its triangles do: +z of the file is south.
+    // Without stored normals, the triangles' normals are used: the file's +z is south.
     assert!(part.mesh.normals.iter().all(|n| (*n - vec3(0.0, -1.0, 0.0)).length() < 1e-6));
     let look = &model.surfaces[part.surface];
     assert_eq!(look.color, [0.1, 0.3, 0.05]);
@@ -225,7 +228,8 @@ fn an_obj_file_is_read_with_its_materials_and_masks() {
     assert!(as_it_is.parts[0].mesh.positions.contains(&vec3(1.0, 1.0, 0.0)));
 }
 
-/// A document with one triangle in a buffer beside it: positions, coordinates as normalised bytes, indices as bytes.
+/// A glTF document with one triangle in an external buffer: positions, texture coordinates as normalised bytes, indices
+/// as bytes.
 fn triangle(extra: impl FnOnce(&mut Value)) -> (Value, Vec<u8>) {
     let mut bytes: Vec<u8> =
         [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0].iter().flat_map(|f| f.to_le_bytes()).collect();
@@ -252,7 +256,7 @@ fn triangle(extra: impl FnOnce(&mut Value)) -> (Value, Vec<u8>) {
     (document, bytes)
 }
 
-fn load(folder: &Path, (document, bytes): (Value, Vec<u8>)) -> furrow::Result<Model> {
+fn load(folder: &Path, (document, bytes): (Value, Vec<u8>)) -> furrow_base::Result<Model> {
     write(folder, "the bytes.bin", bytes);
     Model::load(&write(folder, "model.gltf", document.to_string()), Up::Y)
 }
@@ -283,13 +287,13 @@ fn nodes_turn_scale_and_mirror_what_hangs_on_them() {
     )
     .unwrap();
     let mesh = &model.parts[0].mesh;
-    // A quarter turn about the upright takes x to −z (north) and −z to −x (west); 2 m up.
+    // A quarter turn about the vertical axis takes x to −z (north) and −z to −x (west); 2 m up.
     let corners = [vec3(0.0, 0.0, 2.0), vec3(0.0, -2.0, 2.0), vec3(-1.0, 0.0, 2.0)];
     for (is, should) in mesh.positions.iter().zip(corners) {
         assert!((*is - should).length() < 1e-6, "{is} {should}");
     }
     let [a, b, c] = mesh.triangles[0].map(|i| mesh.positions[i as usize]);
-    assert!((b - a).cross(c - a).z > 0.0, "a mirrored surface still faces outwards");
+    assert!((b - a).cross(c - a).z > 0.0, "a mirrored surface must still face outwards");
     assert!(mesh.normals.iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
 }
 
@@ -298,7 +302,7 @@ fn opacity_is_cut_where_the_file_says() {
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     let texels = [[255, 0, 0, 255], [255, 0, 0, 200], [255, 0, 0, 100], [255, 0, 0, 0]];
-    output::write_png(&folder.join("cut.png"), 2, 2, &output::Picture::Rgba(&texels), "").unwrap();
+    furrow_output::write_png(&folder.join("cut.png"), 2, 2, &furrow_output::Picture::Rgba(&texels), "").unwrap();
     let there = |mode: &str, cutoff: f32| {
         let document = triangle(|d| {
             d["meshes"][0]["primitives"][0]["material"] = json!(0);
@@ -341,7 +345,10 @@ fn a_page_gives_class_place_size_and_number() {
     let tone = field.scene.materials[weed.material as usize].swatch().mean;
     assert!((tone.transmittance.0 - Spectrum::new(0.05, 0.1, 0.02, 0.4).0).abs().max_element() < 1e-6);
     assert!((tone.reflectance.0 - Spectrum::new(0.1, 0.3, 0.05, 0.5).0).abs().max_element() < 1e-6);
-    assert!(placed(&folder, "(file: \"square.obj\", class: Crop, scale: 1e9)").is_err(), "no field is that large");
+    assert!(
+        placed(&folder, "(file: \"square.obj\", class: Crop, scale: 1e9)").is_err(),
+        "a model of that size must be refused"
+    );
 }
 
 #[test]
@@ -359,7 +366,7 @@ fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
     let field =
         assemble::field(&page, &Options { width: Some(32), ..Options::default() }).unwrap_or_else(|e| panic!("{e}"));
     let bare = program::field(&small_text(), &Options { width: Some(32), ..Options::default() });
-    assert_eq!(field.plants[..bare.plants.len()], bare.plants[..], "a model moves no plant");
+    assert_eq!(field.plants[..bare.plants.len()], bare.plants[..], "a model must not move any plant");
     let model = field.plants.last().unwrap();
     assert!(model.number > bare.plants.last().unwrap().number);
     let ground = field.scene.parts[0].mesh.positions.iter();
@@ -380,13 +387,13 @@ fn what_a_model_needs_counts_into_the_scenes_hash() {
     };
     let first = hash("0.1 0.3 0.05");
     assert_eq!(first, hash("0.1 0.3 0.05"));
-    assert_ne!(first, hash("0.1 0.3 0.06"), "the materials beside the model are part of the scene");
+    assert_ne!(first, hash("0.1 0.3 0.06"), "the material file must be part of the hash");
 }
 
-/// A change to a document.
+/// An edit of a document.
 type Edit = Box<dyn FnOnce(&mut Value)>;
 
-/// What a page is told whose model is broken.
+/// Returns the error message for a scene file with a broken model.
 fn refused(folder: &Path, name: &str) -> String {
     let Err(error) = placed(folder, &format!("(file: \"{name}\", class: Weed)")) else { panic!("{name} was read") };
     assert_eq!(error.exit_code(), 2, "{error}");
@@ -424,21 +431,21 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
         move |d: &mut Value| *d.pointer_mut(&at).unwrap() = value
     };
     let edits: Vec<(Edit, &str)> = vec![
-        (Box::new(far("/nodes/0/mesh", json!(7))), "mesh 7 is named"),
-        (Box::new(far("/meshes/0/primitives/0/indices", json!(9))), "accessor 9 is named"),
+        (Box::new(far("/nodes/0/mesh", json!(7))), "mesh 7 is referenced"),
+        (Box::new(far("/meshes/0/primitives/0/indices", json!(9))), "accessor 9 is referenced"),
         (Box::new(far("/accessors/0/count", json!(4))), "reaches past its bytes"),
         (Box::new(far("/accessors/0/count", json!(u64::MAX))), "reaches past its bytes"),
         (Box::new(far("/accessors/1/count", json!(2))), "2 texture coordinates"),
         (Box::new(far("/bufferViews/0/byteLength", json!(u64::MAX))), "reaches past its bytes"),
         (Box::new(far("/bufferViews/0/byteOffset", json!(u64::MAX))), "reaches past its bytes"),
         (Box::new(far("/buffers/0/byteLength", json!(1_u64 << 50))), "has 48 of its"),
-        (Box::new(far("/buffers/0/uri", json!("gone.bin"))), "`gone.bin`, which is not there"),
+        (Box::new(far("/buffers/0/uri", json!("gone.bin"))), "`gone.bin`, which does not exist"),
         (Box::new(far("/buffers/0/uri", json!("https://a.b/c.bin"))), "only files can be read"),
         (Box::new(far("/asset/version", json!("1.0"))), "glTF 2.0 can be read"),
         (Box::new(far("/accessors/0/type", json!("VEC4"))), "VEC3 is needed"),
         (Box::new(far("/accessors/0/componentType", json!(1))), "unknown component type"),
         (Box::new(|d| d["nodes"] = json!([{ "mesh": 0, "children": [0] }])), "two parents"),
-        (Box::new(|d| d["bufferViews"][2]["byteOffset"] = json!(33)), "names corner"),
+        (Box::new(|d| d["bufferViews"][2]["byteOffset"] = json!(33)), "refers to vertex"),
         (Box::new(|d| d["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])), "KHR_draco_mesh_compression"),
         (Box::new(|d| d["meshes"][0]["primitives"][0]["mode"] = json!(0)), "no triangles"),
         (Box::new(|d| d["nodes"][0]["scale"] = json!([1e300, 1, 1])), "not a finite number"),
@@ -448,7 +455,7 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
                 d["textures"] = json!([{ "source": 0 }]);
                 d["images"] = json!([{ "uri": "no such.png" }]);
             }),
-            "`no such.png`, which is not there",
+            "`no such.png`, which does not exist",
         ),
     ];
     for (edit, word) in edits {
@@ -462,9 +469,9 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
     bytes[4..8].copy_from_slice(&f32::NAN.to_le_bytes());
     write(&folder, "the bytes.bin", bytes);
     write(&folder, "model.gltf", document.to_string());
-    assert!(refused(&folder, "model.gltf").contains("corner 0 of `stone` is not a finite number"));
+    assert!(refused(&folder, "model.gltf").contains("vertex 0 of `stone` is not a finite number"));
     for (text, word) in [
-        (SQUARE.replace("square.mtl", "gone.mtl"), "`gone.mtl`, which is not there"),
+        (SQUARE.replace("square.mtl", "gone.mtl"), "`gone.mtl`, which does not exist"),
         (SQUARE.replace("4/4", "5/4"), "out of bounds"),
         (SQUARE.replace("v 1 1 0", "v 1 NaN 0"), "not a finite number"),
         (SQUARE.replace("v 1 1 0", "v one 1 0"), "position parse error"),
@@ -477,8 +484,9 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
     }
 }
 
-/// Rationale: models come from other people, and what they name is read into images and datasets. Expected: a path out of the model's
-/// folder is refused in every spelling, before what lies there is looked at; `allow_outside` lifts that for a model of one's own.
+/// Rationale: models come from other people, and the files they name are read into images and datasets. Expected: a
+/// path out of the model's folder is refused in every spelling, before the file is accessed; `allow_outside` permits
+/// such paths for trusted models.
 #[test]
 fn a_model_names_no_file_outside_its_folder_unless_that_is_allowed() {
     let (_keep, around) = scratch();
@@ -523,10 +531,10 @@ fn a_model_names_no_file_outside_its_folder_unless_that_is_allowed() {
             field.files.iter().any(|file| file.ends_with("leaf.png") || file.ends_with("square.mtl"))
         }));
     }
-    // Not even whether it is there is told.
+    // The message does not reveal whether the file exists.
     let words = refused(&folder, pictured("../no such.png"));
-    assert!(words.contains("does not lie in the folder") && !words.contains("is not there"), "{words}");
-    // Below its folder, also by a detour.
+    assert!(words.contains("does not lie in the folder") && !words.contains("does not exist"), "{words}");
+    // Paths below the model's folder are accepted, also with `..` inside it.
     std::fs::create_dir_all(folder.join("textures")).unwrap();
     picture(&folder.join("textures"), "leaf.png");
     for uri in ["textures/leaf.png", "./textures/../textures/leaf.png"] {
@@ -534,7 +542,7 @@ fn a_model_names_no_file_outside_its_folder_unless_that_is_allowed() {
     }
 }
 
-/// What reads a file of these bytes: a model, or an error that says something.
+/// Reads a file of these bytes: the result is a model or a meaningful error.
 fn read_as(name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = tempfile::tempdir().unwrap();
     let path = write(folder.path(), name, bytes);

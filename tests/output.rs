@@ -1,17 +1,17 @@
-//! Files hold what they promise, or are not there.
+//! Output files have the documented contents, or do not exist.
 //!
-//! Rationale: what is written is all that anyone else sees. Expected: the EXR has the documented channels with the film's and the
-//! labels' numbers and says where it comes from; PNGs hold no clock time and no path; a folder that cannot be written and a disk
-//! that is full give a clear error, exit code 1 and no half-written file.
-//! Source: the documentation of `output` and `output::exr`.
+//! Rationale: the written files are all that users see. Expected: the EXR has the documented channels with the film's
+//! and the labels' values and records its provenance; PNGs contain no time and no path; a folder that is not writable
+//! and a full disk give a clear error, a non-zero exit code and no partial file. Source: the documentation of `output`
+//! and `furrow_output::exr`.
 
 use crate::common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, small_text, trace};
 use exr::prelude::*;
-use furrow::film::Film;
-use furrow::math::Spectrum;
-use furrow::output::{self, Provenance, Spp};
-use furrow::render::{LabelMap, label::NONE};
-use furrow::scene::assemble::Options;
+use furrow_base::math::Spectrum;
+use furrow_field::assemble::Options;
+use furrow_output::{Provenance, Spp};
+use furrow_render::film::Film;
+use furrow_render::render::{LabelMap, label::NONE};
 use std::collections::BTreeMap;
 use std::path::Path as File;
 
@@ -27,18 +27,21 @@ fn provenance(hash: &str) -> Provenance {
     }
 }
 
-/// The small page's image, in memory and on disk.
+/// Renders the small scene; returns its image in memory and on disk.
 fn written() -> (tempfile::TempDir, std::path::PathBuf, Film, LabelMap, Provenance) {
     let field = field(&small_text(), &Options { width: Some(64), ..Options::default() });
     let (film, labels) = shoot(&field, 3, 2);
     let provenance = provenance(&field.hash);
     let (keep, out) = scratch();
-    output::write_files(&out, &output::image_files(&film, &labels, &field.photograph(&film), &provenance).unwrap())
-        .unwrap();
+    furrow_output::write_files(
+        &out,
+        &furrow_output::image_files(&film, &labels, &field.photograph(&film), &provenance).unwrap(),
+    )
+    .unwrap();
     (keep, out, film, labels, provenance)
 }
 
-/// f32, f16 widened to f32, or u32.
+/// Samples of a channel: f32, f16 widened to f32, or u32.
 #[derive(Debug, PartialEq)]
 enum Samples {
     Whole(Vec<u32>),
@@ -46,7 +49,7 @@ enum Samples {
     Half(Vec<f32>),
 }
 
-/// Channels by name, and the header's comment.
+/// Reads the channels by name, and the comment of the header.
 fn channels(path: &File) -> (BTreeMap<String, Samples>, String) {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let layer = image.from_file(path).unwrap().layer_data;
@@ -85,12 +88,12 @@ fn the_exr_holds_the_film_and_the_labels() {
         other => panic!("{name} is not f16: {other:?}"),
     };
     for (band, name) in Spectrum::NAMES.iter().enumerate() {
-        let of = |f: fn(&furrow::film::Pixel) -> Spectrum| {
+        let of = |f: fn(&furrow_render::film::Pixel) -> Spectrum| {
             film.pixels.iter().map(|p| f(p).to_array()[band]).collect::<Vec<_>>()
         };
-        assert_eq!(single(name), &of(|p| p.mean), "{name} is the film's mean, to the bit");
+        assert_eq!(single(name), &of(|p| p.mean), "{name} must equal the film's mean bit for bit");
         assert_eq!(single(&format!("variance.{name}")), &of(|p| p.variance));
-        assert!(single(name).iter().all(|v| v.is_finite() && *v >= 0.0), "{name} is finite and not negative");
+        assert!(single(name).iter().all(|v| v.is_finite() && *v >= 0.0), "{name} must be finite and not negative");
         assert!(single(&format!("variance.{name}")).iter().all(|v| v.is_finite() && *v >= 0.0));
         for (stored, kept) in half(&format!("albedo.{name}")).iter().zip(of(|p| p.albedo)) {
             assert!((stored - kept).abs() <= 1e-3 * kept + 1e-7 && *stored <= 1.01, "albedo {stored} for {kept}");
@@ -103,8 +106,8 @@ fn the_exr_holds_the_film_and_the_labels() {
     }
     let depth: Vec<f32> = film.pixels.iter().map(|p| p.depth).collect();
     assert_eq!(single("depth.Z"), &depth);
-    assert!(depth.iter().all(|d| *d > 0.0), "nothing lies behind the camera");
-    let ids = |f: fn(&furrow::scene::tag::Tag) -> u32| Samples::Whole(labels.tags.iter().map(f).collect());
+    assert!(depth.iter().all(|d| *d > 0.0), "nothing may be behind the camera");
+    let ids = |f: fn(&furrow_render::scene::tag::Tag) -> u32| Samples::Whole(labels.tags.iter().map(f).collect());
     assert_eq!(channels["id.class"], ids(|t| t.class as u32));
     assert_eq!(channels["id.plant"], ids(|t| t.plant));
     assert_eq!(channels["id.leaf"], ids(|t| u32::from(t.leaf)));
@@ -113,7 +116,7 @@ fn the_exr_holds_the_film_and_the_labels() {
     assert!(bits(&film).iter().any(|b| *b != 0));
 }
 
-/// The text chunks of a PNG; any chunk that is not pixels, palette or colour space counts as text.
+/// Returns the text chunks of a PNG: all chunks except pixels, palette and colour space.
 fn text_of(path: &File) -> Vec<(String, String)> {
     let bytes = std::fs::read(path).unwrap();
     let mut at = 8;
@@ -149,7 +152,7 @@ fn a_pngs_text_tells_its_origin_but_no_path_and_no_time() {
     }
 }
 
-/// Expected: exit code 2, for the command must change; the path on stderr, nothing on stdout.
+/// Expected: exit code 2, because the command must change; the path on stderr, nothing on stdout.
 #[test]
 fn a_folder_that_cannot_be_made_is_a_clear_error() {
     let (keep, _) = scratch();
@@ -161,7 +164,7 @@ fn a_folder_that_cannot_be_made_is_a_clear_error() {
         let output = trace(&args).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
-        assert!(error.contains(file.to_str().unwrap()), "which path? {error}");
+        assert!(error.contains(file.to_str().unwrap()), "no path in: {error}");
         assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
         assert_eq!(names(keep.path()), ["file"]);
@@ -169,15 +172,15 @@ fn a_folder_that_cannot_be_made_is_a_clear_error() {
     }
 }
 
-/// Rationale: disks fill up in the middle of a file. The shell's limit on a file's size fails a write in the same way. Expected:
-/// an error about the file, exit code 1; an image that was there before stays as it was, none of its files is replaced; where there was
-/// none there is none, and no temporary file stays.
+/// Rationale: disks fill up in the middle of a file; the shell's limit on file sizes makes writes fail in the same way.
+/// Expected: an error that names the file, exit code 1; an existing image is unchanged, with none of its files
+/// replaced; otherwise no file and no temporary file is left.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_leaves_no_half_written_file() {
     let (_keep, out) = scratch();
     let program = env!("CARGO_BIN_EXE_trace");
-    // Blocks of 512 or 1024 bytes: enough for the pictures of 64 × 48 pixels, not for the radiance.
+    // Blocks of 512 or 1024 bytes: enough for the PNGs of 64 × 48 pixels, but not for the radiance.
     let script = format!(
         "trap '' XFSZ; ulimit -f 24; exec '{program}' --scene {SMALL} --spp 1 --width 64 --out '{}'",
         out.display()
@@ -197,15 +200,15 @@ fn a_full_disk_leaves_no_half_written_file() {
     let before = read();
     refused();
     assert_eq!(names(&out), FILES);
-    assert!(read() == before, "two fields are mixed in one folder");
+    assert!(read() == before, "files of two fields are mixed in one folder");
 }
 
 #[test]
 fn a_file_is_replaced_whole() {
     let (_keep, out) = scratch();
     let path = out.join("deep").join("file");
-    output::write_atomically(&path, b"first, and long").unwrap();
-    output::write_atomically(&path, b"second").unwrap();
+    furrow_output::write_atomically(&path, b"first, and long").unwrap();
+    furrow_output::write_atomically(&path, b"second").unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), b"second");
     assert_eq!(names(path.parent().unwrap()), ["file"]);
 }

@@ -1,19 +1,23 @@
 //! `trace dataset --pack`: images in tar archives instead of folders, and the tables of images and plants.
 //!
-//! Rationale: a million small files are more than many file systems bear, so images lie in archives; then all that a dataset promises must
-//! hold of these: bytes that depend on nothing but the recipe, kills that lose nothing, checks that see every changed byte. Expected: the
-//! archives hold the files of the same dataset in folders, byte for byte; however it was made, cut up, killed, made longer or mended, its
-//! files are those of one run. Source: the dataset in folders; the packages `webdataset`, `datasets`, pandas, polars and DuckDB as readers.
+//! Rationale: many file systems cannot handle a million small files, so images are stored in archives. All guarantees
+//! of a dataset must hold for these as well: the bytes depend only on the recipe, kills lose nothing, checks detect
+//! every changed byte.
+//!
+//! Expected: the archives contain the files of the same dataset in folders, byte for byte; however it was generated,
+//! sharded, killed, extended or repaired, its files are those of one run. Source: the dataset in folders; the packages
+//! `webdataset`, `datasets`, pandas, polars and DuckDB as readers.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::{ask, python, torch_with};
-use furrow::compare::gap;
-use furrow::dataset::classes::Classes;
-use furrow::dataset::{Set, native};
-use furrow::output::{Picture, write_png};
-use furrow::train::data::{Band, Example, Shape};
-use furrow::train::deploy::pictures;
+use furrow_compare::gap;
+use furrow_dataset::Set;
+use furrow_dataset::model::classes::Classes;
+use furrow_dataset::read::native;
+use furrow_output::{Picture, write_png};
+use furrow_train::data::{Band, Example, Shape};
+use furrow_train::deploy::pictures;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -21,7 +25,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// A dataset of tiny images in packs of four.
+/// Returns the command for a dataset of tiny images in packs of four.
 fn packed(folder: &Path, count: u64, more: &[&str]) -> Command {
     let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--out"]);
     command.arg(folder).args(["--count", &count.to_string(), "--pack", "4", "--split", "3,1,0"]).args(more);
@@ -44,8 +48,8 @@ fn members(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// Expected: the files of each image are those in folders, in the stream's order; nothing lies in folders; what is written to all images is
-/// as it would be without packs, but for the manifest and links of the report.
+/// Expected: the files of each image are those of the folders, in the order of `trace stream`, and no image folder
+/// remains; files for all images are the same as without packs, except for the manifest and the report's links.
 #[test]
 fn archives_hold_the_files_of_the_folders() {
     let (_keep, data) = scratch();
@@ -59,7 +63,7 @@ fn archives_hold_the_files_of_the_folders() {
     let (packed_tree, folder_tree) = (tree(&data), tree(&folders));
     assert_eq!(members(&data), folder_tree.iter().filter_map(image).collect());
     let names: Vec<&String> = packed_tree.keys().filter(|name| name.starts_with("packs/")).collect();
-    // Of nine images in the pattern 3,1 seven are for training.
+    // With the split pattern 3,1 seven of nine images are for training.
     assert_eq!(names, ["packs/train-000000.tar", "packs/train-000001.tar", "packs/val-000000.tar"]);
     assert!(!packed_tree.keys().any(|name| name.starts_with("images/") || name.contains(".furrow-")));
     assert_eq!(packed_tree.keys().filter(|name| name.starts_with("seals/")).count(), 3);
@@ -71,15 +75,16 @@ fn archives_hold_the_files_of_the_folders() {
     assert!(said.contains("9 of 9 images checked, 2 rendered again and the same; 0 faults"), "{said}");
     let said = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
     assert!(said.contains("9 of 9 images"), "{said}");
-    // An archive is what the stream writes of these images.
+    // An archive has the bytes that `trace stream` writes for these images.
     let mut stream = trace(&["stream", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--split", "3,1,0"]);
     stream.args(["--count", "3"]);
     let stream = succeed(stream).stdout;
     let whole = stream.len() - 1024;
-    assert!(packed_tree["packs/train-000000.tar"][..whole] == stream[..whole], "other archives than the stream's");
+    assert!(packed_tree["packs/train-000000.tar"][..whole] == stream[..whole], "archives differ from the stream");
 }
 
-/// Expected: shards, threads and kills, a dataset that grows, and one whose folders are packed later end with the files of one run.
+/// Expected: shards, threads and kills, a dataset that is extended, and one whose folders are packed later all give the
+/// files of one run.
 #[test]
 fn however_it_is_made_its_files_are_those_of_one_run() {
     let (_keep, whole) = scratch();
@@ -91,10 +96,14 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     for shard in ["1/2", "0/2"] {
         succeed(verb("render", &shards, &["--quiet", "--shard", shard, "--threads", "3"]));
     }
-    assert!(fs::read_dir(shards.join("images")).is_ok_and(|mut all| all.next().is_none()), "all lies in packs");
+    assert!(
+        fs::read_dir(shards.join("images")).is_ok_and(|mut all| all.next().is_none()),
+        "all images must be in packs"
+    );
     succeed(verb("finish", &shards, &["--quiet"]));
     same(&tree(&shards), &whole);
-    // Shards of packs: there are three to train and one to validate, so a fifth would be empty.
+    // Shards consist of whole packs: there are three for training and one for validation, so a fifth shard would be
+    // empty.
     let said = fail(verb("emit", &shards, &["--scheduler", "slurm", "--shards", "5"]), 2);
     assert!(said.contains("5 shards of 4 packs"), "{said}");
 
@@ -114,10 +123,11 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     let said = fail(other, 2);
     assert!(said.contains("another dataset lies in this folder: pack 4 there, 5 here"), "{said}");
 
-    // Killed again and again.
+    // Killed repeatedly.
     let (_keep, killed) = scratch();
     for pause in [40, 90, 140, 190, 240, 290, 340, 120, 60, 200] {
-        let mut child = packed(&killed, 11, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it");
+        let mut child =
+            packed(&killed, 11, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
         std::thread::sleep(Duration::from_millis(pause));
         child.kill().expect("a kill");
         child.wait().expect("an end");
@@ -126,10 +136,13 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     same(&tree(&killed), &whole);
 }
 
-/// Rationale: files of other names in the folders of images are the user's, such as further bands for training; to pack images must not remove them.
-/// Expected: they, and nothing else, stay where they are; the library, training, prediction, comparison and Python take images out of the
-/// archives beside them, and a further band from its folder; the command goes on, also where an archive is mended, and all else has the bytes
-/// that it has without them. What killed runs have left goes away.
+/// Rationale: files with other names in the image folders, such as further bands for training, belong to the user;
+/// packing must not remove them.
+///
+/// Expected: exactly these files stay in place. The library, training, prediction, comparison and Python read images
+/// from the archives beside them, and a further band from its folder. The command can be resumed, also after an archive
+/// was repaired, and all other files have the same bytes as without the user's files. Leftovers of killed runs are
+/// removed.
 #[test]
 fn files_of_the_user_stay_when_images_are_packed() {
     const READ: &str = "
@@ -147,7 +160,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     let before = native::read(&data, "000000").expect("an image");
     let (width, height) = before.size();
     let thermal = vec![90_u8; before.pixels()];
-    write_png(&data.join("images/000000/thermal.png"), width, height, &Picture::Gray(&thermal), "").expect("a picture");
+    write_png(&data.join("images/000000/thermal.png"), width, height, &Picture::Gray(&thermal), "").expect("an image");
     fs::create_dir(data.join("images/000003/mine")).expect("a folder");
     fs::write(data.join("images/000003/mine/notes.txt"), "wet").expect("a file");
     for file in ["images/000000/thermal.png", "images/000003/mine/notes.txt"] {
@@ -165,9 +178,9 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     assert_eq!(learnt.planes, [thermal]);
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
     let found = || pictures::find(std::slice::from_ref(&data), &shape, &[]);
-    let pictures = found().expect("pictures");
+    let pictures = found().expect("images");
     assert!(pictures.len() == 6 && pictures.iter().all(|picture| picture.read().is_ok()));
-    assert_eq!(gap::photos(&data, "--real").expect("pictures").len(), 6);
+    assert_eq!(gap::photos(&data, "--real").expect("images").len(), 6);
     let images = data.join("images");
     for arguments in [["compare", path(&images), path(&images)], ["compare", "--real", path(&images)]] {
         let mut command = trace(&arguments);
@@ -193,7 +206,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     succeed(verb("verify", &data, &["--quiet", "--rerender", "1"]));
     let said = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
     assert!(said.contains("6 of 6 images"), "{said}");
-    // The folder of an image that is in no archive is none of it.
+    // The folder of an image that is in no archive is not read as an image.
     for file in ["packs/val-000000.tar", "seals/val-000000.json"] {
         fs::remove_file(data.join(file)).expect("a file");
     }
@@ -203,7 +216,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     same(&tree(&data), &whole);
 }
 
-/// Expected: a changed byte of an archive, wherever it is, is found and mended; so is a lost record.
+/// Expected: a changed byte anywhere in an archive is found and repaired, and so is a lost record.
 #[test]
 fn changed_archives_are_found_and_mended() {
     let (_keep, data) = scratch();
@@ -211,7 +224,7 @@ fn changed_archives_are_found_and_mended() {
     let whole = tree(&data);
     let archive = data.join("packs/train-000000.tar");
     let bytes = fs::read(&archive).expect("an archive");
-    // In the header of the first file, in a picture, and in what fills a block.
+    // In the header of the first file, in an image, and in the padding of a block.
     for place in [120, 700, bytes.len() - 1] {
         let mut other = bytes.clone();
         other[place] ^= 1;
@@ -221,7 +234,7 @@ fn changed_archives_are_found_and_mended() {
         succeed(packed(&data, 6, &[]));
         same(&tree(&data), &whole);
     }
-    // Missing or cut short: told once, first, with what to do, and not for each file of each image.
+    // Missing or truncated: reported once and first, with a remedy, not for each file of each image.
     for (cut, fault) in [(false, "is missing"), (true, "has 1000 bytes instead of")] {
         fs::remove_file(&archive).expect("an archive");
         if cut {
@@ -237,7 +250,7 @@ fn changed_archives_are_found_and_mended() {
         succeed(packed(&data, 6, &[]));
         same(&tree(&data), &whole);
     }
-    // A record that is not what its checksum says.
+    // A record that does not match its checksum.
     let mut other = bytes.clone();
     let place = bytes.windows(9).position(|some| some == b"{\"index\":").expect("a record");
     other[place] = b'[';
@@ -246,17 +259,18 @@ fn changed_archives_are_found_and_mended() {
     assert!(said.contains("record.json: it was changed") && said.contains("dataset render"), "{said}");
     succeed(packed(&data, 6, &[]));
     same(&tree(&data), &whole);
-    // A lost index of an archive that the manifest knows: nothing is drawn anew, formats are written anew.
+    // A lost index of an archive that the manifest lists: no image is rendered again, formats are written again.
     succeed(packed(&data, 6, &["--format", "yolo-detect"]));
     let whole = tree(&data);
     let record = data.join("seals/val-000000.json");
     for lost in [true, false] {
         let text = fs::read_to_string(&record).expect("a record");
-        if lost { fs::remove_file(&record) } else { fs::write(&record, text.replacen("512", "513", 1)) }.expect("it");
+        if lost { fs::remove_file(&record) } else { fs::write(&record, text.replacen("512", "513", 1)) }
+            .expect("a record");
         let said = fail(verb("verify", &data, &["--quiet"]), 1);
         assert!(said.contains("packs/val-000000.tar is not written yet"), "{said}");
         let drawn = || {
-            let rows = furrow::dataset::timing_log::rows(&data).expect("a timing log");
+            let rows = furrow_dataset::make::timing_log::rows(&data).expect("a timing log");
             rows.iter().filter(|row| row.draw_s > 0.0).count()
         };
         let before = drawn();
@@ -264,14 +278,14 @@ fn changed_archives_are_found_and_mended() {
         same(&tree(&data), &whole);
         assert_eq!(drawn(), before);
     }
-    // A format that is added later.
+    // A format added later.
     succeed(verb("finish", &data, &["--quiet", "--format", "coco"]));
     succeed(verb("verify", &data, &["--quiet"]));
     let said = fail(verb("finish", &data, &["--quiet", "--format", "nerf"]), 2);
     assert!(said.contains("--format nerf names the files in images/"), "{said}");
 }
 
-/// Images of one field are in one pack.
+/// All images of a field are in the same pack.
 #[test]
 fn packs_do_not_cut_fields() {
     let (_keep, data) = scratch();
@@ -285,8 +299,9 @@ fn packs_do_not_cut_fields() {
     assert!(said.contains("would cut fields") && !data.exists(), "{said}");
 }
 
-/// Expected: a command that copies builds the same dataset at the other place, in names of any letters; one that fails is told with its words
-/// and code 1, and the next run goes on with what is not pushed; what was pushed is not pushed again; freed images are not made again.
+/// Expected: a push command that copies files builds the same dataset at the target, whatever characters the paths
+/// contain. If a push fails, its message and code 1 are reported, and the next run continues with the remaining packs;
+/// pushed packs are not pushed again, and freed images are not rendered again.
 #[test]
 fn what_is_finished_is_pushed_once_and_whole() {
     let (_keep, whole) = scratch();
@@ -304,14 +319,14 @@ fn what_is_finished_is_pushed_once_and_whole() {
     assert!(there.join("packs/train-000000.tar").is_file() && there.join("dataset.json").is_file());
     let refused = fail(packed(&data, 9, &["--push", "true"]), 2);
     assert!(refused.contains("write {dir}"), "{refused}");
-    // Freed: what the next run needs stays.
+    // With local files freed; those that the next run needs are kept.
     succeed(packed(&data, 9, &["--push", &copy, "--push-check", "test -d {dir}", "--push-free"]));
     assert!(!tree(&data).keys().any(|name| name.starts_with("packs/") || name.starts_with("images/")));
     let log = fs::read_to_string(format!("{}.log", path(&there))).expect("a log");
     let pushed: Vec<&str> = log.lines().filter_map(|line| line.rsplit('/').next()).collect();
     assert_eq!(pushed.len(), 4, "{log}");
     assert_eq!(pushed[..2], ["recipe", "train-000000"], "{log}");
-    // Nothing is left to do, and nothing is done.
+    // All packs are pushed, so the command does nothing.
     succeed(verb("render", &data, &["--quiet", "--push", &copy, "--push-free"]));
     assert_eq!(fs::read_to_string(format!("{}.log", path(&there))).expect("a log"), log);
     let status = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
@@ -323,8 +338,9 @@ fn what_is_finished_is_pushed_once_and_whole() {
     succeed(verb("verify", &there, &["--quiet"]));
 }
 
-/// Rationale: a push that hangs kept a night's work waiting for ever, and what it had started went on after the run's end. Expected: with a bound it counts as
-/// failed, in words, and a program that the command has started in the background ends with it: the file that it would have made never appears.
+/// Rationale: a push that hung blocked a night's work forever, and its subprocesses outlived the run. Expected: with a
+/// time limit it counts as failed, with a message, and background processes of the command end with it: the file that
+/// they would create never appears.
 #[test]
 fn a_push_that_hangs_is_ended_with_all_it_has_started() {
     let (_keep, data) = scratch();
@@ -335,10 +351,10 @@ fn a_push_that_hangs_is_ended_with_all_it_has_started() {
     let said = fail(packed(&data, 2, &["--push", &hangs, "--push-tries", "1", "--push-timeout", "1"]), 1);
     assert!(said.contains("recipe was not pushed") && said.contains("took longer than 1 s"), "{said}");
     std::thread::sleep(std::time::Duration::from_secs(5));
-    assert!(!late.exists(), "what the command started went on");
+    assert!(!late.exists(), "a subprocess of the command continued");
 }
 
-/// The same of images in folders, and of what belongs to all.
+/// The same for images in folders, and for files common to all images.
 #[test]
 fn folders_are_pushed_too() {
     let (_keep, data) = scratch();
@@ -350,12 +366,12 @@ fn folders_are_pushed_too() {
     let mut expected = tree(&data);
     expected.retain(|name, _| !name.starts_with("pushed/"));
     same(&tree(&there), &expected);
-    fs::remove_dir_all(there).expect("it goes");
+    fs::remove_dir_all(there).expect("the folder is removed");
 }
 
-/// Rationale: of two runs on one dataset, the first that is done clears away what killed ones have left, the other's folder of files to be pushed
-/// with it; what copies from there copies half then, and may well be content. Expected: it is pushed once more, whole, at the first try. What
-/// killed runs have left takes no room where images are freed.
+/// Rationale: of two runs on one dataset, the one that ends first removes leftovers of killed runs, including the other
+/// run's staging folder; a copy from there may then be incomplete and still succeed. Expected: the unit is pushed again
+/// completely, with a single try allowed. Leftovers of killed runs take no disk space if images are freed.
 #[test]
 fn a_folder_that_was_cleared_away_is_pushed_once_more() {
     let (_keep, data) = scratch();
@@ -378,13 +394,14 @@ fn a_folder_that_was_cleared_away_is_pushed_once_more() {
     whole.retain(|name, _| !name.starts_with("pushed/"));
     same(&tree(&there), &whole);
     for folder in [there, flag] {
-        fs::remove_dir_all(folder).expect("it goes");
+        fs::remove_dir_all(folder).expect("the folder is removed");
     }
 }
 
-/// Rationale: beside its archives lie pictures of formats, label maps among them, which a program that looks for pictures would take for
-/// photographs. Expected: `compare` of pairs says that it reads folders, and its way out leads to what the same dataset in folders gives; as a
-/// set the packs are as far from other pictures as those folders are.
+/// Rationale: beside the archives are images of formats, label maps among them, which a program looking for images
+/// would take for photographs. Expected: `compare` of pairs reports that it reads folders, and its suggested remedy
+/// gives the result of the same dataset in folders; compared as sets, the packs have the same distance to other images
+/// as those folders.
 #[test]
 fn who_reads_folders_says_how_to_unpack() {
     let (_keep, data) = scratch();
@@ -407,7 +424,7 @@ fn who_reads_folders_says_how_to_unpack() {
         }
     }
     let said = fail(trace(&["compare", path(&data), path(&data)]), 2);
-    let way = said.split_once("name `unpacked`: ").expect("a way out").1.trim();
+    let way = said.split_once("name `unpacked`: ").expect("a remedy").1.trim();
     let mut shell = Command::new("sh");
     shell.current_dir(data.parent().expect("a folder")).args(["-c", way]);
     succeed(shell);
@@ -432,10 +449,10 @@ fn who_reads_folders_says_how_to_unpack() {
     let folders = gap(&unpacked, &unpacked);
     assert_eq!(gap(&data, &unpacked), folders);
     assert_eq!(gap(&unpacked, &data), folders);
-    fs::remove_dir_all(unpacked).expect("it goes");
+    fs::remove_dir_all(unpacked).expect("the folder is removed");
 }
 
-/// Expected: the guide's few lines for webdataset, `datasets`, supervision and torch do on a small dataset what they say.
+/// Expected: the guide's examples for webdataset, `datasets`, supervision and torch work on a small dataset.
 #[test]
 fn examples_of_the_guide_run() {
     let Some(python) = python("import webdataset, datasets, supervision") else { return };
@@ -446,7 +463,7 @@ fn examples_of_the_guide_run() {
         trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "8", "--pack", "2"]);
     make.args(["--split", "1,0,0", "--format", "coco", "--out"]).arg(&data);
     succeed(make);
-    std::os::unix::fs::symlink(&data, folder.join("data/own")).expect("another name");
+    std::os::unix::fs::symlink(&data, folder.join("data/own")).expect("a link");
     let page = crate::common::book::read("docs/guide/datasets.md");
     let mut ran = 0;
     for block in crate::common::book::blocks(&page) {
@@ -465,7 +482,7 @@ fn examples_of_the_guide_run() {
     assert_eq!(ran, 4);
 }
 
-/// Expected: each reader finds the images of the dataset, and the tables say what the records say.
+/// Expected: each reader finds the images of the dataset, and the tables agree with the records.
 #[test]
 fn readers_of_others_open_packs_and_tables() {
     let (_keep, data) = scratch();

@@ -1,27 +1,28 @@
-//! Pages that the programs write open anywhere: in wide and narrow windows nothing is asked of a network, nothing is complained about, nothing
-//! hangs over the window's edge, and what must be read is in sight.
+//! HTML pages written by the programs open anywhere: in wide and narrow windows they load nothing, report no errors, do
+//! not overflow the window, and show the important content.
 //!
-//! Rationale: people judge by these pages, on desks and on phones. Expected: no request, no error in the console, a document no wider than its
-//! window, every picture decoded. Source: headless Chromium (Debian's `chromium`), windows 1280 and 400 pixels wide.
+//! Rationale: users judge results by these pages, on desktops and phones. Expected: no request, no error in the
+//! console, a document no wider than its window, every image decoded. Source: headless Chromium (Debian's `chromium`),
+//! windows 1280 and 400 pixels wide.
 
 use crate::common::browser::browser;
 use crate::common::devtools::Page;
 use crate::common::program::{scratch, trace};
-use furrow::report::chart::{Chart, Curve, Effect};
-use furrow::report::{Cell, Table};
-use furrow::train::figure::{self, Plot, Shot};
-use furrow::train::measure::{Evaluation, Prediction};
+use furrow_report::chart::{Chart, Curve, Effect};
+use furrow_report::{Cell, Table};
+use furrow_train::figure::{self, Plot, Shot};
+use furrow_train::measure::{Evaluation, Prediction};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What is true of a page in a window: as many pixels as it is too wide, requests, pictures that are not decoded.
+/// State of a page in a window: overflow in pixels, requests, and images that are not decoded.
 const SEEN: &str = r#"({
   over: Math.max(0, document.documentElement.scrollWidth - innerWidth),
   requests: performance.getEntriesByType("resource").map(e => e.name).filter(n => !n.startsWith("data:")),
   broken: [...document.images].filter(i => !(i.complete && i.naturalWidth > 0)).length,
 })"#;
 
-/// Opens a page in a wide and in a narrow window; `more` is asked of it in each and must be true.
+/// Opens a page in a wide and in a narrow window; the expression `more` must be true in both.
 fn opens(browser: &Path, file: &Path, more: &str) {
     for width in [1280, 400] {
         let folder = tempfile::tempdir().unwrap();
@@ -47,7 +48,8 @@ fn write(folder: &Path, name: &str, page: &figure::Page<'_>) -> std::path::PathB
     file
 }
 
-/// Expected: names at the left of the zero line, all in the drawing; a table that is wider than the window scrolls by itself.
+/// Expected: names are to the left of the zero line and inside the figure; a table wider than the window scrolls by
+/// itself.
 #[test]
 fn the_answer_of_an_ablation_opens() {
     let Some(browser) = browser() else { return };
@@ -91,7 +93,7 @@ fn the_answer_of_an_ablation_opens() {
     opens(&browser, &file, inside);
 }
 
-/// Expected: the worst image stands first; a click makes its picture as large as the window, another puts it back.
+/// Expected: the worst image is first; a click enlarges it to the width of the window, another click restores it.
 #[test]
 fn an_evaluation_opens_with_the_worst_first_and_pictures_enlarge() {
     let Some(browser) = browser() else { return };
@@ -132,7 +134,7 @@ fn an_evaluation_opens_with_the_worst_first_and_pictures_enlarge() {
     opens(&browser, &file, &format!("{order} && {enlarges}"));
 }
 
-/// Expected: every stage has its name as text, and a bar that is as long as it says.
+/// Expected: every stage has its name as text, and a bar of the stated length.
 #[test]
 fn the_catalogue_opens() {
     let Some(browser) = browser() else { return };
@@ -157,7 +159,7 @@ fn the_catalogue_opens() {
     opens(&browser, &out.join("catalogue.html"), said);
 }
 
-/// Expected: two sets of which one is darker; the page has advice as a list of fields.
+/// Expected: for two sets, one of which is darker, the page lists fields to change.
 #[test]
 fn a_comparison_of_sets_opens() {
     let Some(browser) = browser() else { return };
@@ -166,8 +168,8 @@ fn a_comparison_of_sets_opens() {
         std::fs::create_dir_all(folder.join(name)).unwrap();
         for k in 0..4_u32 {
             let rgb: Vec<[u8; 3]> = (0..96 * 64).map(|p| [((p * 7 + k * 13) % 90 + 80 - lift) as u8; 3]).collect();
-            let picture = furrow::output::Picture::Rgb(&rgb);
-            furrow::output::write_png(&folder.join(format!("{name}/{k}.png")), 96, 64, &picture, "").unwrap();
+            let picture = furrow_output::Picture::Rgb(&rgb);
+            furrow_output::write_png(&folder.join(format!("{name}/{k}.png")), 96, 64, &picture, "").unwrap();
         }
     }
     let out = folder.join("out");

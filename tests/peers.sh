@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# Installs what the build and the tests need, on Debian 12, as root or as a user who may sudo, and asks nothing: Embree and a C compiler; Mesa's
-# Vulkan for the rasterized engine; and the
-# programs that the tests ask for a second opinion (a browser, a batch system, Python clients in target/venv, Debian's PyTorch for the CPU with
-# target/venv-torch, 210 MB to download); libtorch for the feature `train`.
-# What is there already is left alone.
+# Installs the dependencies of the build and the tests on Debian 12, as root or as a user with sudo, without prompts:
+# Embree and a C compiler; Mesa's Vulkan driver for the raster engine; the programs used as independent references by
+# the tests (a browser, a batch system, Python clients in target/venv, Debian's PyTorch for the CPU with
+# target/venv-torch, 210 MB to download); and libtorch for the feature `train`. Installed packages are left alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch python3-torchvision python3-pil"
@@ -18,7 +17,7 @@ if ! cmp -s tests/requirements.txt target/venv/installed; then
   target/venv/bin/pip install -q -r tests/requirements.txt
   cp tests/requirements.txt target/venv/installed
 fi
-# PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is for the CPU, and is found by Debian's Python only.
+# PyPI's torch for Linux needs three gigabytes of CUDA. Debian's is CPU-only, and is visible to Debian's Python only.
 beside_torch="$(grep '^safetensors==' tests/requirements.txt) efficientnet-lite-pytorch==0.1.0 timm==0.9.16 ultralytics==8.4.190 opencv-python-headless==4.10.0.84"
 if [ "$(cat target/venv-torch/installed 2>/dev/null || true)" != "$beside_torch" ]; then
   /usr/bin/python3 -m venv --system-site-packages target/venv-torch

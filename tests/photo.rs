@@ -1,22 +1,23 @@
-//! `trace dataset --photo`: photographs as PNG or JPEG, each byte once.
+//! `trace dataset --photo`: images as PNG or JPEG, each stored once.
 //!
-//! Rationale: photographs are most of a dataset's disk, and what is stored with loss must be one thing to all readers: the pixels that the file
-//! decodes to. Expected: samples, formats and networks have those pixels; formats hold the very file, as another name of it; what
-//! makes a dataset one (shards, repairs, packs, checks) holds for JPEG as for PNG; datasets of before keep their bytes. Source: the crate
-//! `image` as another way to the decoder, Pillow, and the PNG dataset of the same scene.
+//! Rationale: colour images take most of a dataset's disk space, and with lossy storage all readers must see the same
+//! pixels: those that the file decodes to. Expected: samples, formats and networks have those pixels; formats contain
+//! the same file as a hard link; shards, repairs, packs and checks work for JPEG as for PNG; older datasets keep their
+//! bytes. Source: the crate `image` as another path to the decoder, Pillow, and the PNG dataset of the same scene.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, run, scratch, trace};
 use crate::common::python::python;
-use furrow::compare::Pairs;
-use furrow::dataset::{Sample, Set, native};
-use furrow::output::{self, Picture};
+use furrow_compare::Pairs;
+use furrow_dataset::read::native;
+use furrow_dataset::{Sample, Set};
+use furrow_output::Picture;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// A dataset of the small page.
+/// Returns the command for a dataset of the small scene.
 fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
     let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--spp", "2"]);
     command.args(["--split", "1,1,0", "--count", &count.to_string(), "--out", path(folder)]).args(more);
@@ -27,18 +28,18 @@ fn json(file: &Path) -> Value {
     serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
 }
 
-/// Whether a PNG or JPEG tells of the scene that it shows.
+/// Returns whether a PNG or JPEG contains the comment with the scene's provenance.
 fn has_comment(file: &Path) -> bool {
     fs::read(file).unwrap().windows(5).any(|bytes| bytes == b"seed:")
 }
 
-/// Mean difference of two pictures' values.
+/// Mean absolute difference of two images' values.
 fn apart(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.len() as f64
 }
 
-/// Files of formats that are the photograph of image 0, with the folder that they lie in.
+/// Format files, without their extension, that are copies of image 0.
 const COPIES: [&str; 6] = [
     "coco/images/train/000000",
     "panoptic/images/train/000000",
@@ -74,14 +75,14 @@ fn all_readers_have_the_pixels_of_the_file() {
             "species.png"
         ]
     );
-    assert_eq!(lossy.rgb, output::read_photo(&own).unwrap().2);
-    assert_eq!(lossy.nir, output::read_gray_photo(&at("images/000000/nir.jpg")).unwrap().2);
+    assert_eq!(lossy.rgb, furrow_output::read_photo(&own).unwrap().2);
+    assert_eq!(lossy.nir, furrow_output::read_gray_photo(&at("images/000000/nir.jpg")).unwrap().2);
     let (color, nir) = (apart(lossy.rgb.as_flattened(), exact.rgb.as_flattened()), apart(&lossy.nir, &exact.nir));
     assert!((0.1..8.0).contains(&color) && (0.1..8.0).contains(&nir), "{color} {nir}");
-    // Labels do not depend on it.
+    // Labels do not depend on the image format.
     assert_eq!((&lossy.record, &lossy.plants, &lossy.depth), (&exact.record, &exact.plants, &exact.depth));
 
-    // Formats hold the same file, and name it as it is.
+    // Formats contain the same file, with its extension.
     let bytes = fs::read(&own).unwrap();
     for copy in COPIES {
         assert!(
@@ -93,7 +94,7 @@ fn all_readers_have_the_pixels_of_the_file() {
     let nir = "imagefolder/train/nir/000000.jpg";
     assert!(fs::read(at(nir)).unwrap() == fs::read(at("images/000000/nir.jpg")).unwrap());
     for file in ["voc/VOCdevkit/VOC2012/JPEGImages/000000.jpg", "cropandweed/images/ave-0000-0000.jpg"] {
-        assert!(fs::read(at(file)).unwrap() == bytes, "{file}: encoded twice");
+        assert!(fs::read(at(file)).unwrap() == bytes, "{file}: encoded again");
     }
     for format in ["coco/annotations/instances", "coco/annotations/leaves", "panoptic/annotations/panoptic"] {
         let folder = format.split('/').next().unwrap();
@@ -110,28 +111,29 @@ fn all_readers_have_the_pixels_of_the_file() {
     assert!(at("nerf/000000").join(named).is_file(), "{named}");
     assert!(fs::read_to_string(at("colmap/000000/images.txt")).unwrap().contains(" 000000/rgb.jpg"));
     assert!(fs::read_to_string(at("report.html")).unwrap().contains("images/000000/rgb.jpg"));
-    // Where a layout knows PNG alone, it holds what the file decodes to.
+    // A layout that supports only PNG contains the decoded pixels.
     for file in
         ["phenobench/train/images/000000.png", "cityscapes/leftImg8bit/train/small/small_000000_000000_leftImg8bit.png"]
     {
-        assert_eq!(output::read_rgb(&at(file)).unwrap().2, lossy.rgb, "{file}");
+        assert_eq!(furrow_output::read_rgb(&at(file)).unwrap().2, lossy.rgb, "{file}");
     }
 
-    // Pairs with the other, near infrared and labels among them.
+    // Pairs with the PNG dataset, including near infrared and labels.
     let out = base.join("compared");
     succeed(trace(&["compare", path(&png), path(&jpeg), "--out", path(&out), "--quiet"]));
     let table = fs::read_to_string(out.join("compare.csv")).unwrap();
     assert!(table.contains("000001") && table.to_lowercase().contains("nir") && table.contains("crop"), "{table}");
     learnt_alike(&Set::open(&jpeg).unwrap(), &lossy);
 
-    // A photograph whose end is missing is no grey one.
+    // A truncated image is an error, not an image with a grey area.
     fs::write(&own, &bytes[..bytes.len() / 2]).unwrap();
     assert!(native::read(&jpeg, "000000").unwrap_err().to_string().contains("cut short"));
     fs::remove_file(&own).unwrap();
     assert!(native::read(&jpeg, "000000").is_err());
 }
 
-/// Rationale: pictures are often converted where they lie. Expected: a PNG beside a JPEG of a dataset is read by nobody, and `verify` names it.
+/// Rationale: users often convert images in place. Expected: a PNG beside a dataset's JPEG is ignored, and `verify`
+/// reports it.
 #[test]
 fn a_png_beside_a_jpeg_is_not_read() {
     const READ: &str = "
@@ -145,8 +147,8 @@ assert sample['image'].max() > 0 and sample['nir'].max() > 0
     let (width, height) = before.size();
     let (dark, gray) = (vec![[0_u8; 3]; before.pixels()], vec![0_u8; before.pixels()]);
     let at = |file: &str| data.join("images/000000").join(file);
-    output::write_png(&at("rgb.png"), width, height, &Picture::Rgb(&dark), "").unwrap();
-    output::write_png(&at("nir.png"), width, height, &Picture::Gray(&gray), "").unwrap();
+    furrow_output::write_png(&at("rgb.png"), width, height, &Picture::Rgb(&dark), "").unwrap();
+    furrow_output::write_png(&at("nir.png"), width, height, &Picture::Gray(&gray), "").unwrap();
     let set = Set::open(&data).unwrap();
     assert!(native::read(&data, "000000").unwrap() == before && set.sample(0).unwrap() == before);
     learnt_alike(&set, &before);
@@ -164,11 +166,11 @@ assert sample['image'].max() > 0 and sample['nir'].max() > 0
     }
 }
 
-/// Expected: networks see what the file decodes to, near infrared too.
+/// Expected: networks see the decoded pixels, also for near infrared.
 #[cfg(feature = "train")]
 fn learnt_alike(set: &Set, sample: &Sample) {
-    use furrow::dataset::classes::Classes;
-    use furrow::train::data::{Band, Example};
+    use furrow_dataset::model::classes::Classes;
+    use furrow_train::data::{Band, Example};
     let map = Classes::default().of(&set.recipe.species, &[]).unwrap();
     let bands = [Band::Blue, Band::Gray("nir".into())];
     let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &bands, false).unwrap();
@@ -195,13 +197,14 @@ fn however_it_is_made_it_is_one_dataset() {
     }
     succeed(verb("finish", &shards, &[]));
     same(&tree(&shards), &expected);
-    // One lost its photograph, one a byte of it, one all; who goes on need not say how photographs are stored.
+    // One image lost a file, one has a changed byte, one lost its folder; the image format need not be given to
+    // continue.
     fs::remove_file(whole.join("images/000000/nir.jpg")).unwrap();
     let damaged = whole.join("images/000001/rgb.jpg");
     let mut bytes = fs::read(&damaged).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
-    // A new file: the old one is the format's as well.
+    // A new file, because the old one is hard-linked to the format's file.
     fs::remove_file(&damaged).unwrap();
     fs::write(&damaged, bytes).unwrap();
     fs::remove_dir_all(whole.join("images/000002")).unwrap();
@@ -216,7 +219,7 @@ fn however_it_is_made_it_is_one_dataset() {
     let said = succeed(verb("verify", &whole, &["--rerender", "3"])).stderr;
     assert!(String::from_utf8_lossy(&said).contains("3 rendered again and the same; 0 faults"));
 
-    // In archives the same files, in the order of before.
+    // Archives contain the same files in the same order as before.
     let (_keep, packed) = scratch();
     succeed(make(&packed, 3, &[&more[..2], &["--pack", "2"]].concat()));
     let mut archive = tar::Archive::new(fs::File::open(packed.join("packs/train-000000.tar")).unwrap());
@@ -239,8 +242,8 @@ fn however_it_is_made_it_is_one_dataset() {
     }
 }
 
-/// Expected: the photograph and near infrared of a format are the native files under other names, whether they were made at once or later, also
-/// where the format was damaged in between.
+/// Expected: a format's colour and near-infrared images are hard links to the native files, whether written together or
+/// later, also after the format was damaged in between.
 #[cfg(unix)]
 #[test]
 fn each_byte_lies_once() {
@@ -269,9 +272,9 @@ fn each_byte_lies_once() {
     }
 }
 
-/// Rationale: datasets of before go on for months. Expected: a recipe that does not tell of photographs makes them as it always did, with the bytes
-/// of the single field, comment and all, also where it is told `--photo png`; new ones have no comment; what another way was
-/// begun with is kept, and another is refused.
+/// Rationale: generating a dataset may take months, across program versions. Expected: a recipe without an image format
+/// keeps writing images as before, with the bytes of the single field including the comment, also with `--photo png`;
+/// new datasets have no comment. The format that a dataset was started with is kept, and another one is refused.
 #[test]
 fn datasets_of_before_keep_their_bytes() {
     let (_keep, old) = scratch();
@@ -298,7 +301,7 @@ fn datasets_of_before_keep_their_bytes() {
     succeed(make(&new, 1, &[]));
     succeed(make(&jpeg, 1, &["--photo", "jpeg95"]));
     assert!(!has_comment(&new.join("images/000000/rgb.png")) && !has_comment(&new.join("images/000000/nir.png")));
-    let pixels = |file: &Path| output::read_rgb(file).unwrap();
+    let pixels = |file: &Path| furrow_output::read_rgb(file).unwrap();
     assert_eq!(pixels(&new.join("images/000000/rgb.png")), pixels(&old.join("images/000000/rgb.png")));
     for (folder, photo, there) in
         [(&old, "jpeg95", "none"), (&new, "jpeg95", "\"png\""), (&jpeg, "jpeg90", "\"jpeg95\"")]
@@ -327,5 +330,5 @@ fn wrong_words_are_told() {
     labels.arg(&data);
     let said = fail(labels, 2);
     assert!(said.contains("--labels-only draws none") && said.matches("error: ").count() == 1, "{said}");
-    assert!(names(&data).is_empty(), "nothing was begun");
+    assert!(names(&data).is_empty(), "files were written");
 }

@@ -1,26 +1,30 @@
-//! The size of pixels on the ground: pictures are brought to the pixels that a network was trained on, and crops to pixels that are asked for.
+//! Ground sampling distance: images are resized to the pixel size that a network was trained on, and crops to requested
+//! pixel sizes.
 //!
-//! Rationale: a plant that is twice as large in pixels is another plant to a network, and a factor that is wrong shows in no error message.
-//! Expected: a run tells the pixels that its camera has by geometry; with pictures of pixels twice as large, `predict` and `eval` answer as
-//! at twice the size; crops are scaled by the pixels of their own image; images that do not tell them are refused where they are needed.
-//! Source: `tests/ref/small.ron`, and what `train fit --help` and `train predict --help` say.
+//! Rationale: to a network, a plant twice as large in pixels is a different plant, and a wrong factor causes no error
+//! message.
+//!
+//! Expected: a run records the pixel size that follows from its camera's geometry. For images with pixels twice as
+//! large, `predict` and `eval` give the results of images at twice the size. Crops are scaled by the pixel size of
+//! their own image; images without a recorded pixel size are refused if it is needed. Source: `tests/ref/small.ron`,
+//! and the output of `train fit --help` and `train predict --help`.
 
 use crate::common::dataset::{fail, path, succeed};
 use crate::common::program::{names, small_text, trace};
 use crate::common::training::{self, SIZE, learn, pictures, stirred};
-use furrow::dataset::classes::Classes;
-use furrow::output::{self, Picture};
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::train::data::{
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::model::classes::Classes;
+use furrow_output::Picture;
+use furrow_train::data::{
     Augment, AugmentScale, Band, Batch, Crop, Ground, Loader, Normalization, Order, Pick, Selection, Shape, Store,
 };
-use furrow::train::deploy::pictures::Prediction;
-use furrow::train::fit::hyper::NormalizationMode;
-use furrow::train::measure::Report;
-use furrow::train::net::Network;
-use furrow::train::run::{self, TrainedModel};
-use furrow::train::table::Experiment;
+use furrow_train::deploy::pictures::Prediction;
+use furrow_train::fit::hyper::NormalizationMode;
+use furrow_train::measure::Report;
+use furrow_train::net::Network;
+use furrow_train::run::{self, TrainedModel};
+use furrow_train::table::Experiment;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, LazyLock};
@@ -33,7 +37,7 @@ fn train(arguments: &[&str]) -> Command {
     command
 }
 
-/// A network whose answers are of all classes, in a folder.
+/// Writes a network whose predictions contain all classes into a folder.
 fn network(folder: &Path) -> TrainedModel {
     let learnt = learn(Network::BasicSegnet, "rgb", NormalizationMode::Image, &SET, &folder.join("learnt"));
     let network = stirred(&learnt, 5);
@@ -47,7 +51,7 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     let folder = scratch.path();
     let trained = network(folder);
     let mm = trained.card.pixel_mm.unwrap();
-    // 0.45 m above the ground, 6° off the vertical, 40° across 64 pixels.
+    // 0.45 m above the ground, 6° from the vertical, 40° across 64 pixels.
     let expected = 450.0 / 6f64.to_radians().cos() * 2.0 * 20f64.to_radians().tan() / 64.0;
     assert!((mm / expected - 1.0).abs() < 0.005, "{mm} mm, by geometry {expected}");
 
@@ -58,7 +62,7 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     let masks = |out: &Path| -> Vec<Vec<u8>> {
         let is_png = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "png");
         let is_mask = |name: &&String| is_png(name) && !name.contains("overlay");
-        names(out).iter().filter(is_mask).map(|name| output::read_indexed(&out.join(name)).unwrap().2).collect()
+        names(out).iter().filter(is_mask).map(|name| furrow_output::read_indexed(&out.join(name)).unwrap().2).collect()
     };
     let out = |name: &str| folder.join(name);
     succeed(predict(&out("twice"), &["--pixel-mm", &twice]));
@@ -66,14 +70,14 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     succeed(predict(&out("long"), &["--resize", "128"]));
     succeed(predict(&out("same"), &[]));
     assert_eq!(masks(&out("twice")).len(), 3);
-    assert!(masks(&out("twice")) == masks(&out("long")), "pixels of twice the size are not seen at twice the size");
-    assert!(masks(&out("twice")) != masks(&out("same")), "the size of pixels says nothing");
+    assert!(masks(&out("twice")) == masks(&out("long")), "images with pixels twice as large are not enlarged by two");
+    assert!(masks(&out("twice")) != masks(&out("same")), "the pixel size has no effect");
 
     let told = |name: &str| -> Prediction { run::read_json(&out(name).join("prediction.json")).unwrap() };
     assert_eq!((told("twice").pixel_mm, told("twice").resize.as_str()), (Some(2.0 * mm), "× 2.000"));
     assert_eq!((told("same").pixel_mm, told("same").resize.as_str()), (None, "stretch"));
     let said = fail(predict(&out("twice"), &["--pixel-mm", &(2.000001 * mm).to_string()]), 2);
-    assert!(said.contains("predictions at other sizes lie in this folder"), "{said}");
+    assert!(said.contains("this folder holds predictions at other sizes"), "{said}");
 
     let eval = |name: &str, more: &[&str]| -> (Report, String) {
         let out = out(name);
@@ -84,12 +88,12 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     let (by_pixels, page) = eval("eval-twice", &["--pixel-mm", &twice]);
     assert_eq!(by_pixels.scores, eval("eval-long", &["--resize", "128"]).0.scores);
     assert_ne!(by_pixels.scores, eval("eval-same", &[]).0.scores);
-    assert!(page.contains("size × 2.000"), "the report does not tell the factor");
+    assert!(page.contains("size × 2.000"), "the report does not contain the factor");
 
     for (value, words) in [
-        ("0", "a picture is scaled by 0.02 to 50"),
-        ("-1", "a picture is scaled by"),
-        ("nan", "a picture is scaled by"),
+        ("0", "an image is scaled by 0.02 to 50"),
+        ("-1", "an image is scaled by"),
+        ("nan", "an image is scaled by"),
         ("9000", "the network was trained on pixels of 5.1"),
     ] {
         let said = fail(predict(&out("none"), &[&format!("--pixel-mm={value}")]), 2);
@@ -102,13 +106,14 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     untold.write(&run).unwrap();
     let said = fail(predict(&out("none"), &["--pixel-mm", "2"]), 2);
     assert!(
-        said.contains("training images do not tell the size of their pixels") && said.contains("--resize"),
+        said.contains("training images do not record their ground sampling distance") && said.contains("--resize"),
         "{said}"
     );
     assert!(!out("none").exists());
 }
 
-/// Expected: of each image of an epoch, the crop that its own pixel size gives and no other's. Source: [`Augment::apply`] with each size.
+/// Expected: the crop of each image in an epoch is scaled by its own pixel size. Source: [`Augment::apply`] with each
+/// size.
 #[test]
 fn crops_are_scaled_by_the_pixels_of_their_own_image() {
     let (image, size) = (SIZE, (32, 32));
@@ -139,14 +144,14 @@ fn crops_are_scaled_by_the_pixels_of_their_own_image() {
     assert_eq!(seen, (0..8).collect::<Vec<_>>());
 }
 
-/// Images of numbers and labels of soil: a set that tells no camera.
+/// Imports synthetic images with soil labels: a dataset without camera records.
 fn imported(folder: &Path) -> PathBuf {
     let (photos, masks, out) = (folder.join("photos"), folder.join("masks"), folder.join("imported"));
     let (w, h) = SIZE;
     for k in 0..2 {
         let (name, pixels) = (format!("{k}.png"), pictures(1, SIZE, 3, k));
-        output::write_png(&photos.join(&name), w, h, &Picture::Rgb(pixels.as_chunks().0), "").unwrap();
-        output::write_png(&masks.join(&name), w, h, &Picture::Gray(&vec![0; (w * h) as usize]), "").unwrap();
+        furrow_output::write_png(&photos.join(&name), w, h, &Picture::Rgb(pixels.as_chunks().0), "").unwrap();
+        furrow_output::write_png(&masks.join(&name), w, h, &Picture::Gray(&vec![0; (w * h) as usize]), "").unwrap();
     }
     let mut import = trace(&["dataset", "import", "--format", "masks", "--images", path(&photos)]);
     import.args(["--masks", path(&masks), "--out", path(&out)]);
@@ -154,9 +159,9 @@ fn imported(folder: &Path) -> PathBuf {
     out
 }
 
-/// Expected: a plan has the range where one is asked for and not otherwise; sets whose images do not tell their pixels, a range that is none
-/// and one without scaling are refused, and leave no folder; a range of one size and an encoder that never learns are told; experiment
-/// files take the same words.
+/// Expected: the plan contains the scale range only if one is requested. Datasets without recorded pixel sizes, an
+/// invalid range, and a range without the scale augmentation are refused and leave no folder. A range of a single size
+/// and an encoder that is never trained cause warnings. Experiment files accept the same values.
 #[test]
 fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
     let scratch = tempfile::tempdir().unwrap();
@@ -178,16 +183,16 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
     let auto = succeed(fit(&SET, "auto", &["--augment-scale", "auto", "--freeze", "2"]));
     assert_eq!(plan("auto")["plan"]["augment_scale"], "auto");
     assert!(said(&auto).contains("warning: --augment-scale auto: all crops have pixels of 5.1"), "{}", said(&auto));
-    assert!(said(&auto).contains("warning: the encoder begins at random and stays so"), "{}", said(&auto));
+    assert!(said(&auto).contains("warning: the encoder keeps its random weights"), "{}", said(&auto));
     let range = succeed(fit(&SET, "range", &["--augment-scale", "3..8"]));
     assert_eq!(plan("range")["plan"]["augment_scale"]["pixel_mm"], serde_json::json!([3.0, 8.0]));
     assert!(!said(&range).contains("warning"), "{}", said(&range));
     let weights = |out: &str| std::fs::read(folder.join(out).join(run::WEIGHTS)).unwrap();
-    assert!(weights("range") != weights("plain"), "the range says nothing");
+    assert!(weights("range") != weights("plain"), "the range has no effect");
 
     let imported = imported(folder);
     for (set, more, words) in [
-        (&imported, vec!["--augment-scale", "auto"], "image 000000 does not tell the size of its pixels on the ground"),
+        (&imported, vec!["--augment-scale", "auto"], "image 000000 does not record its pixel size on the ground"),
         (&imported, vec!["--augment-scale", "3..8"], "leave this option out for them"),
         (
             &*SET,
@@ -216,15 +221,16 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
     assert!(words.contains("there is no scale `2..0.3`"), "{words}");
 }
 
-/// An experiment on `frames`, bound to `set`, and on a scene; it takes seconds at most, for nothing is rendered.
+/// An experiment on `frames`, bound to `set`, and on a scene; it takes at most seconds because nothing is rendered.
 fn table(file: &Path, set: &Path, out: &Path, more: &[&str]) -> Command {
     let real = format!("frames={}", path(set));
     train(&[&["table", path(file), "--real", &real, "--out", path(out)][..], more].concat())
 }
 
-/// Rationale: a set takes hours to be rendered, and the training that refuses it comes after. Expected: a training set whose images do not tell
-/// their pixels is refused at its own `augment_scale`, that of the scale or that of the experiment, with exit code 2 and before anything is
-/// made, by a dry run as by a run; images that are not trained on may lack what they like, and `relative` asks for nothing. Source: none.
+/// Rationale: rendering a dataset takes hours, and only the training after it would refuse it. Expected: a training set
+/// without recorded pixel sizes is refused at the `augment_scale` that applies to it (its own, the scale's or the
+/// experiment's), with exit code 2 and before anything is written, in a dry run as in a real run. Test images may lack
+/// pixel sizes, and `relative` needs none. Source: none.
 #[test]
 fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
     let scratch = tempfile::tempdir().unwrap();
@@ -256,7 +262,7 @@ fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
     };
     let auto = r#", augment_scale: "auto""#;
     let own = r#", hyperparameters: (augment_scale: "3..8")"#;
-    let no_image = "no image of the set `frames` tells the size of its pixels on the ground";
+    let no_image = "no image of the set `frames` records its ground sampling distance";
     let folders = folder.join("photos-and-masks");
     std::fs::create_dir_all(&folders).unwrap();
     std::fs::rename(folder.join("photos"), folders.join("images")).unwrap();
@@ -266,7 +272,7 @@ fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
         (vec![(" ALL", auto)], &folders, 6, no_image),
         (vec![(" ALL", auto), (" OWN", own)], &folders, 4, "`Real` cannot be trained with \"3..8\": no image"),
         (vec![(" LESS", auto)], &folders, 7, no_image),
-        (vec![(" ALL", auto), ("SCENE", "level.ron")], &*SET, 6, "image 000000 of the set `scene` does not tell"),
+        (vec![(" ALL", auto), ("SCENE", "level.ron")], &*SET, 6, "image 000000 of the set `scene` does not record"),
         (vec![(" ALL", auto), ("SCENE", "level.ron"), ("PICK", "4..6")], &*SET, 6, "image 000004 of the set"),
         (vec![(" ALL", auto), ("SCENE", "level.ron"), ("PICK", "random:2")], &*SET, 6, "of the set `scene` does not"),
     ] {

@@ -1,9 +1,9 @@
-//! The Python package: built as a wheel, installed into an environment of its own, used from an empty folder.
+//! The Python package: built as a wheel, installed into a separate environment, used from an empty folder.
 //!
-//! Rationale: most people who train networks meet the program through pip. Expected: the wheel brings the program, Embree, and all
-//! that ships; the module's arrays are what the files hold; PyTorch takes them. Source: Pillow, numpy and torch themselves. The wheel is built
-//! around the program that the tests built, so nothing is compiled for it. Without maturin the tests say so and pass, with
-//! `FURROW_REQUIRE_PEERS=1` they fail.
+//! Rationale: most people who train networks install the program through pip. Expected: the wheel contains the program,
+//! Embree, and all shipped data; the module's arrays equal the files; PyTorch accepts them. Source: Pillow, numpy and
+//! torch themselves. The wheel contains the program built for the tests, so nothing is compiled for it. Without maturin
+//! the tests are skipped with a note, or fail with `FURROW_REQUIRE_PEERS=1`.
 
 use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::{python, torch_with};
@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;
 
-/// What the wheel needs, to be built and to run.
+/// Python code that succeeds if the wheel can be built and run.
 const PROBE: &str = "import maturin, numpy, PIL";
 
-/// A dataset of two images, one to train on and one to validate.
+/// A dataset of two images, one for training and one for validation.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-dataset");
     let _ = std::fs::remove_dir_all(&folder);
@@ -24,19 +24,20 @@ static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
-/// The source of the module, for environments in which no wheel is installed.
+/// Source folder of the module, for environments without the wheel.
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
 }
 
-/// Runs a command and expects success; returns what it wrote to stdout.
+/// Runs a command that must succeed; returns its stdout.
 fn done(command: &mut Command) -> String {
     let Output { status, stdout, stderr } = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
     assert!(status.success(), "{command:?}: {}{}", String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
     String::from_utf8(stdout).expect("text")
 }
 
-/// Builds the wheel in `folder`, around the program that the tests built: `tests/python/stand-in` has a cargo that compiles nothing.
+/// Builds the wheel in `folder` with the program built for the tests: `tests/python/stand-in` has a `cargo` that
+/// compiles nothing.
 fn wheel(python: &Path, folder: &Path) -> PathBuf {
     let cargo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/stand-in/cargo");
     let tools = python.parent().expect("a folder").display().to_string();
@@ -50,7 +51,8 @@ fn wheel(python: &Path, folder: &Path) -> PathBuf {
     folder.join(&built[0])
 }
 
-/// A fresh environment with the wheel; numpy and Pillow are seen where `python` has them, as nothing is to be fetched.
+/// Creates an environment with the wheel; numpy and Pillow are taken from `python`'s environment, so nothing is
+/// downloaded.
 fn environment(python: &Path, wheel: &Path, folder: &Path) -> PathBuf {
     done(Command::new(python).args(["-m", "venv"]).arg(folder));
     let own = folder.join("bin/python");
@@ -77,7 +79,7 @@ fn an_installed_wheel_needs_nothing_else() {
         command.current_dir(&empty).args(arguments);
         command
     };
-    // Data and libraries are the wheel's, not the repository's and the system's.
+    // Data and libraries come from the wheel, not from the repository or the system.
     let soils = done(&mut run(&["soils"]));
     let albedo = soils.lines().find(|line| line.contains("dirt.png")).expect("a soil");
     assert!(albedo.contains(venv.to_str().expect("a path")), "{soils}");

@@ -1,41 +1,44 @@
-//! The rasterized engine: its labels, its light, its effects, its files.
+//! The raster engine: labels, lighting, effects and output files.
 //!
-//! Rationale: a comparison of two engines says something only where all else is equal: the same labels, the same light falling in, the same
-//! lens and sensor. Expected: labels are those of the rays in 99.9 % of the pixels of every scene, and where they are not, an edge
-//! of the labels runs; a matt plane returns ρ E cos θ / π of a sun and ρ E / π of an even surrounding, a leaf T E / π of what falls on its other side through the wrapped cosine;
-//! each effect that is left out changes the picture and no label; equal input makes equal bits.
-//! Source: closed forms; the label pass, which `labels.rs` holds against double precision.
+//! Rationale: two engines can only be compared if all else is equal: the same labels, incident light, lens and sensor.
+//!
+//! Expected: labels equal those of ray casting in 99.9 % of the pixels of every scene, and all differences are at label
+//! edges. A matt plane reflects ρ E cos θ / π under a sun and ρ E / π under a uniform environment; a leaf transmits T E
+//! / π of the light on its other side, with a wrapped cosine. Switching off an effect changes the image and no label;
+//! equal input gives equal bits.
+//!
+//! Source: closed forms; the label pass, which `labels.rs` tests against double precision.
 
 use crate::common::program::{self, FILES, SMALL, names, scratch, trace};
 use crate::common::scenes::square;
-use furrow::accel::EmbreeAccel;
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
-use furrow::film::Filter;
-use furrow::geometry::{Intersect, Ray, Window};
-use furrow::light::{Constant, Light, Sun};
-use furrow::material::Material;
-use furrow::math::{Spectrum, Vec2, Vec3, vec2, vec3};
-use furrow::raster::{Drawn, Rasterizer};
-use furrow::render::{LabelMap, label};
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::tag::{Class, Tag};
-use furrow::scene::{Part, Scene};
-use furrow::sensor::{Camera, Distortion, Pose};
-use furrow::settings::{Engine, Technique, Techniques};
+use furrow_base::geometry::{Intersect, Ray, Window};
+use furrow_base::math::{Spectrum, Vec2, Vec3, vec2, vec3};
+use furrow_field::assemble::{self, Options};
+use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar};
+use furrow_optics::light::{Constant, Light, Sun};
+use furrow_optics::sensor::{Camera, Distortion, Pose};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::Filter;
+use furrow_render::material::Material;
+use furrow_render::raster::{Drawn, Rasterizer};
+use furrow_render::render::{LabelMap, label};
+use furrow_render::scene::tag::{Class, Tag};
+use furrow_render::scene::{Part, Scene};
+use furrow_render::settings::{Engine, Technique, Techniques};
 use std::f32::consts::PI;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// The one card of all tests.
+/// The rasterizer, shared by all tests.
 fn card() -> &'static Rasterizer {
     static CARD: OnceLock<Rasterizer> = OnceLock::new();
     CARD.get_or_init(|| Rasterizer::new().expect("a Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1"))
 }
 
 fn draw(scene: &Scene, without: &[Technique]) -> Drawn {
-    card().draw(scene, &Techniques::without(without)).expect("a picture")
+    card().draw(scene, &Techniques::without(without)).expect("an image")
 }
 
 fn rays(scene: &Scene) -> LabelMap {
@@ -43,7 +46,7 @@ fn rays(scene: &Scene) -> LabelMap {
     label(&geometry, &scene.parts, &scene.camera, Window::full(scene.camera.width(), scene.camera.height()))
 }
 
-/// Whether rays see this tag within a twentieth of a pixel of the centre: an edge runs there.
+/// Returns whether rays within 0.05 pixels of the pixel's centre hit this tag, so that an edge passes there.
 fn near(scene: &Scene, geometry: &EmbreeAccel, tag: Tag, x: u32, y: u32) -> bool {
     let centre = vec2(x as f32 + 0.5, y as f32 + 0.5);
     let around = (0..64).map(|k| {
@@ -56,10 +59,10 @@ fn near(scene: &Scene, geometry: &EmbreeAccel, tag: Tag, x: u32, y: u32) -> bool
     })
 }
 
-/// The pages that ship, and the small one.
+/// Returns the shipped scene files and the small one.
 fn pages() -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> =
-        std::fs::read_dir("scenes").expect("pages").map(|e| e.expect("an entry").path()).collect();
+        std::fs::read_dir("scenes").expect("a folder").map(|e| e.expect("an entry").path()).collect();
     all.retain(|p| p.extension().is_some_and(|e| e == "ron"));
     all.push(SMALL.into());
     all.sort();
@@ -77,7 +80,7 @@ fn labels_are_those_of_the_rays_on_every_scene() {
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
         let found = match card().draw(&field.scene, &Techniques::default()) {
             Ok(drawn) => drawn.labels,
-            // Plants that share meshes are drawn as copies.
+            // Plants that share meshes are rendered as copies, which may exceed the GPU's limits.
             Err(error) if error.to_string().contains("can hold") => continue,
             Err(error) => panic!("{}: {error}", page.display()),
         };
@@ -89,9 +92,9 @@ fn labels_are_those_of_the_rays_on_every_scene() {
         for i in differ {
             let (x, y) = ((i % width) as u32, (i / width) as u32);
             let edge = near(&field.scene, &geometry, found.tags[i], x, y);
-            assert!(edge, "{}: no edge runs through pixel ({x}, {y})", page.display());
+            assert!(edge, "{}: no edge passes through pixel ({x}, {y})", page.display());
         }
-        // Depth and normals are those of the surface, but for pixels where another triangle of it won.
+        // Depth and normals are those of the surface, except in pixels where another triangle of it is nearer.
         let same = (0..count).filter(|i| expected.parts[*i] == found.parts[*i]).collect::<Vec<_>>();
         let far = same.iter().filter(|i| {
             let (a, b) = (expected.depth[**i], found.depth[**i]);
@@ -104,7 +107,7 @@ fn labels_are_those_of_the_rays_on_every_scene() {
     assert!(drawn + 1 >= all, "{drawn} of {all}");
 }
 
-/// A square metre of a material a metre below the camera.
+/// Builds a plane of one material, a metre below the camera.
 fn plane(bsdf: Bsdf, lights: Vec<Light>, distortion: Distortion) -> Scene {
     let pose = Pose::nadir(vec3(0.0, 0.0, 1.0), 0.0, 0.0, 0.0);
     let camera = Camera::new((64, 48), [80.0; 2], [32.0, 24.0], distortion, pose).expect("a camera");
@@ -146,19 +149,19 @@ fn light_from_behind_comes_through_a_leaf() {
     let bsdf = Bsdf::Leaf(Leaf::bare(returned, passed));
     let irradiance = Spectrum::ONE;
     let below = plane(bsdf, vec![Light::Sun(Sun::uniform(-Vec3::Z, irradiance))], Distortion::default());
-    // Wrapped by a half, light from straight behind counts (1 + ½) / (1 + ½)².
+    // Wrapped by ½, light from directly behind has the factor (1 + ½) / (1 + ½)².
     expect(&below, passed * (1.5 / 2.25 / PI), "from below");
     let dark = draw(&below, &[Technique::Foliage]).film;
-    assert!(dark.pixels.iter().all(|p| p.mean.max() == 0.0), "without the effect nothing comes through");
+    assert!(dark.pixels.iter().all(|p| p.mean.max() == 0.0), "without the effect no light is transmitted");
 }
 
 #[test]
 fn a_lamp_falls_off_with_the_square_of_the_distance() {
     let albedo = Spectrum::splat(0.5);
-    let small = furrow::light::Lamp::new(
-        furrow::light::Outline::Disc(0.005),
+    let small = furrow_optics::light::Lamp::new(
+        furrow_optics::light::Outline::Disc(0.005),
         vec3(0.0, 0.0, 0.8),
-        furrow::math::Frame::about(-Vec3::Z),
+        furrow_base::math::Frame::about(-Vec3::Z),
         Spectrum::splat(1000.0),
     );
     let scene = plane(Bsdf::OrenNayar(OrenNayar::new(albedo, 0.0)), vec![Light::Lamp(small)], Distortion::default());
@@ -179,7 +182,7 @@ fn each_effect_changes_the_picture_and_no_label() {
     let field = assemble::field(SMALL.as_ref(), &Options::default()).expect("a field");
     let whole = draw(&field.scene, &[]);
     let again = draw(&field.scene, &[]);
-    assert!(whole.film == again.film && whole.labels == again.labels, "equal input makes equal bits");
+    assert!(whole.film == again.film && whole.labels == again.labels, "equal input must give equal bits");
     for (effect, _) in Technique::ALL.into_iter().filter(|(t, _)| t.engine() == Engine::Raster) {
         let name = effect.name();
         let less = draw(&field.scene, &[effect]);
@@ -193,11 +196,11 @@ fn each_effect_changes_the_picture_and_no_label() {
 fn it_is_about_as_bright_as_the_path_tracer() {
     let field = assemble::field(SMALL.as_ref(), &Options::default()).expect("a field");
     let (film, _) = program::shoot(&field, 16, 2);
-    let mean = |film: &furrow::film::Film| {
-        film.pixels.iter().map(|p| p.mean.0).sum::<furrow::math::Vec4>() / film.pixels.len() as f32
+    let mean = |film: &furrow_render::film::Film| {
+        film.pixels.iter().map(|p| p.mean.0).sum::<furrow_base::math::Vec4>() / film.pixels.len() as f32
     };
     let ratio = mean(&draw(&field.scene, &[]).film) / mean(&film);
-    // No light bounces, and the sky is not hidden by what is farther than a leaf.
+    // There is no interreflection, and the sky is occluded only by surfaces within a leaf's size.
     assert!(ratio.min_element() > 0.75 && ratio.max_element() < 1.25, "{ratio}");
 }
 
@@ -207,8 +210,8 @@ fn the_program_writes_the_files_of_an_image() {
     program::run(&out, &["--engine", "raster"]);
     assert_eq!(names(&out), FILES);
     let size = |folder: &Path| {
-        let decoder = png::Decoder::new(BufReader::new(File::open(folder.join("rgb.png")).expect("a picture")));
-        let info = decoder.read_info().expect("a picture").info().clone();
+        let decoder = png::Decoder::new(BufReader::new(File::open(folder.join("rgb.png")).expect("an image")));
+        let info = decoder.read_info().expect("an image").info().clone();
         (info.width, info.height)
     };
     let (_keep, again) = scratch();
@@ -240,11 +243,11 @@ fn what_it_cannot_do_is_said() {
     let (_keep, out) = scratch();
     let out = out.to_str().expect("a path");
     for (flags, words) in [
-        (&["--engine", "raster", "--denoise"][..], "--denoise says nothing with --engine raster"),
-        (&["--engine", "raster", "--time", "5s"], "--time and --target-error say nothing"),
-        (&["--engine", "raster", "--without", "mis"], "--without mis says nothing with --engine raster"),
-        (&["--engine", "raster", "--max-depth", "3"], "--max-depth and --clamp say nothing with --engine raster"),
-        (&["--without", "msaa"], "--without msaa says nothing with --engine trace"),
+        (&["--engine", "raster", "--denoise"][..], "--denoise has no effect with --engine raster"),
+        (&["--engine", "raster", "--time", "5s"], "--time and --target-error have no effect"),
+        (&["--engine", "raster", "--without", "mis"], "--without mis has no effect with --engine raster"),
+        (&["--engine", "raster", "--max-depth", "3"], "--max-depth and --clamp have no effect with --engine raster"),
+        (&["--without", "msaa"], "--without msaa has no effect with --engine trace"),
     ] {
         let output = trace(&["--scene", SMALL, "--out", out]).args(flags).output().expect("the program");
         let said = String::from_utf8_lossy(&output.stderr);
@@ -264,7 +267,7 @@ fn without_a_driver_it_names_the_package() {
     assert!(!out.exists());
 }
 
-/// Rationale: servers have no window system, and an error that is none hides those that are. Expected: not a word on stderr.
+/// Rationale: servers have no window system, and a spurious error hides real ones. Expected: nothing on stderr.
 #[test]
 fn without_a_window_system_nothing_is_said_of_one() {
     let (_keep, out) = scratch();

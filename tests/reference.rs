@@ -1,38 +1,42 @@
-//! Every pixel against a stored reference.
+//! Compares every pixel with a stored reference.
 //!
-//! Rationale: closed forms test simple scenes and means hide what cancels; a reference finds any pixel that moved. Expected: for
-//! each way to trace, the z-test of each pixel and band against the stored mean and error, at α = 0.01 with Šidák's correction,
-//! accepts at least 99.75 %; of squares of six pixels' side and of the whole image it accepts all. What should be found is
-//! found: an image three percent brighter, and one whose sky is gone. Source: Mitsuba 3's render tests (method and share);
-//! Šidák 1967.
+//! Rationale: closed forms only cover simple scenes, and means hide errors that cancel; a reference detects any changed
+//! pixel.
 //!
-//! `tests/ref/*.exr` hold the mean of each band (f32) and its standard error (f16). Where pixels change on purpose, look at
-//! `target/test-failures/reference-*/`, then renew them: `FURROW_BLESS=1 cargo test --release --test all reference::`.
+//! Expected: for each tracing mode, the z-test of each pixel and band against the stored mean and error, at α = 0.01
+//! with Šidák's correction, accepts at least 99.75 %; for squares of six pixels and for the whole image it accepts all.
+//! Errors are detected: an image three percent brighter, and one without the sky. Source: Mitsuba 3's render tests
+//! (method and fraction); Šidák 1967.
+//!
+//! `tests/ref/*.exr` hold the mean of each band (f32) and its standard error (f16). After an intended change of pixels,
+//! inspect `target/test-failures/reference-*/`, then update them:
+//! `FURROW_BLESS=1 cargo test --release --test all reference::`.
 
 use crate::common::layers::{read_layers, write_layers};
 use crate::common::pictures;
 use crate::common::scenes::{camera, scene, shoot_with, sphere, square};
 use crate::common::stats::{p_value, sidak};
-use furrow::bsdf::{Bsdf, Leaf, OrenNayar};
-use furrow::film::Film;
-use furrow::integrator::{PathTracer, Technique};
-use furrow::light::{Lamp, Light, Outline};
-use furrow::math::{Frame, Mat3, Spectrum, Vec3, vec3};
-use furrow::output::{Picture, write_png};
-use furrow::sampling::Points;
-use furrow::scene::Scene;
-use furrow::scene::assemble::{self, Options};
+use furrow_base::math::{Frame, Mat3, Spectrum, Vec3, vec3};
+use furrow_base::sampling::Points;
+use furrow_field::assemble::{self, Options};
+use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar};
+use furrow_optics::light::{Lamp, Light, Outline};
+use furrow_output::{Picture, write_png};
+use furrow_render::film::Film;
+use furrow_render::integrator::{PathTracer, Technique};
+use furrow_render::scene::Scene;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const SIZE: (u32, u32) = (48, 36);
-/// Side of the squares that are tested as one.
+/// Side of the squares that are tested as a whole, in pixels.
 const SQUARE: u32 = 6;
-/// Chance that the file's tests together fail without a fault, were samples independent; those of Sobol err less than is told.
+/// False-alarm probability of all tests in this file, for independent samples; Sobol points have smaller errors than
+/// reported.
 const ALPHA: f64 = 1e-4;
-/// Calls of [`fault`] that expect none, an upper bound.
+/// Upper bound on the calls of [`fault`] that expect no fault.
 const CALLS: usize = 20;
-/// Samples of a reference, and of what is tested against it.
+/// Samples per pixel of a reference, and of the image tested against it.
 const REFERENCE_SPP: u32 = 8192;
 const SPP: u32 = 256;
 
@@ -41,7 +45,7 @@ fn page(path: &str) -> Scene {
     assemble::field(Path::new(path), &options).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-/// A box without a gap, a lamp in it, a ball and a leaf: all light bounces many times.
+/// Builds a closed box with a lamp, a ball and a leaf, in which light bounces many times.
 fn closed_box() -> Scene {
     let wall = |rotation: Mat3, at: Vec3, color: Spectrum| {
         let mut mesh = square(Vec3::ZERO, 2.0);
@@ -107,7 +111,7 @@ impl Estimate {
         write_layers(&Self::path(name), SIZE, &layers, |channel| channel.starts_with("error"));
     }
 
-    /// The mean over squares of this many pixels' width and height.
+    /// Averages over blocks of `w` × `h` pixels.
     fn over(&self, (w, h): (u32, u32)) -> Self {
         let (columns, rows) = (SIZE.0 / w, SIZE.1 / h);
         let mut all = Self { mean: Vec::new(), variance: Vec::new() };
@@ -123,11 +127,11 @@ impl Estimate {
         all
     }
 
-    /// p of every pixel and band that they have the same mean.
+    /// p-value, for every pixel and band, of the hypothesis that both have the same mean.
     fn p(&self, other: &Self) -> Vec<[f64; 4]> {
         let p = |i: usize, band: usize| {
             let difference = self.mean[i][band] - other.mean[i][band];
-            // Single precision of the means.
+            // Single-precision rounding of the means.
             let rounding = (1e-6 * other.mean[i][band]).powi(2) + 1e-16;
             p_value(difference / (self.variance[i][band] + other.variance[i][band] + rounding).sqrt())
         };
@@ -135,7 +139,7 @@ impl Estimate {
     }
 }
 
-/// What speaks against two estimates having the same mean; `None` where nothing does.
+/// Describes the evidence against equal means of two estimates; `None` if there is none.
 fn fault(got: &Estimate, reference: &Estimate) -> Option<String> {
     for (what, size, share) in
         [("pixels", (1, 1), 0.9975), ("squares", (SQUARE, SQUARE), 1.0), ("whole image", SIZE, 1.0)]
@@ -153,7 +157,7 @@ fn fault(got: &Estimate, reference: &Estimate) -> Option<String> {
     None
 }
 
-/// Writes image, reference and the map of the smallest p of each pixel (dark: unlikely), and says where.
+/// Writes image, reference and a map of the smallest p-value of each pixel (dark: unlikely); returns their folder.
 fn keep(name: &str, got: &Estimate, reference: &Estimate) -> String {
     let folder = pictures::folder(&format!("reference-{name}"));
     let white = reference.mean.iter().flatten().copied().fold(1e-9, f64::max);
@@ -164,12 +168,12 @@ fn keep(name: &str, got: &Estimate, reference: &Estimate) -> String {
         .collect();
     for (file, pixels) in [("image", picture(got)), ("reference", picture(reference)), ("p", p_map)] {
         let path = folder.join(format!("{file}.png"));
-        write_png(&path, SIZE.0, SIZE.1, &Picture::Rgb(&pixels), name).expect("a picture");
+        write_png(&path, SIZE.0, SIZE.1, &Picture::Rgb(&pixels), name).expect("an image");
     }
     folder.display().to_string()
 }
 
-/// Every way to trace, and how many times the samples it needs for its variance to be known.
+/// Returns every tracing mode, with the factor by which it needs more samples for a reliable variance.
 fn ways() -> Vec<(&'static str, PathTracer, Points, u32)> {
     let all = Technique::default();
     let with = |technique| PathTracer { technique, ..PathTracer::default() };
@@ -224,7 +228,7 @@ fn a_closed_box_is_the_reference() {
     check("closed-box", &closed_box(), &ways);
 }
 
-/// Expected: the test finds an image that is three percent brighter, and one without the light of the sky.
+/// Expected: the test detects an image that is three percent brighter, and one without the light of the sky.
 #[test]
 fn what_should_be_found_is_found() {
     if std::env::var_os("FURROW_BLESS").is_some_and(|v| v == "1") {
@@ -237,8 +241,8 @@ fn what_should_be_found_is_found() {
     assert_eq!(fault(&right, &reference), None);
     let mut bright = right;
     bright.mean.iter_mut().for_each(|m| *m = m.map(|v| 1.03 * v));
-    assert!(fault(&bright, &reference).is_some(), "three percent more light pass");
+    assert!(fault(&bright, &reference).is_some(), "three percent more light must be detected");
     scene.lights.retain(|light| !matches!(light, Light::Sky(_)));
-    let dark = fault(&shoot(&scene), &reference).expect("a missing sky passes");
-    assert!(dark.starts_with("pixels"), "every pixel should show it: {dark}");
+    let dark = fault(&shoot(&scene), &reference).expect("a missing sky must be detected");
+    assert!(dark.starts_with("pixels"), "the test of single pixels must detect it: {dark}");
 }

@@ -1,8 +1,8 @@
-//! The report of a dataset: what it says is so, it needs nothing but itself, and a browser shows it.
+//! The report of a dataset: its figures are correct, it is self-contained, and a browser shows it.
 //!
-//! Rationale: a page that people judge a dataset by must not be wrong, and must open anywhere. Expected: its numbers are those
-//! added up here from the records; no request leaves the page; every picture is decoded; nothing hangs over a narrow window's edge.
-//! Source: the records on disk; headless Chromium (Debian's `chromium`).
+//! Rationale: users judge a dataset by this page, so it must be correct and open anywhere. Expected: its figures equal
+//! sums over the records computed here; the page makes no request; every image is decoded; nothing overflows a narrow
+//! window. Source: the records on disk; headless Chromium (Debian's `chromium`).
 
 use crate::common::browser::{browser, probe};
 use crate::common::devtools::Page;
@@ -10,10 +10,10 @@ use crate::common::program::{SMALL, scratch, trace};
 use serde_json::Value;
 use std::path::Path;
 
-/// Images of the small dataset.
+/// Number of images in the small dataset.
 const COUNT: u64 = 6;
 
-/// A small dataset, and its report.
+/// Generates a small dataset and returns the text of its report.
 fn dataset(out: &Path) -> String {
     let arguments = ["dataset", "--scene", SMALL, "--spp", "2", "--width", "96", "--height", "72", "--split", "4,1,1"];
     let mut command = trace(&arguments);
@@ -28,7 +28,7 @@ fn records(out: &Path) -> Vec<Value> {
     (0..COUNT).map(|k| serde_json::from_slice(&read(k)).unwrap()).collect()
 }
 
-/// An attribute of the element with this `data-key`.
+/// Returns an attribute of the element with this `data-key`.
 fn attribute<'a>(page: &'a str, key: &str, name: &str) -> &'a str {
     let of = |text: &'a str, before: &str| -> &'a str {
         let at = text.find(before).unwrap_or_else(|| panic!("no {before} of {key}")) + before.len();
@@ -42,7 +42,7 @@ fn number(page: &str, key: &str, name: &str) -> f64 {
     attribute(page, key, name).parse().unwrap()
 }
 
-/// Plants of a class that an image shows.
+/// Returns the plants of a class that are visible in an image.
 fn seen<'a>(record: &'a Value, class: &'a str) -> impl Iterator<Item = &'a Value> {
     let plants = record["plants"].as_array().unwrap().iter();
     plants.filter(move |p| p["class"] == class && p["seen"]["pixels"].as_u64() > Some(0))
@@ -67,7 +67,7 @@ fn numbers_of_the_report_are_those_of_the_records() {
     let mut leaves = 0;
     for class in ["crop", "weed"] {
         let plants: Vec<&Value> = records.iter().flat_map(|r| seen(r, class)).collect();
-        assert!(!plants.is_empty(), "the page shows no {class}");
+        assert!(!plants.is_empty(), "no {class} in the dataset");
         assert_eq!(number(&page, &format!("plants.{class}"), "data-value"), plants.len() as f64);
         leaves += plants
             .iter()
@@ -79,7 +79,7 @@ fn numbers_of_the_report_are_those_of_the_records() {
         {
             let (key, values) = (format!("{key}.{class}"), of(path));
             assert_eq!(number(&page, &key, "data-n"), values.len() as f64, "{key}");
-            // Records write single precision in as few digits as tell it.
+            // Records contain the shortest decimal form of single-precision numbers.
             assert!((number(&page, &key, "data-mean") - mean(&values)).abs() <= 1e-6 * mean(&values), "{key}");
             let bars = attribute(&page, &key, "data-counts").split(' ').map(|n| n.parse::<usize>().unwrap());
             assert_eq!(bars.sum::<usize>(), values.len(), "bars of {key}");
@@ -92,7 +92,7 @@ fn numbers_of_the_report_are_those_of_the_records() {
     let heights: Vec<f64> =
         records.iter().map(|r| r["conditions"]["camera"]["position_m"][2].as_f64().unwrap()).collect();
     assert!((number(&page, "camera_height_m", "data-mean") - mean(&heights)).abs() < 1e-9);
-    // Each species stands in the table with what was seen of it.
+    // Each species is in the table with the number of its visible plants.
     let recipe: Value = serde_json::from_slice(&std::fs::read(out.join("dataset.json")).unwrap()).unwrap();
     for (k, species) in recipe["species"].as_array().unwrap().iter().enumerate() {
         assert!(page.contains(species["name"].as_str().unwrap()));
@@ -111,13 +111,13 @@ fn equal_datasets_have_equal_reports_that_ask_for_nothing() {
         assert!(!page.contains(word), "the page has {word}");
     }
     let outside = page.match_indices("src=\"").filter(|(at, m)| !page[at + m.len()..].starts_with("data:image/"));
-    assert_eq!(outside.count(), 0, "pictures that lie outside the page");
+    assert_eq!(outside.count(), 0, "images outside the page");
     assert_eq!(page.matches("<figure class=\"shot\"").count() as u64, COUNT);
     let manifest: Value = serde_json::from_slice(&std::fs::read(out.join("a/manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["files"]["report.html"]["bytes"], page.len());
 }
 
-/// Looks at the page from inside and leaves what it sees in the document; no part of what is shipped.
+/// Script that reads the page's state in the browser and stores it in the document; not part of the shipped page.
 const PROBE: &str = r#"<script>addEventListener("load", () => {
   const opacity = () => getComputedStyle(document.querySelector(".frame .labels")).opacity;
   document.querySelectorAll(".labels").forEach(i => i.style.transition = "none");
@@ -154,8 +154,8 @@ fn a_browser_shows_the_report_in_wide_and_narrow_windows() {
     }
 }
 
-/// Rationale: a page of many images is searched for the odd ones. Expected: filters, search and order do what they say, from the records; an image
-/// is enlarged from the dataset's own files. Source: the records on disk.
+/// Rationale: users search reports of many images for unusual ones. Expected: filters, search and sorting agree with
+/// the records; enlarging an image shows the dataset's own file. Source: the records on disk.
 #[test]
 fn images_are_filtered_sorted_searched_and_enlarged() {
     let Some(browser) = browser() else { return };
@@ -210,9 +210,10 @@ fn images_are_filtered_sorted_searched_and_enlarged() {
     assert!(page.complaints.is_empty(), "{:?}", page.complaints);
 }
 
-/// Rationale: a dataset outlives the program that made it. Expected: images of an earlier version verify, and finishing them again
-/// gives the same lists and a report with the same numbers under the same keys; no field of the conditions is lost on the way.
-/// Source: `tests/data/dataset`, two images of version 0.1.0, when conditions were still read by JSON pointers.
+/// Rationale: datasets outlive the program version that made them. Expected: images of an earlier version pass
+/// `verify`, and finishing them again gives the same lists and a report with the same figures under the same keys; no
+/// field of the conditions is lost. Source: `tests/data/dataset`, two images of version 0.1.0, which still read
+/// conditions through JSON pointers.
 #[test]
 fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
     let (_kept, out) = scratch();
@@ -229,7 +230,7 @@ fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
     assert!(said.contains("2 of 2 images checked") && said.contains("; 0 faults"), "{said}");
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     for name in ["000000", "000001"] {
-        let record = furrow::dataset::native::read_record(&out, name).unwrap();
+        let record = furrow_dataset::read::native::read_record(&out, name).unwrap();
         let text = serde_json::to_string(&record).unwrap() + "\n";
         assert_eq!(text, read(&format!("images/{name}/record.json")), "{name}");
     }

@@ -1,22 +1,22 @@
-//! Warps and tables draw what their densities say.
+//! Warps and tables sample according to their densities.
 //!
-//! Rationale: everything the renderer integrates rests on pairs of a draw and a density; a wrong pair is a wrong image that looks
-//! right. Expected: χ² tests pass for each pair, densities integrate to one, and no draw leaves its domain even at the ends of
-//! [0, 1). Source: the warps' references, closed-form areas.
+//! Rationale: every integral of the renderer relies on pairs of a sample and its density; a mismatch gives a wrong
+//! image that looks plausible. Expected: χ² tests pass for each pair, densities integrate to one, and no sample leaves
+//! its domain, even at the ends of [0, 1). Source: the warps' references, closed-form areas.
 
 use crate::common::chi2::{check_counts, check_sphere, check_square, upper_gamma};
-use furrow::math::Vec3;
-use furrow::sampling::distribution::{Distribution1D, Distribution2D, pick};
-use furrow::sampling::{Purpose, Stream, warp};
+use furrow_base::math::Vec3;
+use furrow_base::sampling::distribution::{Distribution1D, Distribution2D, pick};
+use furrow_base::sampling::{Purpose, Stream, warp};
 
 const N: usize = 100_000;
 const ENDS: [f32; 4] = [0.0, 1e-38, 0.5, 1.0 - f32::EPSILON / 2.0];
 
 #[test]
 fn the_test_itself_knows_the_chi_square_distribution() {
-    // Critical values of standard tables: (degrees of freedom, χ² exceeded with probability 0.05, 0.001).
+    // Critical values from standard tables: degrees of freedom, and χ² exceeded with probability 0.05 and 0.001.
     for (k, x05, x001) in [(1.0, 3.841, 10.828), (10.0, 18.307, 29.588), (100.0, 124.342, 149.449)] {
-        // A unit of the last digit printed changes the probability by less than 3e-5 and 1e-6.
+        // One unit of the last printed digit changes the probability by less than 3e-5 and 1e-6.
         let (p05, p001) = (upper_gamma(k / 2.0, x05 / 2.0), upper_gamma(k / 2.0, x001 / 2.0));
         assert!((p05 - 0.05).abs() < 3e-5 && (p001 - 0.001).abs() < 1e-6, "{k} {p05} {p001}");
     }
@@ -119,7 +119,7 @@ fn a_table_of_a_million_cells_keeps_its_small_ones() {
     let weights: Vec<f32> = (0..1024 * 1024).map(|i| if i % 1024 == 512 { 1e4 } else { 1.0 }).collect();
     let table = Distribution2D::new(&weights, 1024).unwrap();
     let mut stream = Stream::of(1, 0, Purpose::Test, 0);
-    // ∫ 1 dA by importance: the mean of 1/pdf, were every cell drawn by its density.
+    // ∫ 1 dA by importance sampling: the mean of 1/pdf, if every cell is sampled with its density.
     let mean = (0..N).map(|_| 1.0 / f64::from(table.sample([stream.uniform32(), stream.uniform32()]).1)).sum::<f64>()
         / N as f64;
     // E[1/pdf²] = ∫ 1/pdf ≈ 1 · (10.77/1): the standard error is √(9.8/N).

@@ -1,28 +1,30 @@
-//! What a LiDAR measures of a field: ranges, intensities, echoes and labels.
+//! LiDAR scans of a field: ranges, intensities, echoes and labels.
 //!
-//! Rationale: who simulates a robot's LiDAR trusts its ranges, its brightness and its labels; each is known in closed form on planes, and by a ray of
-//! one's own in a field. Expected: the LiDAR equation for targets larger than the beam, a cos θ / r² (Wagner et al. 2006); normal errors of the
-//! range; two echoes at an edge, with the shares of a Gaussian beam; the labels of the geometry. Statistical bounds are 5 standard errors: false alarms of 6e-7.
+//! Rationale: users who simulate a robot's LiDAR rely on its ranges, intensities and labels; they are known in closed
+//! form on planes, and by independent rays in a field.
+//!
+//! Expected: the LiDAR equation for targets larger than the beam, a cos θ / r² (Wagner et al. 2006); normally
+//! distributed range errors; two echoes at an edge, with the energy fractions of a Gaussian beam; the labels of the
+//! geometry. Statistical bounds are 5 standard errors, a false-alarm rate of 6e-7.
 
 use crate::common::dataset::fail;
 use crate::common::program::{names, scratch, small_text, trace};
 use crate::common::scenes::{camera, scene, square, with_world};
-use furrow::bsdf::{Bsdf, OrenNayar};
-use furrow::geometry::{Intersect, Mesh, Ray};
-use furrow::job::{Field, SceneFile, Threads};
-use furrow::math::{Spectrum, Vec2, Vec3, vec3};
-use furrow::output;
-use furrow::render::{self, Echo};
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::Scene;
-use furrow::scene::assemble::Scanner;
-use furrow::scene::tag::{Class, Tag};
-use furrow::sensor::{Lidar, LidarDesc};
+use furrow_base::geometry::{Intersect, Mesh, Ray};
+use furrow_base::math::{Spectrum, Vec2, Vec3, vec3};
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_field::assemble::Scanner;
+use furrow_job::{Field, SceneFile, Threads};
+use furrow_optics::bsdf::{Bsdf, OrenNayar};
+use furrow_optics::sensor::{Lidar, LidarDesc};
+use furrow_render::render::{self, Echo};
+use furrow_render::scene::Scene;
+use furrow_render::scene::tag::{Class, Tag};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// A LiDAR of the field of [`page`]: one ray a pulse, without errors.
+/// A LiDAR for the field of [`page`]: one ray per pulse, without errors.
 const RAYS: &str = "lidar: (position_m: (0.05, 0.02, 0.9), beams: Fan(count: 16, from_deg: -88, to_deg: -40), pulses: StepDeg(3), \
                     min_m: 0.2, divergence_mrad: 0, exit_mm: 0, range_noise_m: 0),";
 
@@ -35,7 +37,7 @@ fn matt(albedo: f32) -> Bsdf {
     Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(albedo), 0.0))
 }
 
-/// Matt surfaces with these labels. No light: a LiDAR brings its own.
+/// Builds a scene of matt surfaces with these labels. It has no light, because a LiDAR emits its own.
 fn stage(parts: Vec<(Mesh, f32, Tag)>) -> Scene {
     let look = camera((8, 8), vec3(0.0, 0.0, 1.0), vec3(0.0, 0.1, 0.0), 40.0);
     let tags: Vec<Tag> = parts.iter().map(|(.., tag)| *tag).collect();
@@ -54,8 +56,9 @@ fn scanned(stage: &Scene, lidar: &Lidar) -> Vec<Echo> {
     with_world(stage, 2, |world, _| render::scan(world, lidar, &Stream::of(1, 0, Purpose::Test, 0)))
 }
 
-/// Expected: at the height h and an elevation e below the horizon r = h / sin e, and intensity albedo · sin e / r²; without width and errors to single
-/// precision. Of a beam with width the mean over its Gaussian: of 1/r² and of r by less than 1e-4 of the value at the axis, where it is 1 mrad wide.
+/// Expected: at height h and an elevation e below the horizon, r = h / sin e and intensity = albedo · sin e / r², to
+/// single precision for a beam without width and errors. A beam with width averages over its Gaussian; at 1 mrad, 1/r²
+/// and r differ by less than 1e-4 from their values on the axis.
 #[test]
 fn a_matt_plane_is_as_far_and_as_bright_as_the_lidar_equation_says() {
     let (height, albedo) = (3.0_f32, 0.6);
@@ -65,7 +68,7 @@ fn a_matt_plane_is_as_far_and_as_bright_as_the_lidar_equation_says() {
             "(position_m: (0, 0, {height}), beams: Angles([-90, -60, -30, -10, 20]), pulses: StepDeg(10), range_noise_m: 0, {width})"
         ));
         let echoes = scanned(&plane, &lidar);
-        assert_eq!(echoes.len(), 4 * 36, "the beam above the horizon meets nothing");
+        assert_eq!(echoes.len(), 4 * 36, "the beam above the horizon must have no echo");
         for echo in &echoes {
             let down = [90.0, 60.0, 30.0, 10.0_f32][usize::from(echo.pulse.beam)].to_radians().sin();
             let (range, intensity) = (height / down, albedo * down * (down / height).powi(2));
@@ -78,8 +81,8 @@ fn a_matt_plane_is_as_far_and_as_bright_as_the_lidar_equation_says() {
     }
 }
 
-/// Expected: ranges that err by a normal number, of mean 0 and the standard deviation σ that was asked for: means within 5 σ/√n, deviations within
-/// 5 σ/√(2n); a different error of each pulse; and none beyond the ranges that are told.
+/// Expected: normally distributed range errors with mean 0 and the requested standard deviation σ: means within 5 σ/√n,
+/// deviations within 5 σ/√(2n); a different error for each pulse; no echo outside the range limits.
 #[test]
 fn ranges_err_by_the_noise_that_was_asked_for() {
     let (height, sigma) = (3.0, 0.02);
@@ -99,23 +102,24 @@ fn ranges_err_by_the_noise_that_was_asked_for() {
     assert!((deviation - sigma).abs() < 5.0 * sigma / (2.0 * n).sqrt(), "{deviation}, not {sigma}");
     let different: BTreeSet<u32> = echoes.iter().map(|echo| echo.range.to_bits()).collect();
     assert!(different.len() > 11_000, "{}", different.len());
-    // Half of them lie beyond, and are not told.
+    // Half of the echoes are beyond the limit and not returned.
     let near = aimed(sigma, "max_m: 3");
-    assert!(near.iter().all(|echo| echo.range <= 3.0), "told beyond its range");
+    assert!(near.iter().all(|echo| echo.range <= 3.0), "echo beyond the range limit");
     let share = near.len() as f64 / n;
     assert!((share - 0.5).abs() < 2.5 / n.sqrt(), "{share}");
     let wild = aimed(1e6, "min_m: 0");
     assert!(wild.iter().all(|echo| (0.0..=100.0).contains(&echo.range)));
 }
 
-/// A leaf at 1 m, whose edge runs north at `edge` m, over ground; seen from 5 m.
+/// Builds a leaf at a height of 1 m over ground, whose edge runs north at x = `edge` m; the LiDAR is at 5 m.
 fn leaf_over_ground(edge: f32) -> Scene {
     let leaf = Tag { class: Class::Crop, plant: 7, leaf: 3 };
     let mesh = square(vec3(edge + 0.5, 0.0, 1.0), 1.0);
     stage(vec![(square(Vec3::ZERO, 10.0), 0.2, Tag::default()), (mesh, 0.5, leaf)])
 }
 
-/// Share of a Gaussian beam beyond the distance `d` from its axis, in units of half its 1/e² width, of what lies within that: by sums.
+/// Fraction of a Gaussian beam's energy beyond the distance `d` from its axis, in units of half its 1/e² width,
+/// relative to the energy within that width; summed numerically.
 fn share_beyond(d: f64) -> f64 {
     let (mut beyond, mut all) = (0.0, 0.0);
     let n = 400;
@@ -132,9 +136,12 @@ fn share_beyond(d: f64) -> f64 {
     beyond / all
 }
 
-/// Expected: leaf and ground 1 m apart are two echoes of a pulse of 0.5 m, at 4 m and 5 m; what each brings, over what it would bring of the whole beam,
-/// sums to 1, and is the share of a Gaussian beam on the leaf within what 19 rays can tell, the weight of a few of them; first and last are told as asked. A pulse of 1.5 m makes one echo of both:
-/// their sum, at their mean.
+/// Expected: a leaf and ground 1 m apart give two echoes of a 0.5 m pulse, at 4 m and 5 m. Their intensities, relative
+/// to those of the whole beam, sum to 1; the leaf's fraction is that of a Gaussian beam within the resolution of 19
+/// rays (the weight of a few of them).
+///
+/// First and last echoes are returned as requested. A 1.5 m pulse gives one echo of both: the sum of the intensities,
+/// at their mean range.
 #[test]
 fn a_beam_over_the_edge_of_a_leaf_has_two_echoes() {
     let aimed = |returns: &str, pulse_ns: f32| {
@@ -156,7 +163,7 @@ fn a_beam_over_the_edge_of_a_leaf_has_two_echoes() {
         assert!((shares[0] + shares[1] - 1.0).abs() < 1e-4, "{shares:?}");
         let expected = share_beyond(f64::from(beyond));
         assert!((f64::from(shares[0]) - expected).abs() < 0.12, "{beyond}: {}, not {expected}", shares[0]);
-        // The same echoes, by what is asked of them.
+        // The same echoes, selected by the return mode.
         let brightest = if leaf.intensity > soil.intensity { leaf } else { soil };
         for (returns, told) in [
             ("First", vec![leaf]),
@@ -175,8 +182,9 @@ fn a_beam_over_the_edge_of_a_leaf_has_two_echoes() {
     }
 }
 
-/// Rationale: a slope spreads a beam over metres of range, which is one long echo and no row of them. Expected: one echo of each pulse on a plane however
-/// flat it is met and however short the pulse; as bright as the LiDAR equation says of the whole beam, to second order in its width.
+/// Rationale: a slope spreads a beam over metres of range, which is one long echo, not several. Expected: one echo of
+/// each pulse on a plane, however grazing the beam and however short the pulse; its intensity follows the LiDAR
+/// equation for the whole beam, to second order in its width.
 #[test]
 fn a_plane_that_is_met_flatly_is_one_echo() {
     for pulse_ns in ["0", "1", "6.67"] {
@@ -195,7 +203,7 @@ fn a_plane_that_is_met_flatly_is_one_echo() {
     }
 }
 
-/// The small page with `more` in it, as a file of its own.
+/// Writes the small scene file with the text `more` added.
 fn page(folder: &Path, name: &str, more: &str) -> PathBuf {
     std::fs::create_dir_all(folder).unwrap();
     let root = env!("CARGO_MANIFEST_DIR");
@@ -212,7 +220,7 @@ fn grown(page: &Path, threads: usize) -> Field {
     SceneFile::open(page).unwrap().threads(&threads).scanned(Scanner::OfScene).field(0).unwrap()
 }
 
-/// Columns of a PLY file by their names, and its comments; read by its header alone.
+/// Returns the columns of a PLY file by name, and its comments, using only its header.
 fn columns(file: &[u8]) -> (BTreeMap<String, Vec<f64>>, Vec<String>) {
     let end = file.windows(11).position(|w| w == b"end_header\n").expect("a header") + 11;
     let header = std::str::from_utf8(&file[..end]).unwrap();
@@ -245,12 +253,12 @@ fn columns(file: &[u8]) -> (BTreeMap<String, Vec<f64>>, Vec<String>) {
             found.entry(name.clone()).or_default().push(value);
         }
     }
-    assert_eq!(at, file.len(), "the file is as long as its header says");
+    assert_eq!(at, file.len(), "the file's length must agree with its header");
     (found, comments)
 }
 
-/// Expected: a ray of one's own along each pulse meets what the echo says, at that range, or nothing where there is none; the file holds the same
-/// labels, and the identity of the plant; plants of both classes and soil are among them.
+/// Expected: an independent ray along each pulse hits the part and range of its echo, or nothing if there is no echo.
+/// The file contains the same labels and the identity of the plant; plants of both classes and soil occur.
 #[test]
 fn every_echo_has_the_labels_of_a_ray_of_its_own() {
     let (_keep, folder) = scratch();
@@ -260,7 +268,7 @@ fn every_echo_has_the_labels_of_a_ray_of_its_own() {
     let pulses = (0..lidar.columns()).flat_map(|c| (0..lidar.beams()).map(move |b| lidar.pulse(c, b)));
     let met: Vec<_> = pulses.filter_map(|p| Some((p, geometry.closest(&Ray::new(p.origin, p.direction))?))).collect();
     assert_eq!(met.len(), echoes.len());
-    let file = output::scan::cloud(field.grown(), lidar, &echoes).file("test");
+    let file = furrow_output::scan::cloud(field.grown(), lidar, &echoes).file("test");
     let (columns, _) = columns(&file);
     let ids: BTreeMap<u32, u32> = field.grown().plants.iter().map(|plant| (plant.number, plant.id)).collect();
     let mut seen = BTreeMap::new();
@@ -287,8 +295,8 @@ fn every_echo_has_the_labels_of_a_ray_of_its_own() {
     assert!([0, 1, 2].iter().all(|class| seen.get(class).is_some_and(|n| *n > 20)), "{seen:?}");
 }
 
-/// Expected of beams with width: the label of the only surface where all rays of a pulse meet one, and else of one of those that they meet; each plant's
-/// echoes lie about it.
+/// Expected for beams with width: if all rays of a pulse hit one surface, its label, otherwise the label of one of the
+/// surfaces hit; each plant's echoes are around it.
 #[test]
 fn an_echo_of_a_wide_beam_has_a_label_within_its_beam() {
     let (_keep, folder) = scratch();
@@ -310,10 +318,10 @@ fn an_echo_of_a_wide_beam_has_a_label_within_its_beam() {
         several += u32::from(echo.count > 1);
         let (lo, hi) = hits.iter().fold((f32::INFINITY, 0.0_f32), |(lo, hi), hit| (lo.min(hit.t), hi.max(hit.t)));
         assert!((lo - 1e-4..=hi + 1e-4).contains(&echo.range));
-        assert!(echo.normal.dot(echo.pulse.direction) < 0.1, "the side that it sees");
+        assert!(echo.normal.dot(echo.pulse.direction) < 0.1, "the normal must face the LiDAR");
     }
     assert!(pure > 500 && mixed > 50 && several > 10, "{pure} {mixed} {several}");
-    // More than one echo only of more than one surface, or of one that stands twice in the beam; seldom of the ground alone.
+    // Several echoes only from several surfaces, or from one that is in the beam twice; rarely from the ground alone.
     let of = |echo: &&Echo| parts[echo.part as usize].tag == Tag::default();
     let alone = echoes.windows(2).filter(|pair| pair[0].pulse == pair[1].pulse && pair.iter().all(|e| of(&e))).count();
     assert!(alone * 50 < echoes.len(), "{alone} of {} echoes are of ground behind ground", echoes.len());
@@ -328,17 +336,18 @@ fn a_scan_is_the_same_bits_on_one_and_two_threads() {
     let file = |threads| {
         let field = grown(&path, threads);
         let (lidar, echoes) = field.scan().unwrap();
-        output::scan::cloud(field.grown(), lidar, &echoes).file("test")
+        furrow_output::scan::cloud(field.grown(), lidar, &echoes).file("test")
     };
     let one = file(1);
     assert!(one.len() > 50_000 && one == file(2));
     let field = grown(&path, 2);
     let (_, again) = field.scan().unwrap();
-    assert_eq!(again, field.scan().unwrap().1, "and again of the same field");
+    assert_eq!(again, field.scan().unwrap().1, "a second scan of the same field must be equal");
 }
 
-/// Expected: a drive of 0.5 m/s to the east at 2 Hz moves the LiDAR by 0.25 m a frame; its pulses move with it during a turn. Its plants stay: those
-/// with the same identity are found in both frames, about the same places. Errors of the range are other ones.
+/// Expected: a drive of 0.5 m/s to the east at 2 Hz moves the LiDAR by 0.25 m per frame, and its pulses move with it
+/// during a turn. Plants stay in place: those with the same identity are found in both frames at about the same
+/// positions. The range errors differ between the frames.
 #[test]
 fn frames_of_a_drive_move_the_lidar() {
     let (_keep, folder) = scratch();
@@ -348,7 +357,7 @@ fn frames_of_a_drive_move_the_lidar() {
     for frame in 0..2 {
         field.take(frame).unwrap();
         let (lidar, echoes) = field.scan().unwrap();
-        let file = output::scan::cloud(field.grown(), lidar, &echoes).file("test");
+        let file = furrow_output::scan::cloud(field.grown(), lidar, &echoes).file("test");
         let (columns, comments) = columns(&file);
         let [x, y] = [lidar.position.x, lidar.position.y];
         assert!(comments.iter().any(|line| line.starts_with(&format!("lidar position_m: {x} {y} "))), "{comments:?}");
@@ -357,7 +366,7 @@ fn frames_of_a_drive_move_the_lidar() {
     let way = frames[1].0.position - frames[0].0.position;
     assert!((way - vec3(0.25, 0.0, 0.0)).length() < 1e-5, "{way}");
     for (lidar, _) in &frames {
-        assert!((lidar.axes.y_axis - Vec3::X).length() < 1e-5, "its front looks ahead");
+        assert!((lidar.axes.y_axis - Vec3::X).length() < 1e-5, "its front must face the direction of travel");
         let [begin, half] = [0, lidar.columns() / 2].map(|column| lidar.pulse(column, 0));
         assert!((half.origin - begin.origin - Vec3::X * (0.5 * half.time_s)).length() < 1e-6 && half.time_s > 0.04);
     }
@@ -384,7 +393,7 @@ fn frames_of_a_drive_move_the_lidar() {
     }
 }
 
-/// Expected: each plant that an image of the field has is a plant of its scan, with the same identity, place, species and age.
+/// Expected: each plant in an image of the field is in its scan, with the same identity, position, species and age.
 #[test]
 fn plants_have_the_identities_of_an_image() {
     let (_keep, folder) = scratch();
@@ -398,13 +407,13 @@ fn plants_have_the_identities_of_an_image() {
         assert!((plant.position - same.position).truncate().length() < 1e-5, "{} {}", plant.position, same.position);
         assert_eq!((&plant.species, plant.age_days, plant.leaves), (&same.species, same.age_days, same.leaves));
     }
-    // And what a camera's image shows does not depend on the LiDAR.
+    // The LiDAR does not change the camera's image.
     let plain = SceneFile::open(page(&folder, "plain.ron", "")).unwrap().field(0).unwrap();
     assert_eq!(image.label().unwrap(), plain.label().unwrap());
 }
 
-/// Rationale: a LiDAR brings its own light, so a scene file for scans alone needs none. Expected: a scan of one without lights warns of nothing, and an image
-/// of it would be black and says so.
+/// Rationale: a LiDAR emits its own light, so scene files for scans need no lights. Expected: a scan without lights
+/// causes no warning, while an image would be black and causes one.
 #[test]
 fn a_scan_needs_no_light() {
     let (_keep, folder) = scratch();
@@ -420,7 +429,7 @@ fn a_scan_needs_no_light() {
     assert!(warns(image));
 }
 
-/// Expected: exit code 2, one error that says what to write, and no file; then a scan that does write.
+/// Expected: exit code 2, one error with a remedy, and no file; then a scan that succeeds.
 #[test]
 fn mistakes_are_told_and_write_nothing() {
     let (_keep, folder) = scratch();
@@ -449,7 +458,7 @@ fn mistakes_are_told_and_write_nothing() {
         let error = fail(scan(&written(k, more), &[]), 2);
         assert!(error.contains(words) && error.matches("error:").count() == 1, "{more}: {error}");
         assert!(error.contains("help:"), "{more}: {error}");
-        assert!(!out.exists(), "{more}: something was written");
+        assert!(!out.exists(), "{more}: output was written");
     }
     let good = written(20, RAYS);
     let error = fail(scan(&good, &["--lidar", "Vlp16"]), 2);

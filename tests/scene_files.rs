@@ -1,21 +1,22 @@
-//! Method 11: scene files. Every page that ships builds, says the same after printing and reading, and every mistake in
-//! `tests/bad` is answered by exactly the words beside it.
+//! Method 11: scene files. Every shipped file builds and survives printing and parsing, and every invalid file in
+//! `tests/bad` gives exactly the message stored beside it.
 //!
-//! Rationale: people write pages by hand, at night, in editors that know nothing of them. Expected: a page builds or its
-//! error shows file, line, column, the characters at fault and a way out. Source: none; the words are ours. After a change of
-//! words: `FURROW_BLESS=1 cargo test --test all scene_files::` writes them anew; read the difference before committing it.
+//! Rationale: users write scene files by hand, in editors that do not know the format. Expected: a file builds, or its
+//! error shows the file, line, column, the faulty characters and a remedy. Source: none; the messages are our own.
+//! After a change of messages, `FURROW_BLESS=1 cargo test --test all scene_files::` updates them; review the difference
+//! before committing.
 
-use furrow::Result;
-use furrow::model::{Model, Up};
-use furrow::plant::{Stage, grow};
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::desc::{FieldDesc, SpeciesDesc};
-use furrow::texture::draw::Recipe;
-use furrow::texture::panorama::Panorama;
-use furrow::texture::{ColorSpace, Texture};
-use furrow::train::table::{Experiment, ExperimentDesc};
+use furrow_base::Result;
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_field::assemble::{self, Options};
+use furrow_field::desc::{FieldDesc, SpeciesDesc};
+use furrow_grow::model::{Model, Up};
+use furrow_grow::plant::{Stage, grow};
+use furrow_optics::texture::draw::Recipe;
+use furrow_optics::texture::panorama::Panorama;
+use furrow_optics::texture::{ColorSpace, Texture};
+use furrow_train::table::{Experiment, ExperimentDesc};
 use proptest::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -23,7 +24,7 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The `.ron` files of a folder and the folders in it, in order; paths relative to the repository, where tests run.
+/// Returns the `.ron` files of a folder and its subfolders, sorted, relative to the repository.
 fn pages(folder: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -60,13 +61,17 @@ fn species() -> Vec<PathBuf> {
 
 #[test]
 fn every_field_page_builds() {
-    assert!(fields().len() >= 7, "scene pages are missing");
+    assert!(fields().len() >= 7, "scene files are missing");
     for path in fields() {
-        // Few pixels: the ground is grown as fine as a pixel sees it.
+        // Few pixels, because the detail of the ground depends on the pixel size.
         let options = Options { width: Some(48), ..Options::default() };
         let field = assemble::field(&path, &options).unwrap_or_else(|e| panic!("{e}"));
-        assert!(!field.scene.parts.is_empty() && !field.scene.lights.is_empty(), "{}: nothing to see", path.display());
-        // A horizon has ground beyond all plants, which its scene file tells.
+        assert!(
+            !field.scene.parts.is_empty() && !field.scene.lights.is_empty(),
+            "{}: no parts or no lights",
+            path.display()
+        );
+        // A visible horizon has ground beyond all plants, which causes an intended warning.
         let told = |warning: &&String| !warning.starts_with("the camera sees ground to the horizon");
         assert_eq!(field.warnings.iter().filter(told).collect::<Vec<_>>(), [""; 0], "{}", path.display());
         for part in &field.scene.parts {
@@ -77,7 +82,7 @@ fn every_field_page_builds() {
 
 #[test]
 fn every_species_page_grows_at_every_stage() {
-    assert!(species().len() >= 16, "species pages are missing");
+    assert!(species().len() >= 16, "species files are missing");
     for path in species() {
         let desc = SpeciesDesc::read(&path).unwrap_or_else(|e| panic!("{e}"));
         for stage in &desc.plant.stages {
@@ -101,7 +106,7 @@ fn every_species_page_grows_at_every_stage() {
 
 #[test]
 fn every_experiment_page_reads_at_each_of_its_scales() {
-    assert!(!experiments().is_empty(), "experiment pages are missing");
+    assert!(!experiments().is_empty(), "experiment files are missing");
     for path in experiments() {
         let page = RonFile::read(&path).unwrap();
         let desc: ExperimentDesc = page.parse().unwrap_or_else(|e| panic!("{e}"));
@@ -153,7 +158,7 @@ fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
         for other in &all[..i] {
             assert!(page.seed != other.seed && page.weeds != other.weeds);
             let alike = FieldDesc { seed: page.seed, weeds: page.weeds.clone(), ..other.clone() };
-            assert!(alike == *page, "seed {}: something else than weeds and seed differs", page.seed);
+            assert!(alike == *page, "seed {}: more than weeds and seed differs", page.seed);
         }
     }
     let species = |page: &FieldDesc| page.weeds.iter().map(|w| w.species.clone()).collect::<Vec<_>>();
@@ -162,7 +167,7 @@ fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
     assert_eq!(species(&all[3]).len(), 5);
 }
 
-/// What a bad page is told, as the program prints it.
+/// Returns the error for an invalid file, as the program prints it.
 fn told(path: &Path) -> String {
     match assemble::field(path, &Options { width: Some(16), ..Options::default() }) {
         Ok(_) => panic!("{}: it builds", path.display()),
@@ -177,7 +182,7 @@ fn bad() -> Vec<PathBuf> {
 #[test]
 fn every_mistake_gets_exactly_the_words_beside_it() {
     let bless = std::env::var_os("FURROW_BLESS").is_some_and(|v| v == "1");
-    assert!(bad().len() >= 24, "bad pages are missing");
+    assert!(bad().len() >= 24, "invalid scene files are missing");
     let mut wrong = Vec::new();
     for path in bad() {
         let (words, beside) = (told(&path), path.with_extension("txt"));
@@ -186,13 +191,13 @@ fn every_mistake_gets_exactly_the_words_beside_it() {
         }
         let expected = std::fs::read_to_string(&beside).unwrap_or_default();
         if words != expected {
-            wrong.push(format!("{}\n--- expected\n{expected}--- told\n{words}", path.display()));
+            wrong.push(format!("{}\n--- expected\n{expected}--- printed\n{words}", path.display()));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Line, column, underlined characters of a message: what a reader's eye follows.
+/// Line, column and underlined characters of a message.
 fn pointed_at(words: &str) -> (usize, usize, String) {
     let mut lines = words.lines();
     let head = lines.next().unwrap().strip_prefix("error: tests/bad/").unwrap();
@@ -213,7 +218,7 @@ fn every_message_points_into_its_page_and_helps() {
             continue;
         }
         let (line, column, under) = pointed_at(&words);
-        // The page at fault may be one that the page names.
+        // The faulty file may be one that the scene file names.
         let file = words.strip_prefix("error: ").unwrap().split(':').next().unwrap();
         let text = String::from_utf8_lossy(&std::fs::read(file).unwrap()).into_owned();
         let there: String =
@@ -254,11 +259,11 @@ fn the_program_refuses_bad_pages_and_writes_nothing() {
         assert_eq!(done.status.code(), Some(2), "{}", path.display());
         assert!(done.stdout.is_empty(), "{}", path.display());
         assert_eq!(String::from_utf8(done.stderr).unwrap(), told(&path));
-        assert!(!out.exists(), "{}: a folder was made", path.display());
+        assert!(!out.exists(), "{}: a folder was created", path.display());
     }
 }
 
-/// A page, or an error that a terminal can show.
+/// Checks that reading succeeds or gives an error that a terminal can show.
 fn tidy<T>(read: Result<T>) -> Result<(), TestCaseError> {
     let Err(error) = read else { return Ok(()) };
     prop_assert!(error.place().is_some_and(|place| place.span.is_some()), "{error}");
@@ -276,7 +281,7 @@ fn read_as_any(text: &str) -> Result<(), TestCaseError> {
     tidy(page.parse::<Recipe>())
 }
 
-/// One edit of a text: bytes taken away, put in or doubled.
+/// Edits a text once: removes, inserts or duplicates characters.
 fn edited(text: &str, (at, len, kind, with): &(prop::sample::Index, usize, u8, String)) -> String {
     let chars: Vec<char> = text.chars().collect();
     let at = at.index(chars.len() + 1);
@@ -316,8 +321,8 @@ proptest! {
     }
 }
 
-/// Rationale: a pipe that nobody writes into and a device that never ends would hold the program for ever. Expected: every kind of file
-/// that a scene names is refused at once, with words that say what it is.
+/// Rationale: a pipe without a writer, or an endless device, would block the program forever. Expected: every kind of
+/// file named by a scene is refused at once if it is not a regular file, with a message that says what it is.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_at_once() {
@@ -331,7 +336,7 @@ fn pipes_and_devices_are_refused_at_once() {
     let zero = std::path::PathBuf::from("/dev/zero");
     let (done, wait) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
-        let words = |error: furrow::Error| (error.exit_code(), error.to_string());
+        let words = |error: furrow_base::Error| (error.exit_code(), error.to_string());
         done.send(words(RonFile::read(&scene).unwrap_err())).unwrap();
         done.send(words(RonFile::read(&zero).unwrap_err())).unwrap();
         done.send(words(Texture::load(&picture, ColorSpace::Srgb).unwrap_err())).unwrap();
@@ -341,7 +346,7 @@ fn pipes_and_devices_are_refused_at_once() {
         done.send(words(RonFile::of(&text).need_file(panorama.to_str().unwrap()).unwrap_err())).unwrap();
     });
     for k in 0..6 {
-        let (code, words) = wait.recv_timeout(std::time::Duration::from_secs(60)).expect("it waits for ever");
+        let (code, words) = wait.recv_timeout(std::time::Duration::from_secs(60)).expect("the program waits forever");
         assert!(code == 2 && words.contains("a pipe, a socket or a device, not a file"), "{k}: {code} {words}");
     }
 }

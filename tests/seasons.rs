@@ -1,29 +1,31 @@
-//! Days: one field that grows.
+//! Days: a field over a growing season.
 //!
-//! Rationale: who looks at plants over weeks needs the same plants in the same places, each a little larger, with the damage that it had and
-//! more. Expected: identities and places stay, leaves come and grow, holes stay where they were on the leaf, weeds are not there before they
-//! emerge, and no byte depends on which other days are rendered. Equality is exact.
+//! Rationale: a time series of several weeks needs the same plants at the same positions, each a little larger, with
+//! its earlier damage and more. Expected: identities and positions stay, leaves appear and grow, holes keep their
+//! positions on the leaf, weeds are absent before they emerge, and no byte depends on the other days that are rendered.
+//! Equality is exact.
 
 use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, small_text, trace};
 use crate::common::python::{ask, python};
-use furrow::dataset::{Record, Set, format, native};
-use furrow::geometry::AlphaMask;
-use furrow::light::LightRecord;
-use furrow::math::vec2;
-use furrow::plant::condition::{Bearer, Marks};
-use furrow::plant::{Condition, ConditionDesc};
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble::{Options, field_of};
-use furrow::scene::days::DaysDesc;
-use furrow::scene::traits::Traits;
-use furrow::scene::{Field, PartKind};
+use furrow_base::geometry::AlphaMask;
+use furrow_base::math::vec2;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::read::native;
+use furrow_dataset::{Record, Set, format};
+use furrow_field::assemble::{Options, field_of};
+use furrow_field::days::DaysDesc;
+use furrow_field::traits::Traits;
+use furrow_field::{Field, PartKind};
+use furrow_grow::plant::condition::{Bearer, Marks};
+use furrow_grow::plant::{Condition, ConditionDesc};
+use furrow_optics::light::LightRecord;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 const CAMERA: &str = "Pinhole(size: (24, 18), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.6))";
 
-/// A row of beets and two flushes of fat hen without soil, in this condition.
+/// A row of beets and two flushes of fat hen without soil, in the given condition.
 fn bare(condition: &str) -> String {
     let root = env!("CARGO_MANIFEST_DIR");
     let weed = |day: u32| {
@@ -46,7 +48,7 @@ fn on(text: &str, day: u32) -> Field {
 
 const FLAWLESS: &str = "(holes: 0, shot_holes: 0, bites: 0, tears: 0, spots: 0, blotches: 0, scorched: 0, wilt: 0)";
 
-/// Expected: all that stood there stands there, older, with no smaller leaf and no less area; a plant's flat leaves are what they were or more.
+/// Expected: all plants are still present and older, no leaf is smaller, and no plant has less leaf area.
 #[test]
 fn one_field_grows() {
     let text = bare(FLAWLESS);
@@ -57,17 +59,18 @@ fn one_field_grows() {
         let (before, now) = (&pair[0], &pair[1]);
         let (had, have) = (Traits::of(before), Traits::of(now));
         for plant in &before.plants {
-            let grown = now.plants.iter().find(|other| other.id == plant.id).expect("no plant goes");
+            let grown = now.plants.iter().find(|other| other.id == plant.id).expect("no plant may disappear");
             assert_eq!((grown.number, grown.position, &grown.species), (plant.number, plant.position, &plant.species));
-            assert!(grown.leaf_ids.starts_with(&plant.leaf_ids), "leaves keep their identities");
+            assert!(grown.leaf_ids.starts_with(&plant.leaf_ids), "leaves must keep their identities");
             assert!(grown.age_days > plant.age_days && grown.bbch >= plant.bbch && grown.leaves >= plant.leaves);
             rates.push(
                 (grown.age_days - plant.age_days) / f32::from(now.day.unwrap() as u16 - before.day.unwrap() as u16),
             );
-            // Seed leaves narrow and fall where the species file says so.
+            // Cotyledons narrow and fall as the species file states.
             for leaf in plant.leaf_axes.iter().filter(|leaf| leaf.leaf > 2) {
-                let later = grown.leaf_axes.iter().find(|other| other.leaf == leaf.leaf).expect("no leaf goes");
-                let area = |of: furrow::plant::LeafSize| of.length * of.width;
+                let later =
+                    grown.leaf_axes.iter().find(|other| other.leaf == leaf.leaf).expect("no leaf may disappear");
+                let area = |of: furrow_grow::plant::LeafSize| of.length * of.width;
                 assert!(area(later.size) >= (1.0 - 1e-5) * area(leaf.size), "{} leaf {}", plant.species, leaf.leaf);
                 leaves += 1;
             }
@@ -77,13 +80,13 @@ fn one_field_grows() {
         assert!(have.canopy.unwrap().lai > had.canopy.unwrap().lai);
     }
     assert!(leaves > 50, "{leaves}");
-    // Every plant has a pace of its own, and keeps it.
+    // Every plant has its own constant growth rate.
     let (lo, hi) = rates.iter().fold((f32::MAX, 0.0_f32), |(lo, hi), r| (lo.min(*r), hi.max(*r)));
     assert!(lo > 0.7 && hi < 1.31 && hi - lo > 0.05, "{lo} {hi}");
 }
 
-/// Expected: the first flush, of days 0 to 4, is there on day 17, and nothing that is younger; on day 30 the second is, of days 18 to 22, with
-/// plants that were not there before. No plant ages faster than 1.3 or slower than 0.7 days a day.
+/// Expected: on day 17 only the first flush of days 0 to 4 is present; on day 30 the second flush of days 18 to 22 as
+/// well, with new plants. No plant ages by more than 1.3 or less than 0.7 days per day.
 #[test]
 fn weeds_emerge_in_flushes() {
     let text = bare(FLAWLESS);
@@ -99,19 +102,20 @@ fn weeds_emerge_in_flushes() {
     assert!(old.iter().all(|(_, age)| **age >= 26.0 * 0.7) && old.len() >= early.len());
 }
 
-/// Where leaves are cut, on a raster of each leaf's own image.
+/// Cut areas of all leaves, sampled on a grid in each leaf's texture coordinates.
 fn cut(field: &Field) -> BTreeMap<(u32, u16), Vec<bool>> {
     let ids: BTreeMap<u32, u32> = field.plants.iter().map(|p| (p.number, p.id)).collect();
     let at = |i: usize| vec2(((i % 64) as f32 + 0.5) / 64.0, ((i / 64) as f32 + 0.5) / 64.0);
     let parts = field.scene.parts.iter().filter(|part| part.mask.is_some());
-    let of = |part: &furrow::scene::Part| {
+    let of = |part: &furrow_render::scene::Part| {
         let mask = part.mask.as_ref().unwrap();
         ((ids[&part.tag.plant], part.tag.leaf), (0..64 * 64).map(|i| !mask.opaque_at(at(i))).collect())
     };
     parts.map(of).collect()
 }
 
-/// Expected: what is gone of a leaf on a day is gone at the same places of the leaf on all later days, and more is.
+/// Expected: areas missing from a leaf on one day are missing at the same positions on all later days, and more are
+/// added.
 #[test]
 fn damage_never_heals_and_stays_where_it_was() {
     let text = bare("(holes: 4, shot_holes: 6, bites: 1, tears: 0.5)");
@@ -119,7 +123,7 @@ fn damage_never_heals_and_stays_where_it_was() {
     let mut gained = 0;
     for pair in days.windows(2) {
         for (leaf, gone) in &pair[0] {
-            // Seed leaves fall.
+            // Cotyledons fall.
             let Some(later) = pair[1].get(leaf) else {
                 assert!(leaf.1 <= 2, "leaf {leaf:?} is gone");
                 continue;
@@ -145,8 +149,9 @@ fn soil() -> String {
     )
 }
 
-/// Expected: stones lie where they lay but for millimetres of their height; moisture and clouds are the day's; the sun is where the scene file
-/// says; crusts have more of the ground every day. The same day is the same bits whatever the list of days.
+/// Expected: stones stay in place except for millimetres of height; moisture and clouds change by day; the sun is at
+/// the position in the scene file; crusts cover more ground every day. A day gives the same bits whatever the list of
+/// days.
 #[test]
 fn weather_is_the_days_and_soil_the_fields() {
     let text = soil();
@@ -165,7 +170,7 @@ fn weather_is_the_days_and_soil_the_fields() {
         let debris = field.scene.parts.iter().zip(&field.kinds).filter(|(_, kind)| matches!(kind, PartKind::Debris(_)));
         debris
             .map(|(part, _)| {
-                part.mesh.positions.iter().map(|p| p.truncate()).sum::<furrow::math::Vec2>()
+                part.mesh.positions.iter().map(|p| p.truncate()).sum::<furrow_base::math::Vec2>()
                     / part.mesh.positions.len() as f32
             })
             .collect::<Vec<_>>()
@@ -182,8 +187,8 @@ fn weather_is_the_days_and_soil_the_fields() {
     assert_eq!((undated.day, undated.conditions.soil.unwrap().layers[1].share), (None, 0.5));
 }
 
-/// Expected: a scene file whose crop is 20 days old in the middle shows it so on day 20, and younger by the days before; what is written by
-/// BBCH stages likewise.
+/// Expected: a scene file whose crop has a mean age of 20 days shows it at that age on day 20, and correspondingly
+/// younger on earlier days; the same for growth given as BBCH stage.
 #[test]
 fn a_scene_file_without_days_is_of_the_day_that_its_crop_says() {
     let root = env!("CARGO_MANIFEST_DIR");
@@ -203,12 +208,13 @@ fn a_scene_file_without_days_is_of_the_day_that_its_crop_says() {
         // A smaller plant may not reach into the view.
         assert!(week.get(&plant.id).is_none_or(|age| (age - plant.age_days + 7.0).abs() < 1e-4));
     }
-    // The fourth leaf unfolds on day 23 by the species file; the drawn plants are all of that day.
+    // By the species file, the fourth leaf unfolds on day 23; the sampled plants all have that age.
     assert!(ages(&other, 23).values().all(|age| (age - 23.0).abs() < 1e-4));
     assert!(on(&other, 0).plants.iter().all(|p| p.age_days < 1e-3));
 }
 
-/// The small page, each image of which takes a fraction of a second, with a second camera and two frames on each day.
+/// Writes the small scene file, whose images render in a fraction of a second, with a second camera and two frames on
+/// each day.
 fn page(folder: &Path) -> PathBuf {
     let root = env!("CARGO_MANIFEST_DIR");
     let more = "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.45, \
@@ -222,8 +228,9 @@ fn page(folder: &Path) -> PathBuf {
     path
 }
 
-/// Expected: days make a dataset like any other; images have the same bytes alone, after any others and among other days; shards share out
-/// days; a plant keeps number and identity over days; flow ends with the day.
+/// Expected: days form a dataset like any other. Images have the same bytes alone, after any others and among other
+/// days; shards divide the days among them; a plant keeps its number and identity over the days; flow ends with the
+/// day.
 #[test]
 fn images_of_days_do_not_depend_on_the_others() {
     let (_keep, folder) = scratch();
@@ -259,11 +266,11 @@ fn images_of_days_do_not_depend_on_the_others() {
     let lines = |name: &str| String::from_utf8(before[name].clone()).unwrap().lines().count();
     assert_eq!((lines("tum/000000-right.txt"), lines("colmap/000000-day009/images.txt")), (5, 10));
     let flows = |k: u32| {
-        // Names of channels stand in the file's head as they are.
+        // Channel names are stored uncompressed in the file header.
         before[&format!("flow/{k:06}.exr")].windows(6).any(|name| name == b"next.x")
     };
     assert_eq!([0, 2, 4, 6].map(flows), [true, false, true, false]);
-    // A lost image, the other order of shards, and another list of days.
+    // A lost image, shards in the other order, and another list of days.
     std::fs::remove_dir_all(whole.join("images/000005")).unwrap();
     succeed(make(&whole, &[]));
     same(&tree(&whole), &before);
@@ -285,11 +292,11 @@ fn images_of_days_do_not_depend_on_the_others() {
     }
     // Another list of days is another dataset.
     assert!(fail(make(&one, &["--days", "9,21"]), 2).contains("days [21] there, [9,21] here"));
-    // Tables tell field, camera and day of what they list.
+    // Tables contain the field, camera and day of their entries.
     succeed(verb("finish", &whole, &["--format", "coco,traits"]));
     let told = std::fs::read(whole.join("coco/annotations/instances_train.json")).unwrap();
     let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
-    // A video is what one camera takes on all days.
+    // A video contains the images of one camera over all days.
     for (video, name) in [(1, "000000-camera"), (2, "000000-right")] {
         assert_eq!(told["videos"][video - 1]["name"], name);
         let of = told["images"].as_array().unwrap().iter().filter(|image| image["video_id"] == video);
@@ -300,8 +307,9 @@ fn images_of_days_do_not_depend_on_the_others() {
     }
 }
 
-/// Rationale: a warning of what nobody asked for is noise. Expected: where none is named, formats that have nothing to tell of these images are left out in
-/// silence; those that are named are told of. Optical flow, which leads nowhere with one image a day, has no files then, and the dataset is whole.
+/// Rationale: warnings about formats that the user did not request are noise. Expected: if no format is named, formats
+/// without content for these images are omitted silently; named ones cause a warning. Optical flow, which has no target
+/// with one image per day, then has no files, and the dataset is complete.
 #[test]
 fn formats_that_have_nothing_to_tell_are_left_out() {
     let (_keep, folder) = scratch();
@@ -324,7 +332,7 @@ fn formats_that_have_nothing_to_tell_are_left_out() {
     }
     assert_eq!(formats, ["colmap", "tum"]);
     succeed(verb("render", &named, &["--quiet"]));
-    assert_eq!(made(&named).len(), 2, "nothing is made again");
+    assert_eq!(made(&named).len(), 2, "no image may be rendered again");
     succeed(verb("verify", &named, &["--rerender", "1"]));
     let page = page(&folder);
     let (_, formats) = run(&folder.join("labels"), path(&page), &["--days", "21", "--labels-only"]);
@@ -340,9 +348,9 @@ fn what_is_no_day_is_told() {
     };
     let days = "days: (from: 4, to: 36, every: 4),";
     let none = refused(&|text| text.replace(days, ""));
-    assert!(none.contains("a plant emerges on a day, and there are no days") && none.contains("--day"), "{none}");
+    assert!(none.contains("a plant emerges on a day, but there are no days") && none.contains("--day"), "{none}");
     for (wrong, words) in [
-        ("(from: 9, to: 4)", "no days lie between 9 and 4"),
+        ("(from: 9, to: 4)", "there are no days between 9 and 4"),
         ("(to: 9, every: 0)", "in steps of 0"),
         ("(on: [9, 4])", "in order"),
         ("(to: 40, on: [9])", "given twice"),
@@ -353,8 +361,8 @@ fn what_is_no_day_is_told() {
     }
 }
 
-/// Expected: all that a leaf has lost in a part of the time it has lost for good, place by place of its image; more at every later moment,
-/// and nothing at first.
+/// Expected: areas that a leaf has lost at some time stay missing, point by point of its texture; more are missing at
+/// every later time, and none at the start.
 #[test]
 fn marks_stay_where_they_were_and_more_come() {
     let mask = AlphaMask::new(120, 200, |x, y| ((x as f32 - 59.5) / 56.0).hypot((y as f32 - 99.5) / 95.0) < 1.0);

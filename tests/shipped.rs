@@ -1,13 +1,14 @@
-//! What ships with the program, found from any folder by its name: scene files, species, soils; and the folder that `trace init` makes.
+//! Shipped scene files, species and soils, found by name from any folder, and the folder that `trace init` creates.
 //!
-//! Rationale: who has installed the program has no clone of the repository to name paths in. Expected: names lead to the files that ship,
-//! files of one's own come first, and a dataset made from names holds all that it needs. Source: the names in the species files.
+//! Rationale: users of an installed program have no clone of the repository whose paths they could name. Expected:
+//! names resolve to the shipped files, the user's own files take precedence, and a dataset made from names contains all
+//! the files it needs. Source: the names in the species files.
 
 use crate::common::program::{names, scratch};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Runs `trace` in a folder; `data` is what FURROW_DATA names.
+/// Runs `trace` in a folder, with FURROW_DATA set to `data`.
 fn run(folder: &Path, data: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
     command.current_dir(folder).env("FURROW_DATA", data).args(arguments).output().expect("the program")
@@ -17,19 +18,19 @@ fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Expects success; returns stdout.
+/// Checks that a run succeeded; returns its stdout.
 fn done(output: &Output) -> String {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).expect("text")
 }
 
-/// Expects exit code 2; returns stderr.
+/// Checks that a run exited with code 2; returns its stderr.
 fn refused(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stderr.clone()).expect("text")
 }
 
-/// A scene file that names a species and a soil by their names alone.
+/// A scene file that names a species and a soil by name only.
 const BY_NAME: &str = r#"Field(
     camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 30), pose: Nadir(height_m: 0.5)),
     lights: [Constant(radiance: (1, 1, 1, 1))],
@@ -44,7 +45,7 @@ fn scene_files_are_found_by_name_from_an_empty_folder() {
     let arguments = ["--scene", "02-one-plant", "--width", "32", "--spp", "1", "--quiet"];
     let paths = done(&run(&folder, repository(), &arguments));
     assert!(paths.lines().count() == 7 && paths.lines().all(|path| path.starts_with("out/02-one-plant/")), "{paths}");
-    // A file of that name in the folder comes first.
+    // A file of that name in the folder takes precedence.
     std::fs::write(folder.join("02-one-plant.ron"), "Field(").unwrap();
     assert!(refused(&run(&folder, repository(), &arguments)).contains("02-one-plant.ron:1:"));
     let near = refused(&run(&folder, repository(), &["--scene", "fild"]));
@@ -55,14 +56,14 @@ fn scene_files_are_found_by_name_from_an_empty_folder() {
     assert!(nowhere.contains("FURROW_DATA"), "{nowhere}");
 }
 
-/// Expected: a species and a soil by name grow as by path; the dataset holds copies and names them by path, so that a machine on which
-/// nothing is installed but the program renders the same bytes.
+/// Expected: a species and a soil named by name give the same field as by path; the dataset contains copies and names
+/// them by path, so that a machine with only the program renders the same bytes.
 #[test]
 fn a_dataset_holds_what_its_scene_file_names() {
     holds(BY_NAME);
 }
 
-/// The same of layers that the scene file leaves out.
+/// The same for soil layers that the scene file omits.
 #[test]
 fn a_dataset_holds_the_soil_that_its_scene_file_leaves_out() {
     let start = BY_NAME.find("layers:").unwrap();
@@ -70,7 +71,7 @@ fn a_dataset_holds_the_soil_that_its_scene_file_leaves_out() {
     holds(&[&BY_NAME[..start], BY_NAME[end..].trim_start_matches(',')].concat());
 }
 
-/// The same of a species of one's own that is like one that ships, whose leaves stand in a table.
+/// The same for a user's species based on a shipped one (`like`), whose leaves are in a table.
 #[test]
 fn a_dataset_holds_what_a_species_is_like() {
     let (_keep, folder) = scratch();
@@ -102,13 +103,13 @@ fn holds(text: &str) {
     assert!(text.contains(r#"albedo: "external/textures/soil/dirt.png""#), "{text}");
     let verified = run(&folder, Path::new("/nowhere"), &["dataset", "verify", "data", "--rerender", "2"]);
     done(&verified);
-    // The copy is a scene file like any other.
+    // The copy is an ordinary scene file.
     let copy = ["--scene", "data/scene/mine.ron", "--spp", "1", "--quiet", "--out", "by-path"];
     done(&run(&folder, Path::new("/nowhere"), &copy));
-    let pixels = |out: &str| furrow::output::read_indexed(&folder.join(out).join("semantics.png")).unwrap();
+    let pixels = |out: &str| furrow_output::read_indexed(&folder.join(out).join("semantics.png")).unwrap();
     assert_eq!(pixels("by-name"), pixels("by-path"));
     assert!(!labels("by-name").is_empty());
-    // Again, by the same command: the dataset goes on.
+    // Running the same command again continues the dataset.
     done(&run(&folder, repository(), &plan));
 }
 
@@ -125,7 +126,7 @@ fn a_name_that_no_species_has_is_shown_where_it_stands() {
         let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
         assert!(said.contains("mine.ron:5:") && said.contains(words), "{said}");
     }
-    // A file of one's own comes first.
+    // A file of the user takes precedence.
     std::fs::write(folder.join("cirsium"), "Species(").unwrap();
     std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", "cirsium")).unwrap();
     let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
@@ -138,7 +139,7 @@ fn a_folder_of_ones_own_renders_at_once() {
     std::fs::create_dir(&folder).unwrap();
     let paths = done(&run(&folder, repository(), &["init", "my-field"]));
     assert!(paths.lines().all(|path| folder.join(path).is_file()) && paths.contains("my-field/field.ron"), "{paths}");
-    // Nothing else is needed.
+    // No other files are needed.
     let own = folder.join("my-field");
     let render = ["--scene", "field.ron", "--width", "32", "--spp", "1", "--quiet"];
     done(&run(&own, Path::new("/nowhere"), &render));

@@ -1,8 +1,8 @@
-//! The program asked to stop: by a terminal, by a batch system, while it renders and before.
+//! Interruptions of the program, by a terminal or a batch system, before and during rendering.
 //!
-//! Rationale: a scheduler tells "stopped, start me again" from "failed" by the exit code alone, and a folder of half-written
-//! images would be worse than none. Expected: exit code 75 on INT, TERM, HUP and USR1, no file left, whatever the program is
-//! at. Source: sysexits.h, EX_TEMPFAIL; Slurm's `--signal`, which sends USR1.
+//! Rationale: a scheduler distinguishes "stopped, start me again" from "failed" only by the exit code, and a folder of
+//! partial images would be worse than none. Expected: exit code 75 on INT, TERM, HUP and USR1, and no file left,
+//! whatever the program is doing. Source: sysexits.h, EX_TEMPFAIL; Slurm's `--signal`, which sends USR1.
 
 use crate::common::dataset::{path, succeed, tree};
 use crate::common::program::{SMALL, names, scratch, small_text, trace};
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Hours of samples, for nobody will wait for them.
+/// Starts a render that would take hours, to be interrupted.
 fn endless(out: &Path) -> Child {
     trace(&["--scene", SMALL, "--spp", "65536", "--width", "256", "--threads", "1", "--out", out.to_str().unwrap()])
         .stderr(Stdio::piped())
@@ -25,7 +25,7 @@ fn send(signal: &str, child: &Child) {
     assert!(sent.success(), "{signal} to {}", child.id());
 }
 
-/// The child's end, which must come within a minute.
+/// Waits for the child's end, which must come within a minute.
 fn end(child: &mut Child) -> ExitStatus {
     let begin = Instant::now();
     loop {
@@ -34,13 +34,13 @@ fn end(child: &mut Child) -> ExitStatus {
         }
         if begin.elapsed() > Duration::from_secs(60) {
             child.kill().unwrap();
-            panic!("it did not stop");
+            panic!("the program did not stop");
         }
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
-/// Waits until the program watches for signals, as the system sees it: bit 14 of the mask is TERM.
+/// Waits until the program has a handler for TERM: bit 14 of its signal mask in `/proc`.
 #[cfg(target_os = "linux")]
 fn watches(child: &Child) {
     let begin = Instant::now();
@@ -50,7 +50,7 @@ fn watches(child: &Child) {
         if u64::from_str_radix(mask.trim(), 16).unwrap() >> 14 & 1 == 1 {
             return;
         }
-        assert!(begin.elapsed() < Duration::from_secs(60), "it never watches");
+        assert!(begin.elapsed() < Duration::from_secs(60), "the program never handles signals");
     }
 }
 
@@ -61,12 +61,12 @@ fn a_signal_while_rendering_exits_with_75_and_leaves_no_file() {
         let mut child = endless(&out);
         let mut talk = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
-        // The last words before it renders.
+        // The last message before rendering starts.
         while !line.contains("grown in") {
             line.clear();
-            assert!(talk.read_line(&mut line).unwrap() > 0, "{signal}: it ended early");
+            assert!(talk.read_line(&mut line).unwrap() > 0, "{signal}: the program ended early");
         }
-        // Labels come first, which take a few milliseconds.
+        // Labels are computed first, which takes a few milliseconds.
         std::thread::sleep(Duration::from_secs(1));
         send(signal, &child);
         assert_eq!(end(&mut child).code(), Some(75), "{signal}");
@@ -102,17 +102,17 @@ fn two_signals_in_a_row_end_it_with_75() {
     let mut line = String::new();
     while !line.contains("grown in") {
         line.clear();
-        assert!(talk.read_line(&mut line).unwrap() > 0, "it ended early");
+        assert!(talk.read_line(&mut line).unwrap() > 0, "the program ended early");
     }
     send("TERM", &child);
-    // The child may have ended by itself by now; it has not been waited for, so its number is still its own.
+    // The child may have ended already; it has not been waited for, so its process id is still valid.
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(names(&out), Vec::<String>::new());
 }
 
-/// Interrupts a command on a terminal as soon as that shows that a field grows; its exit code, and all that it said. `None` where no `script` makes
-/// a terminal.
+/// Interrupts a command on a terminal as soon as it shows that a field is being built; returns the exit code and all
+/// output. `None` if the program `script`, which provides a terminal, is missing.
 #[cfg(target_os = "linux")]
 fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String)> {
     let program = format!("echo $$; exec {} {}", env!("CARGO_BIN_EXE_trace"), arguments.join(" "));
@@ -126,7 +126,7 @@ fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String
     let (mut said, mut bytes) = (Vec::new(), [0; 4096]);
     while !String::from_utf8_lossy(&said).contains("growing: ") {
         let read = talk.read(&mut bytes).unwrap();
-        assert!(read > 0, "it ended early: {}", String::from_utf8_lossy(&said));
+        assert!(read > 0, "the program ended early: {}", String::from_utf8_lossy(&said));
         said.extend_from_slice(&bytes[..read]);
     }
     let first = String::from_utf8_lossy(&said).lines().next().unwrap().trim().to_owned();
@@ -135,19 +135,21 @@ fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String
     Some((end(&mut script).code(), String::from_utf8_lossy(&said).into_owned()))
 }
 
-/// What such a command says once the line that shows its field is gone; its code must be 75. `None` where no `script` makes a terminal.
+/// Returns the output of such a command after the progress line was cleared; its exit code must be 75. `None` if
+/// `script` is missing.
 #[cfg(target_os = "linux")]
 fn said_after_it_grew(arguments: &[&str]) -> Option<String> {
     let (code, said) = interrupted_while_it_grows(arguments)?;
     assert_eq!(code, Some(75), "{arguments:?}: {said}");
     let (_, after) = said.rsplit_once("growing: ").unwrap();
-    // The line is cleared, then words follow on it.
-    let (_, after) = after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{arguments:?}: the line stays: {said:?}"));
+    // The line is cleared, then the message is printed on it.
+    let (_, after) =
+        after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{arguments:?}: the line is not cleared: {said:?}"));
     assert!(!after.contains("error"), "{arguments:?}: {said}");
     Some(after.to_owned())
 }
 
-/// Writes the small page with so many weeds on a square metre.
+/// Writes the small scene file with this number of weeds per square metre.
 #[cfg(target_os = "linux")]
 fn write_weeds(page: &Path, weeds_per_m2: u32) {
     let root = env!("CARGO_MANIFEST_DIR");
@@ -156,13 +158,14 @@ fn write_weeds(page: &Path, weeds_per_m2: u32) {
     std::fs::write(page, text.replace("\"scenes/", &format!("\"{root}/scenes/"))).unwrap();
 }
 
-/// More of them than grow in a second.
+/// More weeds per square metre than can be built in a second.
 #[cfg(target_os = "linux")]
 const MANY: u32 = 4000;
 
-/// Rationale: before its first image a dataset grows a field, which may take a minute. Expected: Ctrl-C takes away the line that shows it, and says what
-/// it says while images are made: nothing was written, or how many images are there; the code is 75, and no file is written. Source: `script`, which
-/// makes a terminal; where there is none, the test says so.
+/// Rationale: before its first image a dataset builds a field, which may take a minute. Expected: Ctrl-C clears the
+/// progress line and prints the same message as during rendering (nothing was written, or how many images exist); the
+/// exit code is 75, and no file is written. Source: `script`, which provides a terminal; without it the test is skipped
+/// with a note.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupt_while_a_plan_grows_its_field_is_told() {
@@ -189,7 +192,7 @@ fn an_interrupt_while_a_plan_grows_its_field_is_told() {
     assert!(before == tree(&data));
 }
 
-/// Expected: the same of what tells the costs of a dataset, which grows fields as a plan does and writes nothing.
+/// Expected: the same for the cost estimate of a dataset, which builds fields like a plan and writes nothing.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupt_while_a_bill_grows_its_fields_is_told() {

@@ -1,19 +1,18 @@
-//! Skins of exported leaves: they bend in other programs as they were bent here.
+//! Skins of exported leaves: other programs bend the leaves exactly as this program does.
 //!
-//! Rationale: a skin that is a little off tears leaves or moves them, and no picture of the file at rest shows it. Expected: the pose of the
-//! file is its mesh within 1e-5 m; weights sum to one; a joint moves what lies beyond it and nothing else; meshes are those of an export
-//! without skins. Source: glTF 2.0 specification, 3.7.3 (skins); the `gltf` crate reads the file.
+//! Rationale: a slightly wrong skin tears or moves leaves, which is invisible in the rest pose. Expected: the file's
+//! rest pose equals its mesh within 1e-5 m; weights sum to one; a joint moves only the parts beyond it; meshes equal
+//! those of an export without skins. Source: glTF 2.0 specification, 3.7.3 (skins); the `gltf` crate reads the file.
 
 use crate::common::program::{SMALL, field, scratch, trace};
-use furrow::math::{DMat4, DQuat, DVec3};
-use furrow::output;
-use furrow::scene::Field;
-use furrow::scene::assemble::Options;
+use furrow_base::math::{DMat4, DQuat, DVec3};
+use furrow_field::Field;
+use furrow_field::assemble::Options;
 use gltf::Gltf;
 use gltf::material::AlphaMode;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Two beets and a peanut, whose leaves are leaflets.
+/// Builds two beets and a peanut, which has leaflets.
 fn grown(rigged: bool) -> Field {
     let plant = |species: &str, x: f32| {
         format!("(species: \"scenes/species/{species}.ron\", growth: Bbch(14), position_m: ({x}, 3)),")
@@ -30,7 +29,7 @@ fn grown(rigged: bool) -> Field {
     field(&text, &Options { rigged, ..Options::default() })
 }
 
-/// Plants with flowers, ears and fruits on stems of several kinds.
+/// Builds plants with flowers, ears and fruits on several kinds of stems.
 fn flowering() -> Field {
     let sorts = [("rape", 65), ("wheat", 65), ("papaver", 75), ("potato", 75), ("sugar_beet", 65), ("maize", 69)];
     let plant = |(k, (species, bbch)): (usize, &(&str, u32))| {
@@ -50,32 +49,32 @@ fn flowering() -> Field {
 }
 
 fn encoded(of: &Field) -> Vec<u8> {
-    output::gltf::encode(&of.scene, &of.plants, &of.provenance()).unwrap().0
+    furrow_output::gltf::encode(&of.scene, &of.plants, &of.provenance()).unwrap().0
 }
 
-/// A corner of a mesh in the file.
+/// A vertex of a mesh in the file.
 struct Corner {
     at: DVec3,
     uv: [f32; 2],
     weights: Vec<(usize, f64)>,
 }
 
-/// A vertex as the file has it: place and texture coordinates.
+/// A vertex as stored in the file: position and texture coordinates.
 type Vertex = ([f32; 3], [f32; 2]);
 
-/// A mesh with a skin: its name, its corners, its joints' nodes and inverse bind matrices.
+/// A skinned mesh: its name, vertices, joint nodes and inverse bind matrices.
 struct Skinned {
     name: String,
     corners: Vec<Corner>,
     joints: Vec<usize>,
     binds: Vec<DMat4>,
     triangles: Vec<[usize; 3]>,
-    /// Whether its material has a mask.
+    /// Whether the material has a mask.
     masked: bool,
 }
 
 impl Skinned {
-    /// Where the places of nodes carry the corners.
+    /// Positions of the vertices for the given node transforms.
     fn posed(&self, places: &BTreeMap<usize, DMat4>) -> Vec<DVec3> {
         let joint = |k: usize| places[&self.joints[k]] * self.binds[k];
         let carry = |c: &Corner| c.weights.iter().map(|(k, w)| *w * joint(*k).transform_point3(c.at)).sum();
@@ -87,7 +86,7 @@ fn matrix(m: [[f32; 4]; 4]) -> DMat4 {
     DMat4::from_cols_array_2d(&m.map(|column| column.map(f64::from)))
 }
 
-/// The places of all nodes, each with `change` in its own frame.
+/// World transforms of all nodes, each with `change` applied in its own frame.
 fn places(file: &Gltf, change: &BTreeMap<usize, DMat4>) -> BTreeMap<usize, DMat4> {
     let mut todo: Vec<_> = file.default_scene().unwrap().nodes().map(|node| (node, DMat4::IDENTITY)).collect();
     let mut all = BTreeMap::new();
@@ -95,7 +94,7 @@ fn places(file: &Gltf, change: &BTreeMap<usize, DMat4>) -> BTreeMap<usize, DMat4
         let own = change.get(&node.index()).copied().unwrap_or(DMat4::IDENTITY);
         let at = above * matrix(node.transform().matrix()) * own;
         todo.extend(node.children().map(|child| (child, at)));
-        assert!(all.insert(node.index(), at).is_none(), "a node hangs twice");
+        assert!(all.insert(node.index(), at).is_none(), "a node has two parents");
     }
     all
 }
@@ -121,7 +120,11 @@ fn skinned(file: &Gltf) -> Vec<Skinned> {
                 .filter(|(_, w)| *w > 0.0)
                 .map(|(k, w)| (usize::from(*k), f64::from(w)))
                 .collect();
-            assert_eq!(used.iter().map(|(k, _)| *k).collect::<BTreeSet<_>>().len(), used.len(), "a joint twice");
+            assert_eq!(
+                used.iter().map(|(k, _)| *k).collect::<BTreeSet<_>>().len(),
+                used.len(),
+                "a joint is used twice"
+            );
             Corner { at: DVec3::from_array(at.map(f64::from)), uv, weights: used }
         };
         let indices: Vec<usize> = reader.read_indices().unwrap().into_u32().map(|i| i as usize).collect();
@@ -152,15 +155,15 @@ fn the_pose_of_the_file_is_its_mesh() {
     }
     eprintln!("{} meshes, {} skins, at most {worst:.1e} m", all.len(), file.skins().count());
     assert!(worst < 1e-5, "{worst}");
-    // Every leaf and every plant's stems have one skin, and all parts of plants wear theirs.
+    // Every leaf has a skin, and so do each plant's stems; all plant parts use them.
     let skins: usize = field.plants.iter().map(|plant| plant.leaf_axes.len() + 1).sum();
     assert_eq!(file.skins().count(), skins);
     let parts = field.scene.parts.iter().filter(|part| part.tag.plant > 0);
     assert_eq!(parts.count(), all.len());
 }
 
-/// Expected: of a beet's blade, what lies before the middle of the link before the joint stays; the tip moves by about its distance from the
-/// joint times the angle.
+/// Expected: the part of a beet's blade up to the middle of the link before the joint stays; the tip moves by about its
+/// distance from the joint times the angle.
 #[test]
 fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
     let field = grown(true);
@@ -173,7 +176,7 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
     let all = skinned(&file);
     let of_beets = |one: &&Skinned| numbers.iter().any(|n| one.name.starts_with(&format!("crop {n} leaf")));
     let mut tested = 0;
-    // The image of a blade reaches from end to end.
+    // The texture of a blade spans its whole length.
     for one in all.iter().filter(of_beets) {
         let (Some(joint), Some(tip)) =
             (named.get(&format!("{} VN3", one.name)), named.get(&format!("{} PK", one.name)))
@@ -185,7 +188,7 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
         let change = BTreeMap::from([(joint.index(), DMat4::from_quat(DQuat::from_rotation_z(angle)))]);
         let (before, after) = (one.posed(&rest), one.posed(&places(&file, &change)));
         let moved: Vec<f64> = before.iter().zip(&after).map(|(a, b)| a.distance(*b)).collect();
-        // Whoever hangs below the joint.
+        // All nodes below the joint.
         let mut below = BTreeSet::new();
         let mut todo = vec![joint.clone()];
         while let Some(node) = todo.pop() {
@@ -197,7 +200,7 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
                 corner.weights.iter().filter(|(k, _)| below.contains(&one.joints[*k])).map(|(_, w)| w).sum();
             assert!(beyond > 0.0 || *moved < 1e-9, "{}: moved {moved} without a weight", one.name);
         }
-        // Petioles and midribs have the leaf's name, too, but no mask.
+        // Petioles and midribs have the leaf's name as well, but no mask.
         if !one.masked {
             continue;
         }
@@ -228,9 +231,10 @@ fn a_joint_moves_what_lies_beyond_it_and_nothing_else() {
     assert!(tested >= 4, "{tested} blades");
 }
 
-/// Rationale: who bends a stem means all that stands on it, and nothing torn: where corners went with the nearest stem, flowers that touched
-/// another shoot were drawn out to a quarter of a metre. Expected: whichever stem joint of rape, poppy, potato, bolting beet, wheat and maize is turned,
-/// no edge of a mesh grows beyond what a bend of its stem makes of it, and what is beyond the joint is carried; leaves of grasses stay.
+/// Rationale: bending a stem must carry everything attached to it without tearing. When vertices followed the nearest
+/// stem, flowers that touched another shoot were stretched to a quarter of a metre. Expected: whichever stem joint of
+/// rape, poppy, potato, bolting beet, wheat and maize is rotated, no mesh edge grows more than the bend of its stem
+/// explains, and parts beyond the joint are carried along; leaves of grasses stay.
 #[test]
 fn a_stems_joint_carries_its_leaves_and_flowers_whole() {
     let field = flowering();
@@ -244,7 +248,7 @@ fn a_stems_joint_carries_its_leaves_and_flowers_whole() {
         let worn = all.iter().filter(|one| one.name == name || one.name.starts_with(&format!("{name} leaf")));
         let worn: Vec<(&Skinned, Vec<DVec3>)> = worn.map(|one| (one, one.posed(&rest))).collect();
         let (mut torn, mut flowers, mut leaves) = (0.0_f64, 0, 0);
-        // Every joint of a few, one in some of many.
+        // Every joint of plants with few joints, a subset for plants with many.
         for joint in plant.rig.iter().step_by(plant.rig.len().div_ceil(25)) {
             let node = nodes[&*format!("{name} {}", joint.name)];
             let change = BTreeMap::from([(node, DMat4::from_quat(DQuat::from_rotation_z(angle)))]);

@@ -1,8 +1,9 @@
-//! How far a dataset is, and what it will cost before it is begun.
+//! Progress of a dataset, and its cost estimate before it is started.
 //!
-//! Rationale: whoever renders for a night wants to know in the evening what it takes and in between whether it gets there. Expected: the
-//! numbers of `status` are those of the files, whatever became of the runs; the bill's number of files is exact, its bytes and memory are
-//! within 30 %, and nothing is left anywhere. Source: the files themselves, counted and measured here.
+//! Rationale: users who render overnight want to know the cost in the evening, and the progress in between. Expected:
+//! the figures of `status` equal those of the files, whatever happened to the runs; the estimated number of files is
+//! exact, the estimated bytes and memory are within 30 %, and no file is left behind. Source: the files themselves,
+//! counted and measured here.
 
 use crate::common::dataset::{SIZE, fail, made, make, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, names, scratch, small_text, trace};
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What `trace dataset status --json` prints.
+/// Returns the output of `trace dataset status --json`.
 fn status(data: &Path, more: &[&str]) -> Value {
     let output = succeed(verb("status", data, &[&["--json"][..], more].concat()));
     let text = String::from_utf8(output.stdout).unwrap();
@@ -22,12 +23,12 @@ fn status(data: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// A number of a status.
+/// Returns a number of a status.
 fn number(status: &Value, key: &str) -> f64 {
     status[key].as_f64().unwrap_or_else(|| panic!("no {key}: {status}"))
 }
 
-/// What the program prints for people.
+/// Returns the text output of `trace dataset status`.
 fn told(data: &Path, more: &[&str]) -> String {
     String::from_utf8(succeed(verb("status", data, more)).stdout).unwrap()
 }
@@ -42,12 +43,12 @@ fn a_dataset_that_is_done_says_so() {
     assert_eq!((number(&found, "working"), found["failures"].as_array().unwrap().len()), (0.0, 0));
     let shard = &found["shards"].as_array().unwrap()[..];
     assert_eq!((shard.len(), &shard[0]["state"]), (1, &Value::from("done")));
-    // As many images as the log has, over the time from its first row to its last image.
-    let rows = furrow::dataset::timing_log::rows(&data).unwrap();
+    // The images in the log, divided by the time from its first row to its last image.
+    let rows = furrow_dataset::make::timing_log::rows(&data).unwrap();
     let seconds: f64 = rows.iter().map(|row| row.seconds).sum();
     let rate = number(&found, "images_per_hour");
     assert!(rate > 0.0 && rate < 3600.0 * 4.0 / seconds * 1.1, "{rate} an hour, but {seconds} s for four");
-    // Slow ones come first, with parts that make no more than the whole, and with the plants of their records.
+    // Slow images come first; their parts add up to at most the whole, and their plant counts are those of the records.
     let slow = found["slowest"].as_array().unwrap();
     assert_eq!(slow.len(), 4);
     for pair in slow.windows(2) {
@@ -61,27 +62,27 @@ fn a_dataset_that_is_done_says_so() {
         assert!(parts <= number(image, "seconds"), "{image}");
     }
     assert!(number(&found, "core_s") > 0.0 && number(&found, "peak_bytes") > 1e6, "{found}");
-    // Watched, it ends at once; looking changes nothing.
+    // With `--watch` it ends at once, and it changes no file.
     let words = told(&data, &["--watch"]);
     assert!(
         words.contains("4 of 4 images") && words.contains("all done") && words.contains("slowest images:"),
         "{words}"
     );
     assert!(before == tree(&data));
-    // The page tells the same, and loads itself no more.
+    // The page has the same figures, and no longer reloads itself.
     let page = keep.path().join("status.html");
     told(&data, &["--watch", "--page", path(&page)]);
     let html = fs::read_to_string(&page).unwrap();
     assert!(html.contains(r#"data-key="done" data-value="4""#) && html.contains("Slowest images"), "{html}");
     assert!(html.contains("000000") && !html.contains("location.reload"), "{html}");
-    assert!(fail(verb("status", &data, &["--page", path(&data)]), 2).contains("this is no file"));
+    assert!(fail(verb("status", &data, &["--page", path(&data)]), 2).contains("this is not a regular file"));
     let own = data.join("dataset.json");
     assert!(fail(verb("status", &data, &["--page", path(&own)]), 2).contains("lies in the dataset's folder"));
     assert!(before == tree(&data));
 }
 
-/// Rationale: the folder was copied in part, or files were lost. Expected: images without one of their files, with half of one, or without
-/// checksums count as missing, in the shard that they belong to.
+/// Rationale: a folder may be copied partially, or files may be lost. Expected: images that lack a file, have a
+/// truncated one, or have no checksums count as missing, in their own shard.
 #[test]
 fn images_whose_files_are_gone_are_missing() {
     let (_keep, data) = scratch();
@@ -95,7 +96,7 @@ fn images_whose_files_are_gone_are_missing() {
     let shards: Vec<_> =
         found["shards"].as_array().unwrap().iter().map(|s| (number(s, "images"), number(s, "done"))).collect();
     assert_eq!(shards, [(3.0, 1.0), (3.0, 1.0)]);
-    // At the rate of the run that was, for four images.
+    // At the rate of the previous run, for four images.
     let expected = 4.0 * 3600.0 / number(&found, "images_per_hour");
     assert!((number(&found, "left_s") / expected - 1.0).abs() < 1e-6, "{found}");
     let words = told(&data, &[]);
@@ -104,11 +105,11 @@ fn images_whose_files_are_gone_are_missing() {
     assert_eq!(number(&status(&data, &[]), "done"), 6.0);
 }
 
-/// Waits until some images are there; an error of the test where none come.
+/// Waits until some images exist; panics if none appear.
 fn some_images(data: &Path, child: &mut Child) {
     let begin = Instant::now();
     while made(data).len() < 2 {
-        assert!(child.try_wait().unwrap().is_none(), "it ended early");
+        assert!(child.try_wait().unwrap().is_none(), "the program ended early");
         assert!(begin.elapsed() < Duration::from_secs(120), "no image in two minutes");
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -118,8 +119,8 @@ fn send(signal: &str, child: &Child) {
     assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
 }
 
-/// Expected: a run that was told to stop says so in its log; one that was killed cannot, and is at work until it has been silent for long.
-/// In both cases, and while it runs, what is done is what has checksums.
+/// Expected: a run that was asked to stop records this in its log. A killed run cannot, and counts as working until it
+/// has been silent for long. In both cases, and while it runs, the finished images are those with checksums.
 #[test]
 fn a_run_that_is_stopped_or_killed_leaves_its_status() {
     for (signal, state) in [("-USR1", "stopped"), ("-KILL", "working")] {
@@ -137,12 +138,12 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
         assert_eq!(found["shards"][0]["state"], *state, "{signal}");
         let sealed = names(&data.join("seals")).iter().filter(|name| !name.starts_with('.')).count();
         assert_eq!(number(&found, "done") as usize, sealed, "{signal}");
-        assert!(sealed < 500, "{signal}: it was done before");
+        assert!(sealed < 500, "{signal}: the run finished before the signal");
         assert_eq!(found["left_s"].as_f64().map(|left| left > 0.0), Some(true), "{signal}");
         if signal == "-KILL" {
-            // The clock of its last row, an hour ago.
+            // The time of the last row, moved back by an hour.
             let log = data.join("ledger/shard-0-of-1-run-1.jsonl");
-            let old = furrow::dataset::timing_log::now() - 3600.0;
+            let old = furrow_dataset::make::timing_log::now() - 3600.0;
             let aged = |line: &str| {
                 let Ok(mut row) = serde_json::from_str::<Value>(line) else { return line.to_owned() };
                 for key in ["began_s", "done_s"] {
@@ -161,7 +162,8 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
     }
 }
 
-/// Expected: Ctrl-C ends the watching of what is not done, with the code of what was stopped, and nothing is written.
+/// Expected: Ctrl-C ends `--watch` on an unfinished dataset with the exit code of an interruption, and no file is
+/// written.
 #[test]
 fn watching_ends_with_a_signal() {
     let (_keep, data) = scratch();
@@ -182,7 +184,7 @@ fn watching_ends_with_a_signal() {
     assert!(before == tree(&data));
 }
 
-/// A sun that has set in some fields: those images fail, each with its error, until a run makes them.
+/// The sun is below the horizon in some fields: those images fail, each with its error, until a run succeeds.
 #[test]
 fn images_that_fail_are_told_with_their_errors() {
     let (_keep, data) = scratch();
@@ -198,7 +200,7 @@ fn images_that_fail_are_told_with_their_errors() {
         let plan = ["dataset", "plan", "--scene", path(&page), "--count", "12", "--spp", "2", "--out", path(&data)];
         trace(&plan).output().unwrap().status.success()
     });
-    assert!(begun, "twenty times the sun had set in the first field");
+    assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
     let said = fail(verb("render", &data, &["--quiet"]), 2);
     let found = status(&data, &[]);
     let failures = found["failures"].as_array().unwrap();
@@ -217,7 +219,8 @@ fn images_that_fail_are_told_with_their_errors() {
     assert!(words.contains(&format!("{} failed", failures.len())) && words.contains("failed images:"), "{words}");
 }
 
-/// Expected: each shard has its own images, rate and state; the number of shards is read off the log, and can be given.
+/// Expected: each shard has its own images, rate and state; the number of shards is inferred from the log, or can be
+/// given.
 #[test]
 fn shards_are_told_apart() {
     let (_keep, data) = scratch();
@@ -252,30 +255,30 @@ fn what_is_no_dataset_is_refused() {
     fail(verb("status", &data, &["--shards", "0"]), 2);
 }
 
-/// The rows of a bill by their names.
+/// Returns the rows of a cost estimate by name.
 fn bill(arguments: &[&str]) -> BTreeMap<String, String> {
     rows(trace(arguments))
 }
 
-/// The same of a command.
+/// Returns the rows that a command prints, by name.
 fn rows(command: Command) -> BTreeMap<String, String> {
     let output = succeed(command);
     let text = String::from_utf8(output.stdout).unwrap();
     let row = |line: &str| {
-        let (name, words) = line.split_once("  ").unwrap_or_else(|| panic!("no row: {line}"));
+        let (name, words) = line.split_once("  ").unwrap_or_else(|| panic!("not a row: {line}"));
         (name.trim().to_owned(), words.trim().to_owned())
     };
     text.lines().map(row).collect()
 }
 
-/// The number that some words begin with; thousands are parted by narrow spaces.
+/// Parses the number at the start of a text; thousands are separated by narrow spaces.
 fn first_number(words: &str) -> f64 {
     let digits: String =
         words.chars().filter(|c| *c != '\u{202f}').take_while(|c| c.is_ascii_digit() || *c == '.').collect();
-    digits.parse().unwrap_or_else(|_| panic!("no number: {words}"))
+    digits.parse().unwrap_or_else(|_| panic!("not a number: {words}"))
 }
 
-/// Number of files below a folder, and their bytes, where names of one file count once.
+/// Number of files below a folder and their total size in bytes; hard links count once in the size.
 fn measured(folder: &Path) -> (u64, u64) {
     let (mut files, mut lengths) = (0, BTreeMap::new());
     let mut todo = vec![folder.to_path_buf()];
@@ -294,8 +297,9 @@ fn measured(folder: &Path) -> (u64, u64) {
     (files, lengths.values().sum())
 }
 
-/// Expected: the files are those that are made, to the last one, whatever the splits, formats and cameras; bytes within 30 %; time and memory
-/// are more than nothing and less than a small machine could take; neither `--out` nor the folder for temporary files has anything in it.
+/// Expected: the estimated number of files is exact for all splits, formats and cameras; bytes are within 30 %; time
+/// and memory are positive and within the range of a small machine; neither `--out` nor the temporary folder contains
+/// any file.
 #[test]
 fn the_bill_is_what_is_taken() {
     let drive = "scenes/09-drive.ron";
@@ -320,10 +324,10 @@ fn the_bill_is_what_is_taken() {
             bill(&[&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--bill"]].concat());
         assert!(!data.exists(), "{order:?}");
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(said.contains("drawing images, 1 of 3"), "a log says what is under way: {said}");
+        assert!(said.contains("rendering images, 1 of 3"), "a log must show the current step: {said}");
         let text = String::from_utf8(output.stdout).unwrap();
         for name in rows.keys() {
-            assert!(text.contains(name), "the same rows: {name}: {text}");
+            assert!(text.contains(name), "missing row: {name}: {text}");
         }
         succeed(trace(&[&all[..], &["--quiet"]].concat()));
         let (files, bytes) = measured(&data);
@@ -338,7 +342,7 @@ fn the_bill_is_what_is_taken() {
     }
 }
 
-/// The small page, seen by two cameras in two frames, on the first of these days or as it is.
+/// Writes the small scene file with two cameras and two frames, optionally with a list of days.
 fn several(folder: &Path, days: &str) -> PathBuf {
     let root = env!("CARGO_MANIFEST_DIR");
     let more = format!(
@@ -351,8 +355,9 @@ fn several(folder: &Path, days: &str) -> PathBuf {
     page
 }
 
-/// Expected: the bill of a drive through two fields, and of one over two days, tells images, fields, files and bytes as those of a dataset do, and
-/// nothing is left anywhere; another sequence is refused as the run refuses it.
+/// Expected: the cost estimates of a drive through two fields, and of one over two days, contain the images, fields,
+/// files and bytes of the dataset, and leave no file; the estimate refuses an inconsistent sequence with the same
+/// message as the run.
 #[test]
 fn the_bill_of_a_sequence_is_what_is_taken() {
     for (days, fields, images) in
@@ -381,9 +386,9 @@ fn the_bill_of_a_sequence_is_what_is_taken() {
     }
 }
 
-/// Rationale: who asks in the evening what a night will cost must not learn in the morning that it was refused. Expected: where another dataset lies
-/// in the folder, or something else does, a dry run ends with the run's code and words; what goes on with a dataset is told as that has it, formats
-/// and maps. Nothing is written.
+/// Rationale: users who ask for the cost in the evening must not find out in the morning that the run was refused.
+/// Expected: if the folder contains another dataset or other files, a dry run ends with the run's exit code and
+/// message; for a dataset to be continued, the estimate uses its formats and maps. No file is written.
 #[test]
 fn a_dry_run_refuses_what_the_run_refuses() {
     let (keep, data) = scratch();
@@ -421,13 +426,14 @@ fn a_dry_run_refuses_what_the_run_refuses() {
     same(&tree(keep.path()), &before);
 }
 
-/// Most memory that a program had until it ended well, bytes: `VmHWM` of the process, which never falls, asked for again and again.
+/// Peak memory of a program until it succeeds, in bytes: `VmHWM` of the process, which never decreases, polled
+/// repeatedly.
 fn peak_memory(mut command: Command) -> f64 {
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let about = format!("/proc/{}/status", child.id());
     let mut peak = 0.0;
     loop {
-        // The lines of memory are gone once it has ended.
+        // The memory lines are gone once the process has ended.
         let text = fs::read_to_string(&about).unwrap_or_default();
         let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         peak = line.map_or(peak, |words| 1024.0 * first_number(words.trim()));
@@ -439,9 +445,10 @@ fn peak_memory(mut command: Command) -> f64 {
     }
 }
 
-/// Rationale: a scheduler ends what takes more memory than was asked for. Expected: memory told is within 30 % of the peak of the run itself, with
-/// one image under way and with two, of `field.ron` at 480 × 360 pixels: images of a few thousand pixels of a bare scene take little beside the
-/// program itself, and would say nothing. Source: the kernel's account of the process.
+/// Rationale: a scheduler kills jobs that exceed the requested memory. Expected: the estimated memory is within 30 % of
+/// the peak of the run itself, with one and with two images in progress, for `field.ron` at 480 × 360 pixels. Images of
+/// a few thousand pixels of a bare scene need little memory compared with the program itself, and would test nothing.
+/// Source: the kernel's accounting of the process.
 #[test]
 fn the_memory_of_a_bill_is_what_is_taken() {
     let order = ["dataset", "--scene", "scenes/field.ron", "--width", "480", "--spp", "4", "--count", "4"];
@@ -455,11 +462,11 @@ fn the_memory_of_a_bill_is_what_is_taken() {
         let order = [&order[..], &["--out", path(&data), "--at-once", at_once, "--quiet"]].concat();
         let taken = peak_memory(trace(&order)) / f64::from(1 << 30);
         let off = first_number(told) / taken;
-        assert!((0.7..1.3).contains(&off), "{at_once} at once: {told} told, {taken} GiB taken, {off}");
+        assert!((0.7..1.3).contains(&off), "{at_once} at once: {told} estimated, {taken} GiB used, {off}");
     }
 }
 
-/// Expected: Ctrl-C ends it soon, with the code of what was stopped, and leaves nothing.
+/// Expected: Ctrl-C ends the estimate soon, with the exit code of an interruption, and leaves no file.
 #[test]
 fn a_bill_that_is_stopped_leaves_nothing() {
     let (keep, data) = scratch();
@@ -482,7 +489,7 @@ fn a_bill_that_is_stopped_leaves_nothing() {
     let mut child =
         trace(&order).env("TMPDIR", &temporary).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(Duration::from_secs(3));
-    assert!(child.try_wait().unwrap().is_none(), "hours of samples were drawn in seconds");
+    assert!(child.try_wait().unwrap().is_none(), "the program ended although hours of rendering were left");
     send("-INT", &child);
     let begin = Instant::now();
     assert_eq!(child.wait().unwrap().code(), Some(75));

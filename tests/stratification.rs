@@ -1,24 +1,25 @@
-//! Stratified samples against independent ones, on the main scene.
+//! Stratified samples compared with independent ones, on the main scene.
 //!
-//! Rationale: low-discrepancy points earn their place only by less noise. Expected: at 64 samples the mean squared error
-//! against a long render, relative to each pixel's brightness, is well below that of independent numbers: 0.36 of it over the
-//! whole image, 216 pixels wide, where this was written. Not relative, a few bright pixels would decide it. Source: Burley
-//! 2020; the reference has independent numbers of another seed.
+//! Rationale: low-discrepancy points are only useful if they reduce noise. Expected: at 64 samples, the mean squared
+//! error against a long render, relative to each pixel's brightness, is well below that of independent samples: 0.36
+//! times, measured over the whole image, 216 pixels wide, when this was written. Without the relative weighting, a few
+//! bright pixels would dominate. Source: Burley 2020; the reference uses independent samples with another seed.
 //!
-//! The long test, at many more pixels: `cargo test --release --test all stratification:: -- --ignored --nocapture`.
+//! The long test, with many more pixels: `cargo test --release --test all stratification:: -- --ignored --nocapture`.
 
-#![allow(clippy::print_stdout, reason = "the long test tells what it measured")]
+#![allow(clippy::print_stdout, reason = "the long test prints its measurements")]
 
 use crate::common::scenes::with_world;
-use furrow::film::Pixel;
-use furrow::geometry::Window;
-use furrow::integrator::PathTracer;
-use furrow::render::{self, Settings};
-use furrow::sampling::Points;
-use furrow::scene::assemble::{self, Options};
+use furrow_base::geometry::Window;
+use furrow_base::sampling::Points;
+use furrow_field::assemble::{self, Options};
+use furrow_render::film::Pixel;
+use furrow_render::integrator::PathTracer;
+use furrow_render::render::{self, Settings};
 use std::path::Path;
 
-/// Mean relative squared error of 64 stratified samples over that of 64 independent ones, in squares of this side over the image.
+/// Mean relative squared error of 64 stratified samples divided by that of 64 independent ones, in squares of `side`
+/// pixels spread over the image.
 fn ratio(side: u32, reference_spp: u32, seeds: u64) -> f64 {
     let field = assemble::field(Path::new("scenes/field.ron"), &Options::default()).unwrap();
     let scene = &field.scene;

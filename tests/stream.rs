@@ -1,9 +1,9 @@
-//! `trace stream`: the images of a dataset, as an archive that is read while they are made.
+//! `trace stream`: the images of a dataset, as an archive that is read while they are rendered.
 //!
-//! Rationale: who trains on fields rendered as they are asked for must get those that a dataset of the same scene would hold, and must be
-//! able to stop at any moment. Expected: equality byte for byte with `trace dataset`, in the order of indices, whatever the threads;
-//! shards that give the whole; a reader that leaves, a signal and a field that cannot grow each end it as they should. Source: the dataset
-//! itself; the packages `webdataset` and `torch` as readers.
+//! Rationale: training on fields rendered on demand must see the images of a dataset of the same scene, and must be
+//! able to stop at any moment. Expected: byte equality with `trace dataset`, in index order, with any number of
+//! threads; shards that add up to the whole; correct endings when the reader leaves, on a signal, and for fields that
+//! cannot be built. Source: the dataset itself; the packages `webdataset` and `torch` as readers.
 
 use crate::common::dataset::{fail, path, succeed, tree};
 use crate::common::program::{SMALL, scratch, trace};
@@ -15,15 +15,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Images of a fraction of a second.
+/// Options for images that render in a fraction of a second.
 const SIZE: [&str; 4] = ["--width", "96", "--spp", "2"];
 
-/// Streams the small scene.
+/// Returns the command that streams the small scene.
 fn stream(more: &[&str]) -> Command {
     trace(&[&["stream", "--scene", SMALL, "--quiet"], &SIZE[..], more].concat())
 }
 
-/// Names and contents of the files in an archive, in its order.
+/// Names and contents of the files in an archive, in order.
 fn files(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
     let mut archive = tar::Archive::new(archive);
     let file = |entry: std::io::Result<tar::Entry<'_, &[u8]>>| {
@@ -39,7 +39,7 @@ fn files(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
     archive.entries().expect("an archive").map(file).collect()
 }
 
-/// The keys of an archive's images, in their order.
+/// Keys of an archive's images, in order.
 fn keys(files: &[(String, Vec<u8>)]) -> Vec<u64> {
     let mut keys: Vec<u64> =
         files.iter().map(|(name, _)| name.split('.').next().and_then(|key| key.parse().ok()).expect("a key")).collect();
@@ -47,13 +47,13 @@ fn keys(files: &[(String, Vec<u8>)]) -> Vec<u64> {
     keys
 }
 
-/// The images of a dataset as an archive would name their files.
+/// Files of a dataset's images, named as in an archive.
 fn of_dataset(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let image = |(name, bytes): (String, Vec<u8>)| Some((name.strip_prefix("images/")?.replace('/', "."), bytes));
     tree(folder).into_iter().filter_map(image).collect()
 }
 
-/// Waits for a program's end, which must come soon.
+/// Waits for a program to end, which must happen soon.
 fn end(mut child: Child) -> ExitStatus {
     let begin = Instant::now();
     loop {
@@ -62,7 +62,7 @@ fn end(mut child: Child) -> ExitStatus {
         }
         if begin.elapsed() > Duration::from_secs(60) {
             child.kill().expect("a kill");
-            panic!("the program goes on");
+            panic!("the program continues to run");
         }
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -90,7 +90,7 @@ fn a_stream_holds_the_bytes_of_the_dataset_in_order() {
         let other: Vec<_> = expected.keys().filter(|name| found[*name] != expected[*name]).collect();
         assert!(other.is_empty(), "{more:?}: {other:?}");
         let threads = [&["--count", "4", "--threads", "3", "--at-once", "3"], more].concat();
-        assert!(succeed(stream(&threads)).stdout == whole, "{more:?}: another archive with three threads");
+        assert!(succeed(stream(&threads)).stdout == whole, "{more:?}: three threads give another archive");
     }
 }
 
@@ -107,11 +107,11 @@ fn shards_and_parts_give_the_whole() {
     assert!(parts == all, "shards differ from the whole");
     let later = files(&succeed(stream(&["--first", "5", "--count", "2"])).stdout);
     assert!(later[..] == all[all.len() - later.len()..], "{:?}", keys(&later));
-    // More readers than images: the last of them gets an archive without any.
+    // With more shards than images, the last one gets an empty archive.
     assert!(files(&succeed(stream(&["--count", "1", "--shard", "1/2"])).stdout).is_empty());
 }
 
-/// Several images of one field, which each worker grows for itself.
+/// Several images of one field, which each worker builds for itself.
 #[test]
 fn a_drive_streams_as_its_dataset() {
     let (_keep, data) = scratch();
@@ -121,17 +121,18 @@ fn a_drive_streams_as_its_dataset() {
     let found = succeed(trace(&[&["stream", "--scene", scene, "--threads", "2"], &size[..]].concat())).stdout;
     let found = files(&found);
     assert_eq!(keys(&found), [0, 1, 2, 3]);
-    assert!(found.into_iter().collect::<BTreeMap<_, _>>() == of_dataset(&data), "other bytes than the dataset's");
+    assert!(found.into_iter().collect::<BTreeMap<_, _>>() == of_dataset(&data), "bytes differ from the dataset's");
 }
 
-/// Rationale: a program that trains takes what it needs and leaves. Expected: no message, exit code 0, nothing left in the folder for
-/// temporary files; and while nobody reads, no more is made than waits.
+/// Rationale: a training program reads the images that it needs and exits. Expected: no message, exit code 0, no
+/// temporary file left; while nobody reads, only a bounded number of images is rendered ahead.
 #[test]
 fn a_reader_that_leaves_ends_it_quietly() {
     let (_keep, folder) = scratch();
     fs::create_dir_all(&folder).expect("a folder");
     let mut command = stream(&["--threads", "2"]);
-    let mut child = command.env("TMPDIR", &folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it");
+    let mut child =
+        command.env("TMPDIR", &folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program");
     let mut out = child.stdout.take().expect("stdout");
     let mut archive = Vec::new();
     // Two images: up to the second record.
@@ -140,7 +141,7 @@ fn a_reader_that_leaves_ends_it_quietly() {
         out.read_exact(&mut part).expect("a block");
         archive.extend(part);
     }
-    assert!(!crate::common::program::names(&folder).is_empty(), "the scene is copied while it runs");
+    assert!(!crate::common::program::names(&folder).is_empty(), "the scene must be copied while the program runs");
     drop(out);
     let mut said = String::new();
     let mut stderr = child.stderr.take().expect("stderr");
@@ -150,7 +151,8 @@ fn a_reader_that_leaves_ends_it_quietly() {
     assert_eq!(crate::common::program::names(&folder), Vec::<String>::new());
 }
 
-/// Expected: TERM ends it with 75, also while it waits for a reader that does not read; `--first` goes on where it stopped.
+/// Expected: TERM ends the stream with exit code 75, also while it waits for a reader; `--first` continues where it
+/// stopped.
 #[test]
 fn signals_end_it_while_nobody_reads() {
     let (_keep, folder) = scratch();
@@ -158,8 +160,8 @@ fn signals_end_it_while_nobody_reads() {
     for signal in ["-TERM", "-INT"] {
         let mut command = stream(&[]);
         let command = command.env("TMPDIR", &folder).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().expect("it");
-        // A pipe takes 64 kB, less than is made in this time.
+        let mut child = command.spawn().expect("the program");
+        // A pipe buffers 64 kB, less than is rendered in this time.
         let mut out = child.stdout.take().expect("stdout");
         out.read_exact(&mut [0; 512]).expect("a block");
         std::thread::sleep(Duration::from_secs(2));
@@ -190,7 +192,7 @@ fn what_cannot_be_streamed_is_refused() {
     assert!(said.contains("there is no such scene file") && said.contains("did you mean field"), "{said}");
 }
 
-/// A terminal is made by `script`; where there is none, the test says so.
+/// The program `script` provides a terminal; without it the test is skipped with a note.
 #[test]
 fn a_terminal_is_refused() {
     let program = format!("{} stream --scene {SMALL} --count 1", env!("CARGO_BIN_EXE_trace"));
@@ -205,8 +207,8 @@ fn a_terminal_is_refused() {
     assert!(said.contains("error: stdout is a terminal") && said.lines().count() == 2, "{said}");
 }
 
-/// A sun that has set in some fields and not in others. Expected: they are named when it happens and at the end, the others are there, and
-/// the exit code is that of the dataset.
+/// The sun is below the horizon in some fields. Expected: these are reported when they fail and again at the end, the
+/// others are present, and the exit code is that of the dataset.
 #[test]
 fn fields_that_cannot_be_made_are_left_out_and_named() {
     let (_keep, data) = scratch();
@@ -220,11 +222,15 @@ fn fields_that_cannot_be_made_are_left_out_and_named() {
     let order = ["--scene", path(&scene), "--count", "12", "--spp", "2"];
     let begun = (0..20).any(|seed| {
         fs::write(&scene, text(seed)).expect("a file");
-        trace(&[&["dataset", "plan", "--out", path(&data)], &order[..]].concat()).output().expect("it").status.success()
+        trace(&[&["dataset", "plan", "--out", path(&data)], &order[..]].concat())
+            .output()
+            .expect("the program")
+            .status
+            .success()
     });
-    assert!(begun, "twenty times the sun had set in the first field");
+    assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
     fail(trace(&["dataset", "render", path(&data), "--quiet"]), 2);
-    let output = trace(&[&["stream", "--quiet"], &order[..]].concat()).output().expect("it");
+    let output = trace(&[&["stream", "--quiet"], &order[..]].concat()).output().expect("the program");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     let found = files(&output.stdout);
@@ -235,10 +241,10 @@ fn fields_that_cannot_be_made_are_left_out_and_named() {
         assert!(said.contains(&format!("error: image {index:06}: ")), "{said}");
     }
     assert!(said.contains("below the horizon"), "{said}");
-    assert!(found.into_iter().collect::<BTreeMap<_, _>>() == of_dataset(&data), "other bytes than the dataset's");
+    assert!(found.into_iter().collect::<BTreeMap<_, _>>() == of_dataset(&data), "bytes differ from the dataset's");
 }
 
-/// A script of `tests/python`, with the module `furrow` of the sources and the program that the tests built.
+/// Runs a script of `tests/python` with the source module `furrow` and the program built for the tests.
 fn script(python: PathBuf, name: &str, arguments: &[&str]) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut command = Command::new(python);
@@ -265,7 +271,7 @@ fn pytorch_trains_on_a_stream_as_the_guide_shows() {
     let (_keep, folder) = scratch();
     fs::create_dir_all(&folder).expect("a folder");
     let file = folder.join("example.py");
-    fs::write(&file, example.expect("the guide shows it").text).expect("a file");
+    fs::write(&file, example.expect("an example in the guide").text).expect("a file");
     script(python, "check_stream_torch.py", &[path(&file), SMALL]);
 }
 

@@ -1,8 +1,8 @@
-//! `train table`, from scenes and folders of images to tables: whole, in shards, killed and stopped.
+//! `train table`, from scenes and image folders to tables: in one run, in shards, killed and interrupted.
 //!
-//! Rationale: the paper's tables take a night, and nights have power cuts. Expected: whatever kills the program, and whoever shares its
-//! rows, the same command ends with the same weights and tables, bit for bit, on one thread; wrong input is exit code 2 and leaves
-//! nothing. Source: none needed, equality is exact.
+//! Rationale: the paper's tables take a night, and nights have power cuts. Expected: whatever kills the program, and
+//! however its rows are shared out, the same command ends with the same weights and tables, bit for bit, on one thread;
+//! invalid input gives exit code 2 and leaves no files. Source: none needed, equality is exact.
 
 use crate::common::dataset::{fail, make, path, same, succeed, tree};
 use crate::common::program::scratch;
@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Two networks, two training sets, two seeds; a set is rendered and one is brought in.
+/// An experiment with two networks, two training sets and two seeds; one dataset is rendered and one is imported.
 const PAGE: &str = r#"Experiment(
     networks: ["basic-segnet", "unet"],
     seeds: [1, 2],
@@ -29,7 +29,7 @@ const PAGE: &str = r#"Experiment(
     test: [(name: "Test A", set: "frames", images: "2..5")],
 )"#;
 
-/// A folder of frames with masks beside them, as people keep them, and a page.
+/// A folder that contains images with masks beside them, in a common layout, and an experiment file.
 fn desk() -> &'static Path {
     static DESK: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let made = DESK.get_or_init(|| {
@@ -45,13 +45,13 @@ fn desk() -> &'static Path {
             }
         }
         let small = Path::new(env!("CARGO_MANIFEST_DIR")).join(crate::common::program::SMALL);
-        std::fs::write(folder.join("page.ron"), PAGE.replace("SMALL", path(&small))).expect("the page");
+        std::fs::write(folder.join("page.ron"), PAGE.replace("SMALL", path(&small))).expect("the experiment file");
         (keep, folder)
     });
     &made.1
 }
 
-/// `train table` on the page, on one thread.
+/// Returns the command `train table` on the experiment file, with one thread.
 fn table(out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
     command.current_dir(desk()).args(["table", "page.ron", "--real", "frames=frames", "--threads", "1", "--quiet"]);
@@ -62,7 +62,7 @@ fn table(out: &Path, more: &[&str]) -> Command {
     command
 }
 
-/// What the page comes to without any interruption, and how long it took.
+/// Output of the experiment without any interruption, and the time it took.
 fn whole() -> &'static (TempDir, PathBuf, Duration) {
     static WHOLE: OnceLock<(TempDir, PathBuf, Duration)> = OnceLock::new();
     WHOLE.get_or_init(|| {
@@ -76,7 +76,7 @@ fn whole() -> &'static (TempDir, PathBuf, Duration) {
     })
 }
 
-/// All files but those that tell clock times or where folders lie.
+/// Reads all files except those with clock times or absolute paths.
 fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
     let free = |name: &str| {
         name.contains("/time/")
@@ -111,27 +111,28 @@ fn one_command_makes_sets_trainings_and_tables() {
         }
     }
     let text = |name: &str| String::from_utf8(found[name].clone()).expect("UTF-8");
-    assert_eq!(text("experiment.ron"), std::fs::read_to_string(desk().join("page.ron")).expect("the page"));
+    assert_eq!(text("experiment.ron"), std::fs::read_to_string(desk().join("page.ron")).expect("the experiment file"));
     let csv = text("table-1.csv");
-    // Heads, two networks and two baselines, each on two training sets.
+    // Header, two networks and two baselines, each on two training sets.
     assert_eq!(csv.lines().count(), 1 + 4 * 2, "{csv}");
     assert!(csv.lines().skip(1).all(|l| l.split(',').skip(2).all(|n| n.parse::<f64>().is_ok())), "{csv}");
     assert!(csv.contains("Real-Augmented") && text("table-3.md").contains("vegetation"));
     assert!(text("results.html").contains("Real-Augmented"));
     assert!(found.keys().all(|name| !name.contains(".furrow-")));
-    // Twice is once.
+    // A second run changes nothing.
     let again = succeed(table(out, &[]));
     assert!(again.stderr.is_empty(), "{}", String::from_utf8_lossy(&again.stderr));
     same(&files(out), &found);
 }
 
-/// Where in the whole the kills fall is told by the fractions; sets are rendered first, so that early kills leave an orphaned renderer.
+/// The fractions are the moments of the kills relative to a full run. Datasets are rendered first, so early kills leave
+/// an orphaned renderer.
 #[test]
 fn killed_at_many_moments_it_ends_as_if_never_killed() {
     let (_, expected, once) = whole();
     let (_keep, out) = scratch();
     let mut alive = 0;
-    // Twenty of them, most early: what is there makes the next run shorter.
+    // Twenty kills, mostly early, because each run starts from the results of the previous one and is shorter.
     let moments = [
         0.02, 0.05, 0.08, 0.12, 0.3, 0.1, 0.2, 0.07, 0.3, 0.15, 0.03, 0.06, 0.09, 0.12, 0.04, 0.05, 0.1, 0.07, 0.02,
         0.25,
@@ -144,7 +145,7 @@ fn killed_at_many_moments_it_ends_as_if_never_killed() {
         child.wait().expect("an end");
     }
     assert!(alive > 8, "{alive} of 20 kills hit a running program");
-    // No kill is sure to fall into the writing of a file.
+    // No kill is certain to hit a file write, so partial files are added here.
     for within in ["", "runs/unet/synthetic/seed-1/eval"] {
         std::fs::create_dir_all(out.join(within)).expect("a folder");
         std::fs::write(out.join(within).join(".furrow-half"), "half").expect("a file");
@@ -160,11 +161,11 @@ fn a_disk_that_fails_is_told_and_the_table_goes_on() {
     let (_, expected, _) = whole();
     let expected = files(expected);
     let (_keep, out) = scratch();
-    // One folder through all of them, as a disk that is cleared bit by bit: each run comes further than the one before.
+    // All runs share one folder, as if space were freed little by little: each run gets further than the previous one.
     for at in [1, 4, 40, 150, 60, 30] {
         let ended = crate::common::faults::run(table(&out, &[]), &out, at, at % 4 == 0);
         let said = ended.said();
-        assert_ne!(ended.failed, "none", "it ended before change {at}: {said}");
+        assert_ne!(ended.failed, "none", "the run ended before change {at}: {said}");
         assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
         assert!(said.starts_with("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
     }
@@ -172,7 +173,8 @@ fn a_disk_that_fails_is_told_and_the_table_goes_on() {
     same(&files(&out), &expected);
 }
 
-/// Expected: files from the past and from the future change nothing; a folder of another user is one error, and stays as it is.
+/// Expected: file times in the past and the future change nothing; a folder of another user gives one error and stays
+/// unchanged.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
 fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
@@ -206,7 +208,7 @@ fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
 fn two_shards_at_the_same_time_make_the_whole() {
     let (_, expected, _) = whole();
     let (_keep, out) = scratch();
-    // Both find no sets: one makes them, the other waits.
+    // Neither finds the datasets: one shard renders them, the other waits.
     let shards: Vec<Child> = ["0/2", "1/2"].iter().map(|row| spawn(table(&out, &["--row", row]))).collect();
     for mut shard in shards {
         assert!(shard.wait().expect("an end").success());
@@ -215,14 +217,14 @@ fn two_shards_at_the_same_time_make_the_whole() {
     same(&files(&out), &files(expected));
 }
 
-/// Expected: exit code 75 while sets are rendered and while a network learns; what is there is gone on with.
+/// Expected: exit code 75 while datasets are rendered and while a network is trained; the results so far are reused.
 #[test]
 fn signals_stop_it_cleanly() {
     let (_keep, out) = scratch();
     let until = |child: &mut Child, done: &dyn Fn() -> bool| {
         let deadline = Instant::now() + Duration::from_secs(300);
         while !done() && Instant::now() < deadline {
-            assert_eq!(child.try_wait().expect("a child"), None, "it has ended before it was asked to");
+            assert_eq!(child.try_wait().expect("a child"), None, "the run ended before the signal");
             std::thread::sleep(Duration::from_millis(10));
         }
         assert!(done(), "nothing begins");
@@ -232,14 +234,14 @@ fn signals_stop_it_cleanly() {
         assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
         assert_eq!(child.wait().expect("an end").code(), Some(75), "{signal}");
     };
-    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the experiment file");
     let long = page.replace("count: 6", "count: 5000").replace("steps: 2", "steps: 100000, patience: 100000");
-    std::fs::write(desk().join("long.ron"), &long).expect("a page");
+    std::fs::write(desk().join("long.ron"), &long).expect("an experiment file");
     let mut child = spawn(renamed(&table(&out, &[]), "long.ron"));
     until(&mut child, &|| out.join("sets/small/seals").is_dir());
     stop(&mut child, "-TERM");
-    // Fewer images than there are: into another folder.
-    std::fs::write(desk().join("long.ron"), long.replace("count: 5000", "count: 6")).expect("a page");
+    // The dataset already has more images than this file requests, so it goes into another folder.
+    std::fs::write(desk().join("long.ron"), long.replace("count: 5000", "count: 6")).expect("an experiment file");
     let (_keep, out) = scratch();
     for signal in ["-TERM", "-USR1"] {
         let folder = out.join("runs/basic-segnet/synthetic/seed-1");
@@ -253,7 +255,7 @@ fn signals_stop_it_cleanly() {
     assert!(tree(&out).keys().all(|name| !name.contains(".furrow-")));
 }
 
-/// The same command about another page.
+/// Returns the same command for another experiment file.
 fn renamed(command: &Command, page: &str) -> Command {
     let mut other = Command::new(command.get_program());
     other.current_dir(desk());
@@ -264,15 +266,15 @@ fn renamed(command: &Command, page: &str) -> Command {
 #[test]
 fn wrong_input_is_one_clear_error_and_leaves_nothing() {
     let (_keep, out) = scratch();
-    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the experiment file");
     let pages = [
         ("networks:", "networx:", "wrong.ron:2:5: unknown field `networx`"),
         ("\"small\")]", "\"smal\")]", "wrong.ron:10:42: there is no set `smal`"),
         ("\"2..5\"", "\"5..2\"", "wrong.ron:13:52: `5..2` picks no images"),
-        ("[1, 2]", "[1, 1]", "wrong.ron:3:16: the seed 1 is there twice"),
+        ("[1, 2]", "[1, 1]", "wrong.ron:3:16: the seed 1 is given twice"),
     ];
     for (from, to, words) in pages {
-        std::fs::write(desk().join("wrong.ron"), page.replacen(from, to, 1)).expect("a page");
+        std::fs::write(desk().join("wrong.ron"), page.replacen(from, to, 1)).expect("an experiment file");
         let said = fail(renamed(&table(&out, &[]), "wrong.ron"), 2);
         assert!(said.starts_with("error: ") && said.matches("error").count() == 1, "{said}");
         assert!(said.contains(words), "{words}: {said}");
@@ -301,10 +303,11 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
 #[test]
 fn a_set_that_cannot_be_made_is_told_with_its_reason() {
     let (_keep, out) = scratch();
-    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the page");
+    let page = std::fs::read_to_string(desk().join("page.ron")).expect("the experiment file");
     let (at, end) = (page.find("file: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
-    std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("a page");
-    std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..])).expect("a page");
+    std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("an experiment file");
+    std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..]))
+        .expect("an experiment file");
     let said = fail(renamed(&table(&out, &[]), "broken.ron"), 2);
     assert!(said.contains("scene.ron:1:7: unknown field `seeed`"), "{said}");
     assert!(said.contains("the set `small` cannot be made"), "{said}");

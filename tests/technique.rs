@@ -1,17 +1,17 @@
-//! The flags that leave a technique out, as their user meets them.
+//! The flags that switch off a technique of the path tracer.
 //!
-//! Rationale: a technique that moves the mean is a bug, and only switching it off shows it. Expected: each flag makes another
-//! picture with the same mean (z-test per band, α = 0.01 with Šidák's correction over all flags and bands) and says so in the
-//! files; the limits that bias are found to bias. Source: Veach 1997, chapters 9 and 10. Every pixel by itself is tested in
-//! `tests/reference.rs`.
+//! Rationale: a technique that changes the mean is a bug, and only switching it off reveals this. Expected: each flag
+//! gives another image with the same mean (z-test per band, α = 0.01 with Šidák's correction over all flags and bands)
+//! and is recorded in the files; the options that limit paths are shown to be biased. Source: Veach 1997, chapters 9
+//! and 10. `tests/reference.rs` tests every pixel separately.
 
 use crate::common::layers::read_layers;
 use crate::common::program::{scratch, trace};
 use crate::common::stats::{p_value, sidak};
-use furrow::math::Spectrum;
+use furrow_base::math::Spectrum;
 use std::path::Path;
 
-/// Soil and a plant between a sky and a lamp: light by lamps, by the sky and by many bounces.
+/// Soil and a plant between a sky and a lamp: light from the lamp, from the sky, and from many bounces.
 const PAGE: &str = r"Field(
     camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
     lights: [
@@ -21,7 +21,7 @@ const PAGE: &str = r"Field(
     plants: [(species: SPECIES, growth: Bbch(14))],
 )";
 
-/// Mean and its variance of each band over the image, the bytes of the film, and the header's words.
+/// Mean over the image and its variance for each band, the film's red channel, and the comment of the header.
 struct Shot {
     mean: Vec<f64>,
     variance: Vec<f64>,
@@ -47,7 +47,7 @@ fn shoot(folder: &Path, arguments: &[&str]) -> Shot {
     Shot { mean: mean(""), variance, red: layers["R"].clone(), comment }
 }
 
-/// The smallest p over the bands.
+/// Smallest p-value over the bands.
 fn p(a: &Shot, b: &Shot) -> f64 {
     let band = |i: usize| p_value((a.mean[i] - b.mean[i]) / (a.variance[i] + b.variance[i]).sqrt());
     (0..4).map(band).fold(1.0, f64::min)
@@ -78,6 +78,6 @@ fn limits_that_bias_are_found_to_bias_and_told() {
         assert!(less.comment.ends_with(told), "{}", less.comment);
         let p = p(&all, &less);
         assert!(p < 1e-6, "{flags:?}: p = {p}, so the z-test would not find a bias");
-        assert!(less.mean.iter().zip(&all.mean).all(|(l, a)| l <= a), "{flags:?} takes light away");
+        assert!(less.mean.iter().zip(&all.mean).all(|(l, a)| l <= a), "{flags:?} must not add light");
     }
 }

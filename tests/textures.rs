@@ -1,12 +1,12 @@
 //! The textures that ship with the program.
 //!
-//! After a change of the drawing code: `cargo test --test all textures::redraw -- --ignored` draws them all again; `ONLY=beet` before
-//! it draws those whose path holds the word.
+//! After a change of the texture generator, `cargo test --test all textures::redraw -- --ignored` generates all of them
+//! again; with `ONLY=beet` before it, only those whose path contains the word.
 
-use furrow::geometry::outline::Outline;
-use furrow::math::vec2;
-use furrow::texture::draw::{self, Drawn, Margin, Recipe};
-use furrow::texture::{ColorSpace, Height, Texture, Wrap};
+use furrow_base::geometry::outline::Outline;
+use furrow_base::math::vec2;
+use furrow_optics::texture::draw::{self, Drawn, Margin, Recipe};
+use furrow_optics::texture::{ColorSpace, Height, Texture, Wrap};
 use std::path::{Path, PathBuf};
 
 fn root() -> &'static Path {
@@ -33,7 +33,7 @@ fn text_of(png_file: &Path) -> String {
 }
 
 #[test]
-#[ignore = "writes into the working tree; run it after changing the drawing code"]
+#[ignore = "writes into the working tree; run it after changing the texture generator"]
 fn redraw() {
     let only = std::env::var("ONLY").unwrap_or_default();
     for recipe in all() {
@@ -43,8 +43,8 @@ fn redraw() {
     }
 }
 
-/// Rationale: a recipe that no longer draws its image is a false statement of where the image comes from.
-/// Expected: the same bytes, relief included, from a copy of the recipe elsewhere.
+/// Rationale: an image that its recipe no longer generates has a false provenance. Expected: a copy of the recipe in
+/// another folder generates the same bytes, relief included.
 #[test]
 fn every_image_is_what_its_recipe_draws() {
     let check = |recipe: &Path| {
@@ -55,7 +55,11 @@ fn every_image_is_what_its_recipe_draws() {
             let committed = recipe.with_file_name(drawn.file_name().unwrap());
             if drawn.extension().is_some_and(|e| e == "png") {
                 let same = std::fs::read(&drawn).unwrap() == std::fs::read(&committed).unwrap_or_default();
-                assert!(same, "{} is not what its recipe draws; see this file's head", committed.display());
+                assert!(
+                    same,
+                    "{} differs from its recipe's output; see the documentation of this module",
+                    committed.display()
+                );
             }
         }
     };
@@ -85,7 +89,7 @@ fn every_texture_says_where_it_comes_from() {
             let name = file.split('.').next().unwrap().to_owned();
             assert!(source.contains(&format!("`{name}`")), "{file} is not in SOURCE.md");
             let text = text_of(&path);
-            assert!(text.contains("Source") && text.contains("License"), "{file} does not say it inside");
+            assert!(text.contains("Source") && text.contains("License"), "{file} has no Source and License text");
             let size = std::fs::metadata(&path).unwrap().len();
             assert!(size < 2_900_000, "{file}: {size} bytes");
             bytes += size;
@@ -108,13 +112,13 @@ fn a_texture_drawn_elsewhere_gets_its_source_beside_it() {
 fn leaf(path: &Path) -> (draw::LeafRecipe, Texture) {
     match draw::read(path).unwrap() {
         Recipe::Leaf(recipe) => (*recipe, Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap()),
-        Recipe::Soil(_) => panic!("{} is no leaf", path.display()),
+        Recipe::Soil(_) => panic!("{} is not a leaf", path.display()),
     }
 }
 
-/// Rationale: the renderer takes a texel for a reflectance. Expected: the mean of every leaf lies where measured leaves lie, and
-/// green is the strongest band. Source: LOPEX93 band means of soybean, maize, lettuce: R 0.06–0.11, G 0.09–0.14, B 0.05–0.08
-/// of the camera, whose blue is wider than the eye's.
+/// Rationale: the renderer uses texels as reflectances. Expected: the mean of every leaf is in the range of measured
+/// leaves, and green is the strongest band. Source: LOPEX93 band means of soybean, maize, lettuce: R 0.06–0.11, G
+/// 0.09–0.14, B 0.05–0.08 of the camera, whose blue band is wider than the eye's.
 #[test]
 fn leaves_reflect_what_leaves_reflect() {
     for path in recipes("leaf") {
@@ -136,8 +140,8 @@ fn leaves_reflect_what_leaves_reflect() {
     }
 }
 
-/// Rationale: the mesh of an entire leaf is the outline; alpha must not cut into it. Expected: the opaque area is the outline's,
-/// or two pixels more all around; teeth and lobes only take away.
+/// Rationale: the mesh of an entire leaf is its outline, so alpha must not cut into it. Expected: the opaque area
+/// equals the outline, or is up to two pixels larger on all sides; teeth and lobes only remove area.
 #[test]
 fn opacity_follows_the_outline() {
     for path in recipes("leaf") {
@@ -161,13 +165,13 @@ fn opacity_follows_the_outline() {
             }
             Margin::Lobed(_) | Margin::Lyrate(_) => assert!((0.25..0.85).contains(&share), "{name}: {share}"),
         }
-        // Every point of an entire leaf's mesh is opaque.
+        // Every point on the margin of an entire leaf's mesh is opaque.
         let uncut = recipe.notch.is_none() && recipe.sinus.is_none();
         if let (Outline::Power { .. }, Margin::Entire, true) = (recipe.outline, recipe.margin, uncut) {
             for i in 1..200 {
                 let t = i as f32 / 200.0;
                 for side in [-1.0, 1.0] {
-                    let uv = furrow::geometry::outline::uv(side * recipe.outline.half_width(t), t);
+                    let uv = furrow_base::geometry::outline::uv(side * recipe.outline.half_width(t), t);
                     assert!(mask.opaque_at(uv), "{name}: the margin at {t}");
                 }
             }
@@ -176,13 +180,13 @@ fn opacity_follows_the_outline() {
 }
 
 fn soil(path: &Path) -> (draw::SoilRecipe, Texture, Height) {
-    let Recipe::Soil(recipe) = draw::read(path).unwrap() else { panic!("{} is no soil", path.display()) };
+    let Recipe::Soil(recipe) = draw::read(path).unwrap() else { panic!("{} is not a soil", path.display()) };
     let colour = Texture::load(&path.with_extension("png"), ColorSpace::Srgb).unwrap().wrapped(Wrap::Repeat);
     let height = Height::load(&path.with_extension("height.png"), recipe.range_mm.f32()).unwrap();
     (recipe, colour, height.wrapped(Wrap::Repeat))
 }
 
-/// Expected: across the edge colour and height step no more than within.
+/// Expected: colour and height steps across the tile's edge are no larger than within the tile.
 #[test]
 fn ground_tiles() {
     for path in recipes("soil") {
@@ -208,14 +212,14 @@ fn ground_tiles() {
 fn ground_has_the_colour_that_its_recipe_states() {
     for path in recipes("soil") {
         let (recipe, colour, height) = soil(&path);
-        // The coarsest level of the pyramid is the mean.
+        // The coarsest mip level is the mean.
         let mean = colour.sample(vec2(0.5, 0.5), 20.0);
         for k in 0..3 {
             let stated = recipe.albedo[k].f32();
             assert!((mean[k] / stated - 1.0).abs() < 0.12, "{}: {mean:?}", path.display());
         }
         let top = height.values().iter().copied().fold(0.0, f32::max);
-        assert!(top < recipe.range_mm.f32() * 0.999, "{}: the relief is cut off", path.display());
+        assert!(top < recipe.range_mm.f32() * 0.999, "{}: the relief is clipped", path.display());
         assert!(colour.alpha_mask().is_none());
     }
 }
@@ -254,7 +258,7 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
         ),
         (
             "Leaf(seed: 1, size: 64, length_mm: 9, aspect: 0.5, outline: Full, margin: Lyrate(terminal: 0.3, outline: (1, 1), pairs: 60, lobe: 1, rachis: 0.1, teeth: (3, 0.1), lobe_teeth: (8, 0.1)), veins: Parallel(count: 3, midrib: 0.1), pigments: ())",
-            "60 pairs of lobes with so many teeth: at most 11",
+            "60 pairs of lobes with that many teeth: at most 11",
         ),
         (
             "Soil(seed: 1, size: 32, period_mm: 60, ground: Cracked(plate_mm: 0.0000001, crack_mm: 4, depth_mm: 8))",
@@ -269,12 +273,12 @@ fn what_cannot_be_drawn_is_refused_with_a_reason() {
         std::fs::write(&path, page).unwrap();
         let message = draw::write(&path).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
-        assert!(message.starts_with(&path.display().to_string()), "no file in: {message}");
+        assert!(message.starts_with(&path.display().to_string()), "no path in: {message}");
     }
 }
 
-/// Rationale: a recipe of another name was overwritten by its picture. Expected: it is refused, and so is one whose picture, relief or words would go
-/// where a folder stands; nothing is written then.
+/// Rationale: a recipe whose name does not end in .ron was overwritten by its image. Expected: it is refused, as is a
+/// recipe whose image, relief or text file would replace a folder; no file is written then.
 #[test]
 fn nothing_is_drawn_where_it_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -292,11 +296,11 @@ fn nothing_is_drawn_where_it_cannot_be_written() {
         let error = draw::write(&recipe).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains(&format!("{name}: this is no file")), "{error}");
         std::fs::remove_dir(&taken).unwrap();
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "{name}: something was written");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "{name}: files were written");
     }
 }
 
-/// Rationale: odd recipes must end, not hang or panic.
+/// Rationale: extreme recipes must terminate without a hang or panic.
 #[test]
 fn odd_leaves_are_drawn_too() {
     for aspect in ["0.01", "0.5", "3"] {
@@ -327,13 +331,13 @@ fn odd_leaves_are_drawn_too() {
     }
 }
 
-/// A photograph of a leaf as a camera takes it: three stops under, redder than the leaf, lit from one side, with veins, a highlight, noise,
-/// colours smeared over blocks of 8 as JPEG smears them, and an edge that fades over some pixels.
+/// A synthetic photograph of a leaf: three stops underexposed, redder than the leaf, lit from one side, with veins, a
+/// highlight, noise, colours averaged over blocks of 8 as in JPEG, and an edge that fades over several pixels.
 fn photograph() -> (u32, Vec<u8>) {
     const SIDE: u32 = 160;
     let mut state = 7_u64;
     let mut noise = || {
-        state = furrow::sampling::rng::mix(state);
+        state = furrow_base::sampling::rng::mix(state);
         (state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5
     };
     let mut pixels = Vec::new();
@@ -346,12 +350,12 @@ fn photograph() -> (u32, Vec<u8>) {
             let block = 1.0 + 0.06 * (((x / 8 * 37 + y / 8 * 61) % 11) as f32 / 10.0 - 0.5);
             let value = |band: f32, tint: f32| {
                 let linear = band * light * vein * tint + 0.12 * shine;
-                // The sRGB curve, about.
+                // The sRGB curve, approximately.
                 linear.max(0.0).powf(1.0 / 2.2) * 255.0
             };
             let rgb = [value(0.10, block), value(0.14, 1.0), value(0.03, 2.0 - block)]
                 .map(|c| (c + 6.0 * noise()).clamp(0.0, 255.0) as u8);
-            // An ellipse, its edge fading over about five pixels; what lies around it is the table that it was laid on.
+            // An ellipse whose edge fades over about five pixels, on a table.
             let inside = ((1.0 - (u / 0.32).hypot(v / 0.45)) * 12.0 + 0.5).clamp(0.0, 1.0);
             let table = [200.0, 195.0, 190.0];
             let mixed = |k: usize| (f32::from(rgb[k]) * inside + table[k] * (1.0 - inside)) as u8;
@@ -361,15 +365,15 @@ fn photograph() -> (u32, Vec<u8>) {
     (SIDE, pixels)
 }
 
-/// Rationale: whoever gives a photograph of a leaf knows neither its exposure nor its white balance, and a picture of three stops under would
-/// be a black leaf. Expected: as a species' texture, read from its file, the blade's mean is the pigments' reflectance in each band, within 2 % in
-/// R, G, B and 6 % in near infrared, and light passes through it; its veins stay paler than the blade and its lit side brighter; with
-/// `calibrated: true` its own values stay.
+/// Rationale: the exposure and white balance of a leaf photograph are unknown, and an image three stops underexposed
+/// would give a black leaf. Expected: used as a species' texture, the blade's mean equals the pigments' reflectance in
+/// each band, within 2 % in R, G, B and 6 % in near infrared, and the blade transmits light. Its veins stay paler than
+/// the blade and its lit side brighter. With `calibrated: true` the image's own values are kept.
 #[test]
 fn a_photograph_is_exposed_as_the_pigments_say() {
-    use furrow::material::Material;
-    use furrow::math::Spectrum;
-    use furrow::scene::assemble::{self, Options};
+    use furrow_base::math::Spectrum;
+    use furrow_field::assemble::{self, Options};
+    use furrow_render::material::Material;
     let folder = tempfile::tempdir().unwrap();
     let (side, pixels) = photograph();
     let picture = Texture::from_rgba8(side, side, &pixels, ColorSpace::Srgb);
@@ -412,11 +416,11 @@ fn a_photograph_is_exposed_as_the_pigments_say() {
             n += 1.0;
         }
         let bright = |x: u32, y: u32| swatch.texel(x, y).reflectance.luminance();
-        // The midrib over the blade beside it, and the lit side over the dark one.
+        // The midrib relative to the blade beside it, and the lit side relative to the dark one.
         let contrast = (bright(80, 60) / bright(77, 60), bright(112, 84) / bright(50, 84));
         (sum * (1.0 / n), passed * (1.0 / n), contrast)
     };
-    let wanted = furrow::optics::Pigments::default().bands();
+    let wanted = furrow_optics::optics::Pigments::default().bands();
     let (matched, passed, contrast) = mean("");
     for k in 0..4 {
         let off = matched.0[k] / wanted.reflectance.0[k] - 1.0;
@@ -437,5 +441,5 @@ fn a_photograph_is_exposed_as_the_pigments_say() {
     for k in 0..3 {
         assert!((own.0[k] / (dark[k] / n) - 1.0).abs() < 0.02, "band {k}: {own:?} {dark:?}");
     }
-    assert!(own.0.y < 0.3 * matched.0.y, "{own:?} {matched:?}: the photograph is not dark");
+    assert!(own.0.y < 0.3 * matched.0.y, "{own:?} {matched:?}: the photograph must be dark");
 }

@@ -1,8 +1,9 @@
-//! `trace watch`: a scene file that is written while its field is shown, through HTTP and in a browser.
+//! `trace watch`: a scene file is edited while its field is displayed, through HTTP and in a browser.
 //!
-//! Rationale: who writes a scene file must see each change, and each mistake in the program's own words, without asking for it; and nobody
-//! else may look or write. Expected: load → edit → change → break → error → mend, with the last good picture kept; wrong tokens, hosts and
-//! origins refused; values written into the file change no other byte; exit code 75 on a signal.
+//! Rationale: authors of a scene file must see each change, and each error in the program's own words, without asking
+//! for it; nobody else may read or write. Expected: load → edit → change → break → error → repair, with the last valid
+//! image kept; invalid tokens, hosts and origins refused; values written into the file change no other byte; exit code
+//! 75 on a signal.
 
 use crate::common::browser::browser;
 use crate::common::devtools::Page;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A scene that renders in a blink.
+/// A scene that renders in a fraction of a second.
 const SCENE: &str = r"// One beet.
 Field(
     seed: 3, // of the file
@@ -23,14 +24,14 @@ Field(
 )
 ";
 
-/// How long anything may take on a busy machine.
+/// Time limit of any operation on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A running program and the folder of its scene file.
 struct Watched {
     program: Child,
     folder: tempfile::TempDir,
-    /// `127.0.0.1:port`, and the path that begins with the token.
+    /// `127.0.0.1:port`, and the path that starts with the token.
     host: String,
     base: String,
     said: BufReader<std::process::ChildStderr>,
@@ -41,7 +42,7 @@ impl Watched {
         Self::spawn(Command::new(env!("CARGO_BIN_EXE_trace")), more)
     }
 
-    /// The same with at most so many open files.
+    /// Starts the program with a limit on open files.
     fn limited(files: u32) -> Self {
         let mut shell = Command::new("sh");
         shell.args(["-c", &format!("ulimit -n {files}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_trace")]);
@@ -78,14 +79,14 @@ impl Watched {
         std::fs::read_to_string(self.file()).unwrap()
     }
 
-    /// Saves as many editors do: a new file is renamed over the old one.
+    /// Saves like many editors: a new file is renamed over the old one.
     fn save(&self, text: &str) {
         let beside = self.folder.path().join("a.ron~");
         std::fs::write(&beside, text).unwrap();
         std::fs::rename(beside, self.file()).unwrap();
     }
 
-    /// Status and body of a request with these headers.
+    /// Sends a request with these headers; returns status and body.
     fn ask(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -112,7 +113,7 @@ impl Watched {
         (status, String::from_utf8(body).unwrap())
     }
 
-    /// The stream of states, each as it comes.
+    /// Opens the stream of states.
     fn events(&self) -> Events {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -120,7 +121,7 @@ impl Watched {
         Events(BufReader::new(stream))
     }
 
-    /// Ends it with a signal; its exit code and the rest of what it said.
+    /// Ends the program with a signal; returns the exit code and the rest of its output.
     fn end(mut self, signal: &str) -> (Option<i32>, String) {
         let kill = format!("kill -{signal} {}", self.program.id());
         assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
@@ -129,7 +130,7 @@ impl Watched {
             if let Some(status) = self.program.try_wait().unwrap() {
                 break status.code();
             }
-            assert!(begin.elapsed() < PATIENCE, "it did not stop");
+            assert!(begin.elapsed() < PATIENCE, "the program did not stop");
             std::thread::sleep(Duration::from_millis(10));
         };
         let mut rest = String::new();
@@ -149,11 +150,11 @@ impl Drop for Watched {
 struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// The first state from now on of which this holds.
+    /// Waits for the next state that satisfies a condition.
     fn until(&mut self, holds: impl Fn(&Value) -> bool) -> Value {
         let begin = Instant::now();
         loop {
-            assert!(begin.elapsed() < PATIENCE, "no such state came");
+            assert!(begin.elapsed() < PATIENCE, "no such state arrived");
             let mut line = String::new();
             assert!(self.0.read_line(&mut line).unwrap() > 0, "the stream ended");
             if let Some(data) = line.strip_prefix("data: ") {
@@ -165,7 +166,7 @@ impl Events {
         }
     }
 
-    /// The state when the newest picture is finished.
+    /// Waits for the state in which the newest image is finished.
     fn done(&mut self) -> Value {
         self.until(|s| s["error"].is_null() && s["picture"]["asked"] == s["asked"] && s["picture"]["spp"] == 2)
     }
@@ -179,7 +180,7 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
     assert_eq!(
         (first["picture"]["width"].as_u64(), first["picture"]["scale"].as_f64()),
         (Some(96), Some(1.0)),
-        "not larger than its camera"
+        "the image must not be larger than the camera's"
     );
     let view = |name: &str| {
         let (status, png) = watched.get(&format!("view/{name}"));
@@ -208,14 +209,14 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
         broken["error"].as_str().unwrap().contains("a.ron:6:")
             && broken["error"].as_str().unwrap().contains("^^^^^^^^")
     );
-    assert_eq!(view("rgb"), last, "the last good picture stays");
+    assert_eq!(view("rgb"), last, "the last valid image must stay");
 
     watched.save(&good);
     let mended = events.done();
     assert_eq!(mended["picture"]["hash"], first["picture"]["hash"]);
-    assert_eq!(view("rgb"), before[0], "the same file, the same picture");
+    assert_eq!(view("rgb"), before[0], "the same file must give the same image");
 
-    // A file that it names.
+    // A file named by the scene file.
     let species = std::fs::read_to_string("scenes/species/sugar_beet.ron").unwrap();
     let own = species.replace("\"../../", &format!("\"{}/", env!("CARGO_MANIFEST_DIR")));
     std::fs::write(watched.folder.path().join("beet.ron"), &own).unwrap();
@@ -232,8 +233,9 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
     assert!(said.contains("ssh -L") && said.contains("stopped watching"), "{said}");
 }
 
-/// Rationale: a model's materials and pictures are named in the model, not in the scene file; whoever repairs one must see it. Expected: a
-/// material that is saved is shown; one that names a picture that is not there is told; the picture, once it is there, is seen.
+/// Rationale: a model's materials and textures are named in the model, not in the scene file, and users who repair them
+/// must see the result. Expected: a saved material is displayed; one that names a missing texture is reported; the
+/// texture is displayed once it exists.
 #[test]
 fn what_a_model_names_is_followed_and_so_is_what_it_lacks() {
     let watched = Watched::start(&[]);
@@ -268,8 +270,8 @@ fn what_a_model_names_is_followed_and_so_is_what_it_lacks() {
     assert_ne!(mended["picture"]["hash"].as_str(), Some(repainted.as_str()));
 }
 
-/// Rationale: one field of many that is too large must not hide the others. Expected: the picture that is asked for is shown with its sheet open, and a
-/// cell of the sheet that cannot be rendered says why.
+/// Rationale: one field among many that is too large must not hide the others. Expected: the requested image is
+/// displayed with the sheet open, and a cell of the sheet that cannot be rendered shows the reason.
 #[test]
 fn a_field_that_cannot_grow_leaves_the_picture_and_the_other_fields() {
     let watched = Watched::start(&["--seed", "4"]);
@@ -285,7 +287,7 @@ fn a_field_that_cannot_grow_leaves_the_picture_and_the_other_fields() {
     assert_eq!(watched.post("wish", &json!({ "sheet": true })).0, 200);
     let sheet = events.until(|s| s["sheet"]["done"] == 12);
     let failed = |i: usize| sheet["sheet"]["failed"][i].as_str();
-    assert!(failed(0).is_none(), "the field that is shown can grow: {sheet}");
+    assert!(failed(0).is_none(), "the displayed field must be buildable: {sheet}");
     let words: Vec<&str> = (0..12).filter_map(failed).collect();
     assert!(!words.is_empty() && words.len() < 12, "{sheet}");
     assert!(words.iter().all(|words| words.starts_with("error: ") && words.contains("weeds")), "{words:?}");
@@ -328,7 +330,7 @@ fn whoever_does_not_know_the_address_is_refused() {
     let own = format!("Host: {}\r\n", watched.host);
     let status = |path: &str, headers: &str| watched.ask("GET", path, headers, "").0;
     assert_eq!(status(&watched.base, &own), 200);
-    // A length for which there is no memory, from somebody who knows no address: the program lives on.
+    // A length that exceeds any memory, from a client without the token: the program keeps running.
     for length in ["1000000000000000", "9223372036854775807"] {
         let mut stream = TcpStream::connect(&watched.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -377,15 +379,15 @@ fn a_slider_is_a_look_until_it_is_written() {
     assert_eq!(watched.post("wish", &json!({ "values": values, "index": 2 })).0, 200);
     let moved = events.until(|s| s["picture"]["asked"] == s["asked"] && s["picture"]["index"] == 2);
     assert_ne!(moved["picture"]["hash"], first["picture"]["hash"]);
-    assert_eq!(watched.text(), before, "a look writes nothing");
+    assert_eq!(watched.text(), before, "a request for an image must not write to the file");
     let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": 12 }));
     assert_eq!(status, 200, "{said}");
-    assert_eq!(watched.text(), before.replace("Choice([14, 16])", "12"), "comments and all else stay");
+    assert_eq!(watched.text(), before.replace("Choice([14, 16])", "12"), "comments and all other text must stay");
     let written =
         events.until(|s| s["values"].as_object().is_some_and(|v| v.len() == 1) && s["picture"]["asked"] == s["asked"]);
-    assert_eq!(written["picture"]["hash"], moved["picture"]["hash"], "it looks as the slider had shown it");
+    assert_eq!(written["picture"]["hash"], moved["picture"]["hash"], "the image must equal that of the slider");
     assert_eq!(watched.post("write", &json!({ "path": "nothing", "value": 1 })).0, 400);
-    // A value that the file may not have stays out of it.
+    // An invalid value is not written to the file.
     let before = watched.text();
     let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": -1 }));
     assert_eq!(status, 400, "{said}");
@@ -412,7 +414,7 @@ fn a_browser_shows_changes_and_mistakes() {
         "['photo', 'picture'].map((id) => document.getElementById(id)).map((i) => i.clientWidth / i.naturalWidth)",
     );
     let scale = |i: usize| scales[i].as_f64().unwrap();
-    assert!((scale(0) / scale(1) - 1.0).abs() < 0.02, "the same pixel scale: {scales}");
+    assert!((scale(0) / scale(1) - 1.0).abs() < 0.02, "the pixel scales differ: {scales}");
 
     let good = watched.text();
     let before = page.ask("document.body.dataset.shown");
@@ -479,15 +481,16 @@ fn a_sheet_shows_several_indices() {
     };
     let done = run("3..9", &out);
     assert_eq!(String::from_utf8(done.stdout).unwrap().trim(), out.to_str().unwrap());
-    let (width, height, _) = furrow::output::read_photo(&out).unwrap();
-    // Four wide, two high; the words are wider than such small pictures.
+    let (width, height, _) = furrow_output::read_photo(&out).unwrap();
+    // Four wide, two high; the captions are wider than such small images.
     assert!(width > 4 * 48 && height > 2 * 36, "{width} × {height}");
     assert_eq!(run("9..3", &out).status.code(), Some(2));
     assert_eq!(run("0..2", watched.folder.path()).status.code(), Some(2));
 }
 
-/// Rationale: pages that are open in many windows, or scanners, must not end a session. Expected: more connections than the program may have open files
-/// leave it alive: once they are closed it answers again, and ends as ever. The limit is the shell's.
+/// Rationale: pages open in many windows, or port scanners, must not end a session. Expected: the program survives more
+/// connections than its limit on open files; once they are closed it answers again, and ends normally. The shell sets
+/// the limit.
 #[cfg(target_os = "linux")]
 #[test]
 fn too_many_connections_end_nothing() {
@@ -496,7 +499,7 @@ fn too_many_connections_end_nothing() {
     watched.events().done();
     let address = watched.host.parse().unwrap();
     let connect = || TcpStream::connect_timeout(&address, Duration::from_secs(1));
-    // Until its files are open, and some connections more than it can take.
+    // Connect until the limit on open files is reached, and then some more times.
     let files = || std::fs::read_dir(format!("/proc/{}/fd", watched.program.id())).unwrap().count() as u32;
     let (mut idle, begin) = (Vec::new(), Instant::now());
     while files() + 2 < LIMIT {
@@ -515,10 +518,10 @@ fn too_many_connections_end_nothing() {
         said.starts_with(b"HTTP/1.1 200").then_some(())
     };
     while answers().is_none() {
-        assert!(begin.elapsed() < PATIENCE, "it never answered again");
+        assert!(begin.elapsed() < PATIENCE, "the program never answered again");
         std::thread::sleep(Duration::from_millis(100));
     }
     let (code, said) = watched.end("TERM");
     assert_eq!(code, Some(75), "{said}");
-    assert!(said.contains("too many connections"), "the limit was not met: {said}");
+    assert!(said.contains("too many connections"), "the limit was not reached: {said}");
 }

@@ -1,23 +1,25 @@
-//! What is fuzzed: each target takes bytes as a file from elsewhere and reads them as the program does. A refusal is a good answer; a panic, a
-//! hang and memory without bound are finds.
+//! Fuzz targets: each reads bytes as the program reads an untrusted file. An error is a valid result; a panic, a hang or
+//! unbounded memory is a finding.
 
-use furrow::dataset::checksum::Checksum;
-use furrow::dataset::checksum_record::ChecksumRecord;
-use furrow::dataset::import::{Source, coco::Coco, phenobench::PhenoBench};
-use furrow::dataset::{Callbacks, Recipe, Set, Work, generate, native, rle::Rle};
-use furrow::model::{Model, Up};
-use furrow::output;
-use furrow::plant::{self, Stage};
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::assemble::{self, Options};
-use furrow::scene::desc::{FieldDesc, SpeciesDesc};
-use furrow::texture::panorama::Panorama;
-use furrow::texture::{ColorSpace, Texture, draw};
-use furrow::train::fit::checkpoint::{self, Checkpoint};
-use furrow::train::run::{self, Identity, TrainedModel};
-use furrow::train::table::{Experiment, ExperimentDesc};
-use furrow::train::weights::{self, Array};
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::import::{Source, coco::Coco, phenobench::PhenoBench};
+use furrow_dataset::make::generate;
+use furrow_dataset::model::rle::Rle;
+use furrow_dataset::read::checksum::Checksum;
+use furrow_dataset::read::checksum_record::ChecksumRecord;
+use furrow_dataset::read::native;
+use furrow_dataset::{Callbacks, Recipe, Set, Work};
+use furrow_field::assemble::{self, Options};
+use furrow_field::desc::{FieldDesc, SpeciesDesc};
+use furrow_grow::model::{Model, Up};
+use furrow_grow::plant::{self, Stage};
+use furrow_optics::texture::panorama::Panorama;
+use furrow_optics::texture::{ColorSpace, Texture, draw};
+use furrow_train::fit::checkpoint::{self, Checkpoint};
+use furrow_train::run::{self, Identity, TrainedModel};
+use furrow_train::table::{Experiment, ExperimentDesc};
+use furrow_train::weights::{self, Array};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,10 +27,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
-/// A target: its name, which is that of its folder in the corpus, and what it does.
+/// Target: its name, which is also its folder in the corpus, and its function.
 pub(crate) type Target = (&'static str, fn(&[u8]));
 
-/// All of them.
+/// All targets.
 pub(crate) const TARGETS: &[Target] = &[
     ("scene", scene),
     ("species", species),
@@ -56,7 +58,7 @@ pub(crate) const TARGETS: &[Target] = &[
     ("checkpoint", checkpoint),
 ];
 
-/// Most triangles of a plant that is grown.
+/// Largest number of triangles of a plant that is generated.
 const MOST_TRIANGLES: f64 = 2e5;
 
 fn text(bytes: &[u8]) -> Option<RonFile> {
@@ -66,8 +68,8 @@ fn text(bytes: &[u8]) -> Option<RonFile> {
 fn scene(bytes: &[u8]) {
     let Some(page) = text(bytes) else { return };
     let Ok(desc) = page.parse_all::<FieldDesc>() else { return };
-    let printed = RonFile::print(&desc).expect("what was read can be written");
-    let again: FieldDesc = RonFile::of(&printed).parse().expect("what was written can be read");
+    let printed = RonFile::print(&desc).expect("a parsed description can be printed");
+    let again: FieldDesc = RonFile::of(&printed).parse().expect("a printed description can be parsed");
     assert_eq!(printed, RonFile::print(&again).expect("text"));
 }
 
@@ -87,7 +89,7 @@ fn experiment(bytes: &[u8]) {
     }
 }
 
-/// A folder in memory, where there is one, with these files.
+/// Creates a temporary folder with these files, in memory if possible.
 fn folder(files: &[(&str, &[u8])]) -> TempDir {
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.expect("a folder");
@@ -103,11 +105,11 @@ fn png(bytes: &[u8]) {
     let _ = Texture::decode(bytes, ColorSpace::Srgb);
     let folder = folder(&[("a.png", bytes)]);
     let path = folder.path().join("a.png");
-    let _ = output::read_map(&path);
-    let _ = output::read_rgb(&path);
-    let _ = output::read_gray16(&path);
-    let _ = output::read_numbers(&path);
-    let _ = output::read_photo(&path);
+    let _ = furrow_output::read_map(&path);
+    let _ = furrow_output::read_rgb(&path);
+    let _ = furrow_output::read_gray16(&path);
+    let _ = furrow_output::read_numbers(&path);
+    let _ = furrow_output::read_photo(&path);
 }
 
 fn panorama(bytes: &[u8]) {
@@ -117,7 +119,7 @@ fn panorama(bytes: &[u8]) {
 fn exr(bytes: &[u8]) {
     panorama(bytes);
     let folder = folder(&[("a.exr", bytes)]);
-    let _ = output::read_geometry(&folder.path().join("a.exr"));
+    let _ = furrow_output::read_geometry(&folder.path().join("a.exr"));
 }
 
 fn glb(bytes: &[u8]) {
@@ -130,9 +132,9 @@ fn obj(bytes: &[u8]) {
     let _ = Model::load(&folder.path().join("a.obj"), Up::Z);
 }
 
-/// A picture of 4 × 3 pixels.
+/// Returns a PNG file of 4 × 3 pixels.
 fn picture() -> Vec<u8> {
-    output::encode_png(4, 3, &output::Picture::Rgb(&[[90, 120, 60]; 12]), "").expect("a picture")
+    furrow_output::encode_png(4, 3, &furrow_output::Picture::Rgb(&[[90, 120, 60]; 12]), "").expect("a picture")
 }
 
 fn coco(bytes: &[u8]) {
@@ -195,12 +197,12 @@ fn jpeg(bytes: &[u8]) {
     let _ = Texture::decode(bytes, ColorSpace::Srgb);
     let folder = folder(&[("a.jpg", bytes)]);
     let path = folder.path().join("a.jpg");
-    let _ = output::photo_size(&path);
-    let _ = output::read_color_photo(&path);
-    let _ = output::read_gray_photo(&path);
+    let _ = furrow_output::photo_size(&path);
+    let _ = furrow_output::read_color_photo(&path);
+    let _ = furrow_output::read_gray_photo(&path);
 }
 
-/// Places and texture coordinates of a triangle, as glTF has them: nine numbers and six.
+/// Returns a triangle as a glTF buffer: nine numbers for positions, six for texture coordinates.
 fn triangle() -> Vec<u8> {
     let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
     numbers.iter().flat_map(|number: &f32| number.to_le_bytes()).collect()
@@ -217,7 +219,7 @@ fn mtl(bytes: &[u8]) {
     let _ = Model::load(&folder.path().join("a.obj"), Up::Z);
 }
 
-/// Most pixels across and down of a texture that is drawn.
+/// Largest width and height in pixels of a texture that is generated.
 const MOST_PIXELS: f64 = 32.0;
 
 fn texture(bytes: &[u8]) {
@@ -246,13 +248,14 @@ fn poses(bytes: &[u8]) {
     }
 }
 
-/// A dataset of two images in one pack.
+/// Recipe of a dataset with two images in one pack.
 const PACKED: &str = r#"{
     "furrow": "0.1.0", "made": {"imported": {"from": "masks", "source_sha256": ""}}, "count": 2,
     "split": [1, 0, 0], "formats": [], "pack": 2, "licence": "", "species": []
 }"#;
 
-/// A pack's record with these contents and the hash that belongs to them, for without it nothing of it is read; `None` where it would be none.
+/// Returns a pack's record with these contents and the matching hash, without which the record is ignored. `None` if the
+/// contents are not valid.
 fn record_of_pack(bytes: &[u8]) -> Option<(String, Vec<ChecksumRecord>)> {
     let value: Value = serde_json::from_slice(bytes).ok()?;
     let tar: Checksum = serde_json::from_value(value["tar"].clone()).ok()?;
@@ -286,7 +289,7 @@ fn pack(bytes: &[u8]) {
     }
 }
 
-/// An archive whose record is lost is taken apart where the manifest lists it: nothing of it may land beside the dataset.
+/// Unpacks an archive without a record that is listed in the manifest: no file may be written outside the dataset.
 fn archive(bytes: &[u8]) {
     let sum = serde_json::to_string(&Checksum::of(bytes)).expect("JSON");
     let manifest = format!("{{\"recipe\":{PACKED},\"files\":{{\"packs/train-000000.tar\":{sum}}}}}");
@@ -298,11 +301,15 @@ fn archive(bytes: &[u8]) {
     let folder = folder(&files);
     let set = Set::open(&folder.path().join("set")).expect("a dataset");
     let work = Work { threads: 1, at_once: 1, ..Work::default() };
-    // Stopped before the first image is made: archives are taken apart before.
+    // Stopped before the first image is rendered; archives are unpacked earlier.
     let (soon, now) = (AtomicBool::new(true), Arc::new(AtomicBool::new(false)));
     let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &|_| (), soon: &soon, now: &now };
     let _ = generate::generate(&set, &work, &callbacks);
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "something lies beside the dataset");
+    assert_eq!(
+        std::fs::read_dir(folder.path()).expect("a folder").count(),
+        1,
+        "a file was written outside the dataset"
+    );
 }
 
 fn plan(bytes: &[u8]) {
@@ -313,7 +320,7 @@ fn plan(bytes: &[u8]) {
     }
 }
 
-/// The words of a checkpoint beside arrays that are whole: a checksum over both would keep all others out.
+/// Reads checkpoint metadata next to valid arrays, because a checksum over both would reject almost every input.
 fn checkpoint(bytes: &[u8]) {
     let Ok(words) = std::str::from_utf8(bytes) else { return };
     let array = |name: &str| Array { name: name.into(), shape: vec![2], values: vec![0.5, -1.0] };

@@ -1,17 +1,17 @@
-"""Crop fields, rendered and labelled exactly: datasets from disk, and images from scene files.
+"""Rendered crop fields with exact labels: datasets from disk, and images from scene files.
 
     import furrow
 
     image = furrow.render("field", index=7, spp=16, width=648)    # runs the program `trace`
     crop = image["semantics"] == 1                                # 0 soil, 1 crop, 2 weed
 
-    data = furrow.Dataset("data/d", split="train")                # a folder that `trace dataset` has made
+    data = furrow.Dataset("data/d", split="train")                # a folder written by `trace dataset`
     print(len(data), data[0]["plants"].max(), data[0]["record"]["conditions"]["camera"])
 
-    for sample in furrow.stream("field", spp=16, width=324):      # one field after another, none of them written to disk
+    for sample in furrow.stream("field", spp=16, width=324):      # one field after another, without writing to disk
         train(sample["image"], sample["semantics"])
 
-Needs numpy and Pillow. A `Dataset` goes into PyTorch's `DataLoader` as it is; `transform` chooses what a batch holds.
+Requires numpy and Pillow. A `Dataset` can be passed to PyTorch's `DataLoader`; `transform` selects the contents of a batch.
 """
 
 from __future__ import annotations
@@ -37,27 +37,27 @@ SPLITS = ("train", "val", "test")
 
 
 class Error(Exception):
-    """What the program said when it failed, or what a dataset lacks."""
+    """Error message of the program, or a missing or damaged part of a dataset."""
 
 
 class Sample(Dict[str, Any]):
-    """One image with its labels, by name; a notebook shows its picture.
+    """One image with its labels, by name; notebooks display the image.
 
     ========== ======================= ==========================================================
-    image      uint8, (H, W, 3)        the photograph in colour, from PNG or JPEG; none of labels alone
-    nir        uint8, (H, W)           the one in near infrared, where there is one
+    image      uint8, (H, W, 3)        colour image, from PNG or JPEG; absent for labels only
+    nir        uint8, (H, W)           near-infrared image, if there is one
     semantics  uint8, (H, W)           0 soil, 1 crop, 2 weed, 255 no label
-    plants     int32, (H, W)           number of the plant, 0 for none; not there where `--keep` left it out
-    leaves     int32, (H, W)           number of the leaf on its plant, 0 for none; likewise
-    record     dict                    `record.json` of a dataset or a stream; of `render`, where the image came from
+    plants     int32, (H, W)           number of the plant, 0 for none; absent if `--keep` omits it
+    leaves     int32, (H, W)           number of the leaf on its plant, 0 for none; as above
+    record     dict                    `record.json` of a dataset or stream; for `render`, the provenance of the image
     ========== ======================= ==========================================================
     """
 
     def __missing__(self, key: str) -> Any:
-        raise KeyError(f"{key}: this sample has no such map; its record tells plants and leaves with their masks")
+        raise KeyError(f"{key}: this sample has no such map; its record lists plants and leaves with their masks")
 
     def _repr_png_(self) -> bytes:
-        """The photograph, as notebooks show it; the classes where there is none."""
+        """Return the image for display in notebooks, or the classes if there is none."""
         out = io.BytesIO()
         shown = self["image"] if "image" in self else self["semantics"] * 127
         Image.fromarray(shown).save(out, "PNG")
@@ -65,11 +65,11 @@ class Sample(Dict[str, Any]):
 
 
 def _read(file: Union[Path, IO[bytes]], kind: type[np.generic], name: object = None) -> np.ndarray[Any, Any]:
-    """A picture's values, in memory that may be written; `name` is what errors call the file."""
+    """Read an image into a writable array; errors refer to the file as `name`."""
     try:
         with Image.open(file) as picture:
             values = np.array(picture)
-    # What Pillow raises for files that are no pictures, or are cut short.
+    # Raised by Pillow for files that are not images or are truncated.
     except (OSError, SyntaxError, ValueError) as error:
         raise Error(f"{name or file}: {error}") from error
     if kind is np.int32 and values.ndim == 3:
@@ -80,26 +80,26 @@ def _read(file: Union[Path, IO[bytes]], kind: type[np.generic], name: object = N
 
 
 def _object(text: Union[str, bytes], name: object) -> Dict[str, Any]:
-    """What stands in JSON that holds an object."""
+    """Parse JSON that must be an object."""
     try:
         found = json.loads(text)
     except ValueError as error:
         raise Error(f"{name}: {error}") from error
     if not isinstance(found, dict):
-        raise Error(f"{name}: this is no JSON object")
+        raise Error(f"{name}: this is not a JSON object")
     return found
 
 
 def _json(path: Path) -> Dict[str, Any]:
-    """What stands in a JSON file that holds an object."""
+    """Read a JSON file that must contain an object."""
     try:
         return _object(path.read_text(encoding="utf-8"), path)
     except (OSError, UnicodeError) as error:
         raise Error(f"{path}: {error}") from error
 
 
-# Names of pictures in a sample and as files, with the types of their values.
-# Not the 16 bits of the files: PyTorch before 2.3 takes none without a sign.
+# Names of maps in a sample, their file names, and their value types.
+# 32 bits instead of the 16 bits of the files, because PyTorch before 2.3 does not support unsigned 16-bit integers.
 _MAPS = (
     ("image", "rgb", np.uint8),
     ("nir", "nir", np.uint8),
@@ -108,14 +108,14 @@ _MAPS = (
     ("leaves", "leaves", np.int32),
 )
 
-# Endings of the names of pictures: photographs may be either.
+# File name extensions of maps; images may have either.
 _ENDINGS = ("png", "jpg")
 
 
 def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = (), ending: str = "png") -> Sample:
-    """The pictures and labels of an image's folder; `left_out` are not read.
+    """Read the images and labels in the folder of an image, except the maps in `left_out`.
 
-    `photographs` ends the names of other photographs than `rgb` and `nir`, `ending` the names of their files.
+    `photographs` is a suffix of the names `rgb` and `nir`, such as "_denoised"; `ending` is their extension.
     """
     sample = Sample()
     for name, file, kind in _MAPS:
@@ -128,10 +128,10 @@ def _sample(folder: Path, photographs: str = "", left_out: Sequence[str] = (), e
 
 
 class Dataset:
-    """The images of a dataset, each read when it is asked for.
+    """The images of a dataset, each read on access.
 
-    `split` keeps those of "train", "val" or "test"; `transform` gets each `Sample` and its result is the item. PyTorch's own way to
-    make batches takes numbers and arrays of one shape, so for it leave the record out:
+    `split` selects "train", "val" or "test". `transform` is applied to each `Sample`, and its result is the item. PyTorch's
+    default collation accepts only numbers and arrays of the same shape, so omit the record for it:
     `transform=lambda sample: (sample["image"], sample["semantics"])`.
     """
 
@@ -146,10 +146,10 @@ class Dataset:
         try:
             self.recipe = _json(self.path / "dataset.json")
         except Error as error:
-            raise Error(f"{self.path} is no dataset: {error}") from error
+            raise Error(f"{self.path} is not a dataset: {error}") from error
         if split is not None and split not in SPLITS:
-            raise ValueError(f"split is one of {', '.join(SPLITS)}, not {split!r}")
-        # Of any so many fields in a row, the first are for training, then validation, then test.
+            raise ValueError(f"split must be one of {', '.join(SPLITS)}, not {split!r}")
+        # Fields repeat the pattern of the split: first those for training, then validation, then test.
         try:
             self._pattern = [name for name, share in zip(SPLITS, self.recipe["split"]) for _ in range(share)]
             self._captures = int(self.recipe["made"].get("rendered", {}).get("captures", 1))
@@ -157,7 +157,7 @@ class Dataset:
             self.indices = [k for k in every if split is None or self._split(k) == split]
             rendered = self.recipe["made"].get("rendered", {})
             self.labels_only = bool(rendered.get("labels_only"))
-            # Recipes of before do not say what images keep: near infrared is among it. Imported ones may have it, too, unless theirs says no.
+            # Older recipes lack `keep`; their images have near infrared. Imported images may have it unless `nir` is false.
             imported = self.recipe["made"].get("imported", {})
             no_nir = self.labels_only or "nir" not in rendered.get("keep", ["nir"]) or imported.get("nir") is False
             self._left_out = list(rendered.get("omit", []))
@@ -165,7 +165,7 @@ class Dataset:
             self._ending = "jpg" if str(rendered.get("photo", "png")).startswith("jpeg") else "png"
         except (AttributeError, KeyError, TypeError, ValueError, ZeroDivisionError) as error:
             raise Error(f"{self.path}/dataset.json is damaged: {error!r}") from error
-        # Of packs that were read from: where each file lies.
+        # Offset and size of each file, by pack, for packs that have been read.
         self._members: Dict[str, Dict[str, Tuple[int, int]]] = {}
 
     def __len__(self) -> int:
@@ -174,7 +174,7 @@ class Dataset:
     def __getitem__(self, item: SupportsIndex) -> Any:
         index = self.indices[operator.index(item)]
         folder = self.path / "images" / f"{index:06d}"
-        # A folder beside packs that is no whole image was put there.
+        # A folder next to packs without a record is not an image of the dataset.
         if self.recipe.get("pack") and not (folder / "record.json").is_file():
             sample = self._packed(index)
         else:
@@ -183,17 +183,17 @@ class Dataset:
         return sample if self.transform is None else self.transform(sample)
 
     def _split(self, index: int) -> str:
-        """The split of an image: all images of a field are in one."""
+        """Return the split of an image; all images of a field are in the same one."""
         return self._pattern[index // self._captures % len(self._pattern)]
 
     def _pack(self, index: int) -> str:
-        """The name of the pack of an image: packs hold so many images of a split, in order."""
+        """Return the name of the pack of an image. A pack holds a fixed number of images of one split, in order."""
         split, (rounds, place) = self._split(index), divmod(index // self._captures, len(self._pattern))
         rank = rounds * self._pattern.count(split) + place - self._pattern.index(split)
         return f"{split}-{rank // max(self.recipe['pack'] // self._captures, 1):06d}"
 
     def _packed(self, index: int) -> Sample:
-        """An image that lies in an archive with others."""
+        """Read an image from a pack."""
         pack = self._pack(index)
         if pack not in self._members:
             self._members[pack] = _json(self.path / "seals" / f"{pack}.json").get("members", {})
@@ -208,7 +208,7 @@ class Dataset:
         except OSError as error:
             raise Error(f"{archive}: {error}") from error
         if "record.json" not in files:
-            raise Error(f"{archive}: image {index:06d} is not there yet")
+            raise Error(f"{archive}: image {index:06d} does not exist yet")
         return _from_files(files, f"{archive}: {index:06d}", self._left_out)
 
     def __iter__(self) -> Iterator[Any]:
@@ -219,17 +219,17 @@ class Dataset:
 
 
 def program() -> str:
-    """The program `trace`: `$FURROW_TRACE`, then the one that came with this package, then the first on `$PATH`."""
+    """Return the path of `trace`: `$FURROW_TRACE`, else the program in this package, else the first on `$PATH`."""
     named = os.environ.get("FURROW_TRACE")
     own = (Path(__file__).parent.parent / "furrow.scripts/trace", Path(sysconfig.get_path("scripts")) / "trace")
     found = named or next((str(path) for path in own if path.is_file()), None) or shutil.which("trace")
     if not found:
-        raise Error("there is no program `trace`: install Furrow, or name the program in FURROW_TRACE")
+        raise Error("the program `trace` was not found: install Furrow, or set FURROW_TRACE to its path")
     return found
 
 
 def _flags(flags: Dict[str, Any]) -> Sequence[str]:
-    """`target_error=0.02, without=["mis"], denoise=True` as the program's command line writes it."""
+    """Convert keywords such as `target_error=0.02, without=["mis"], denoise=True` to command-line arguments."""
     words = []
     for name, value in flags.items():
         if value is None or value is False:
@@ -243,11 +243,11 @@ def _flags(flags: Dict[str, Any]) -> Sequence[str]:
 
 
 def render(scene: Union[str, "os.PathLike[str]"], index: int = 0, spp: Optional[int] = 16, **flags: Any) -> Sample:
-    """Field `index` of a scene file, rendered with `spp` samples a pixel.
+    """Render field `index` of a scene file with `spp` samples per pixel.
 
-    `scene` is a file, or the name of one that ships, such as "field". Further keywords are the program's flags with `_` for `-`:
-    `width=648`, `seed=3`, `crop=(0, 0, 200, 100)`, `denoise=True`; `target_error=0.05` or `time="30s"` want `spp=None`. With
-    `denoise=True` the photographs are those without noise. Raises `Error` with the program's own words.
+    `scene` is a file, or the name of a bundled one such as "field". Other keywords are the program's flags with `_` for `-`:
+    `width=648`, `seed=3`, `crop=(0, 0, 200, 100)`, `denoise=True`; `target_error=0.05` or `time="30s"` need `spp=None`. With
+    `denoise=True` the denoised images are returned. Raises `Error` with the program's error message.
     """
     with tempfile.TemporaryDirectory(prefix="furrow-") as folder:
         command = [program(), "--scene", os.fspath(scene), "--out", folder, "--quiet"]
@@ -266,12 +266,12 @@ def render(scene: Union[str, "os.PathLike[str]"], index: int = 0, spp: Optional[
 
 
 def _entries(archive: IO[bytes]) -> Iterator[Tuple[str, bytes]]:
-    """Names and contents of the files in a tar archive that is being written; ends where the archive does, or is cut."""
-    # Not `tarfile.open`, which keeps a list of all files: an archive may go on for days.
+    """Yield names and contents of the files in a tar stream, until it ends or is truncated."""
+    # Not `tarfile.open`, which keeps a list of all files: a stream may last for days.
     while header := archive.read(tarfile.BLOCKSIZE):
         try:
             entry = tarfile.TarInfo.frombuf(header, "utf-8", "strict")
-        except tarfile.HeaderError:  # Zeros at the end, or a part of a header.
+        except tarfile.HeaderError:  # Zeros at the end, or an incomplete header.
             return
         content = archive.read(entry.size)
         if len(content) < entry.size:
@@ -281,7 +281,7 @@ def _entries(archive: IO[bytes]) -> Iterator[Tuple[str, bytes]]:
 
 
 def _from_files(files: Dict[str, bytes], key: str, left_out: Sequence[str] = ()) -> Sample:
-    """A sample from the contents of its files, by their names; errors call it `key`, `left_out` are not read."""
+    """Create a sample from its files' contents by name, except the maps in `left_out`; errors refer to it as `key`."""
     sample = Sample()
     for of, file, kind in _MAPS:
         if of in left_out:
@@ -294,7 +294,7 @@ def _from_files(files: Dict[str, bytes], key: str, left_out: Sequence[str] = ())
 
 
 def _samples(archive: IO[bytes]) -> Iterator[Sample]:
-    """The samples of an archive; of each image, the record is the last file."""
+    """Yield the samples of a tar stream; the record is the last file of each image."""
     files: Dict[str, bytes] = {}
     for path, content in _entries(archive):
         key, name = path.split(".", 1)
@@ -312,19 +312,20 @@ def stream(
     shard: Optional[Tuple[int, int]] = None,
     **flags: Any,
 ) -> Generator[Sample, None, None]:
-    """Fields of a scene file from number `first` on, each rendered shortly before it is asked for; without `count` they never end.
+    """Yield the fields of a scene file from index `first` on, each rendered shortly before use; endless without `count`.
 
-    Image k is the one that a dataset of the same scene file, size and samples has, its record included. With several readers, `shard`
-    `(k, n)` gives each its own: reader k of n. Further keywords are the flags of `trace stream` with `_` for `-`: `width=324`, `seed=3`,
-    `denoise=True`, `threads=2`; with `labels_only=True` `spp` says nothing. The program runs until the generator is closed or dropped. Raises `Error` with the program's own words.
+    Image k, including its record, is the same as in a dataset with the same scene file, size and samples. With several readers,
+    `shard=(k, n)` selects the images of reader k of n. Other keywords are the flags of `trace stream` with `_` for `-`:
+    `width=324`, `seed=3`, `denoise=True`, `threads=2`; `labels_only=True` ignores `spp`. The program runs until the generator is
+    closed or deleted. Raises `Error` with the program's error message.
     """
-    # Only what becomes an array is encoded; of labels alone there are no samples, and nothing that they tell.
+    # Encode only the maps that become arrays. With labels only, neither bands nor samples per pixel apply.
     drawn = {} if flags.get("labels_only") else {"keep": "nir", "spp": spp}
     chosen: Dict[str, Any] = {**drawn, "first": first, "count": count, **flags}
     if shard is not None:
         chosen["shard"] = "/".join(map(str, shard))
     command = [program(), "stream", "--quiet", "--scene", os.fspath(scene), *_flags(chosen)]
-    # A file, which unlike a pipe takes any number of warnings.
+    # A file, because unlike a pipe it accepts any number of warnings without being read.
     with tempfile.TemporaryFile(prefix="furrow-") as said:
         try:
             process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said)
@@ -336,7 +337,7 @@ def stream(
                 yield from _samples(process.stdout)
                 failed = process.wait() != 0
             finally:
-                # Does nothing to a program that has ended.
+                # Has no effect if the program has already ended.
                 process.terminate()
         if failed:
             said.seek(0)

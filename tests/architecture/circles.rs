@@ -1,23 +1,25 @@
-//! Import circles between the files of one module.
+//! Circular imports between the files of one module.
 //!
-//! A file needs another one where it imports from it, or names it in a path. Re-exports are followed to the file that defines an item, so
-//! `use super::Camera` means `camera.rs` where `mod.rs` hands on what that file defines. Declaring a child (`mod leaf;`) and handing on what
-//! it has (`pub use leaf::Leaf;`) is no need; what the code of a `mod.rs` makes use of is one, and so is an item that a child takes from the
-//! `mod.rs` that defines it. So a `mod.rs` either holds data that its children use, or calls its children: not both.
+//! A file needs another one if it imports from it or names it in a path. Re-exports are followed to the file that
+//! defines an item, so `use super::Camera` means `camera.rs` if `mod.rs` re-exports the item from there.
 //!
-//! Tests inside the sources and the programs are free. Names in texts (`#[serde(with = "…")]`) and methods that another file adds to a type
-//! are not seen.
+//! Declaring a child (`mod leaf;`) and re-exporting its items (`pub use leaf::Leaf;`) does not count. Items that the
+//! code of a `mod.rs` uses do count, and so does an item that a child takes from the `mod.rs` that defines it. A
+//! `mod.rs` therefore either holds data for its children or calls its children, not both.
+//!
+//! Unit tests inside the sources and the programs are exempt. Names in strings (`#[serde(with = "…")]`) and methods
+//! that another file adds to a type are not detected.
 
 use super::{Source, is_name};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A path as a source writes it: its names, and the name under which it is known from then on.
+/// A path as written in a source: its names, and the name that the file uses for the item.
 struct Named {
     path: Vec<String>,
     name: String,
 }
 
-/// The paths of a `use` statement's tree: `a::{b, c::d as e}` is `a::b` and `a::c::d`, known as `e`.
+/// Collects the paths of a `use` tree: `a::{b, c::d as e}` gives `a::b` and `a::c::d`, the latter named `e`.
 fn leaves(tree: &str, before: &[String], out: &mut Vec<Named>) {
     let tree = tree.trim();
     if let Some(open) = tree.find('{') {
@@ -49,7 +51,7 @@ fn leaves(tree: &str, before: &[String], out: &mut Vec<Named>) {
     }
 }
 
-/// Code in which `super::` of a module inside the file, which means the file itself, is written `self::`.
+/// Rewrites `super::` to `self::` inside inline modules, where it means the file itself.
 fn level(code: &str) -> String {
     let mut out = String::new();
     let mut rest = code;
@@ -73,7 +75,7 @@ fn level(code: &str) -> String {
     out + rest
 }
 
-/// What a file says of others: its imports (those that it hands on first), and the paths in its code.
+/// References of a file to others: its imports (re-exports listed separately) and the paths in its code.
 #[derive(Default)]
 struct Says {
     hands_on: Vec<Named>,
@@ -85,7 +87,7 @@ struct Says {
 
 impl Says {
     fn of(code: &str) -> Self {
-        // `pub(in crate::plant)` says who may look, not what is needed.
+        // `pub(in crate::plant)` is a visibility, not a dependency.
         let code = &level(&code.replace("(in crate::", "(in "));
         let mut says = Self::default();
         let (rest, mut code) = (code, String::new());
@@ -106,7 +108,7 @@ impl Says {
             from = end;
         }
         code.push_str(&rest[from..]);
-        // `mod leaf;` says that there is a file, not that the code makes use of `leaf`.
+        // `mod leaf;` declares a file; it does not use it.
         let declared = |line: &&str| line.trim_end().ends_with(';') && line.split(' ').rev().nth(1) == Some("mod");
         let code: String = code.lines().filter(|line| !declared(line)).flat_map(|line| [line, "\n"]).collect();
         let mut chars = code.as_str();
@@ -131,7 +133,7 @@ impl Says {
     }
 }
 
-/// The files of the library by module path, and what each says of the others.
+/// The files of the library by module path, with the references of each.
 struct Files<'a> {
     sources: BTreeMap<Vec<&'a str>, (&'a Source, Says)>,
 }
@@ -146,7 +148,7 @@ impl<'a> Files<'a> {
         self.sources.contains_key(&path.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// A path that `own` writes, from the crate's root; `None` for what is none of ours.
+    /// Resolves a path written in the module `own` to a path from the crate's root; `None` for foreign paths.
     fn absolute(&self, own: &[&str], path: &[String], followed: usize) -> Option<Vec<String>> {
         let owned = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
         let first = path.first()?.as_str();
@@ -172,7 +174,7 @@ impl<'a> Files<'a> {
         Some(base.into_iter().chain(path[1..].iter().cloned()).collect())
     }
 
-    /// The file that defines what a path from the root names: through re-exports to where it is.
+    /// Returns the file that defines the item a path from the root names, following re-exports.
     fn defines(&self, path: &[String], followed: usize) -> Option<Vec<&'a str>> {
         let len = (1..=path.len()).rev().find(|n| self.is_file(&path[..*n]))?;
         let names: Vec<&str> = path[..len].iter().map(String::as_str).collect();
@@ -193,18 +195,18 @@ impl<'a> Files<'a> {
         Some(module.clone())
     }
 
-    /// Which files of its own module each file needs.
+    /// Returns the files of its own module that each file needs.
     fn needs(&self) -> BTreeMap<&'a str, BTreeSet<&'a str>> {
         let mut needs = BTreeMap::new();
         for (own, (source, says)) in &self.sources {
             let mut of: BTreeSet<&str> = BTreeSet::new();
             let imports = says.imports.iter().map(|i| &i.path);
-            // What is handed on is only named, unless the code makes use of it.
+            // A re-export counts only if the file's own code uses the name.
             let used = says.hands_on.iter().filter(|i| says.words.contains(&i.name)).map(|i| &i.path);
             for (path, is_import) in imports.chain(used).map(|p| (p, true)).chain(says.paths.iter().map(|p| (p, false)))
             {
                 let Some(path) = self.absolute(own, path, 3) else { continue };
-                // A folder imported as a name says nothing yet; what is taken out of it does.
+                // Importing a folder's name is not a dependency; the items taken from it are.
                 let folder = self.is_file(&path) && self.is_folder(&path);
                 if path.first().map(String::as_str) != Some(source.module()) || folder && is_import {
                     continue;
@@ -225,7 +227,7 @@ impl<'a> Files<'a> {
     }
 }
 
-/// Files of one module that need each other, each group once: what a file reaches that reaches it.
+/// Returns the groups of files in one module that need each other; each group is listed once.
 pub(super) fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
     let files = Files::new(sources);
     let needs = files.needs();
@@ -254,4 +256,46 @@ pub(super) fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
         groups.push(group);
     }
     groups
+}
+
+/// Returns the groups of folders and files in one folder that need each other, as `folder: child child`.
+///
+/// A child folder needs another child if any file below it needs a file below the other. A folder's own `mod.rs` is no child: it names
+/// its children.
+pub(super) fn folder_circles(sources: &[Source]) -> Vec<String> {
+    let files = Files::new(sources);
+    let mut graphs: BTreeMap<String, BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
+    for (file, targets) in files.needs() {
+        for target in targets {
+            let (from, to): (Vec<&str>, Vec<&str>) = (file.split('/').collect(), target.split('/').collect());
+            let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+            let (Some(a), Some(b)) = (from.get(shared), to.get(shared)) else { continue };
+            if *a != "mod.rs" && *b != "mod.rs" {
+                graphs.entry(from[..shared].join("/")).or_default().entry(a).or_default().insert(b);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for (folder, graph) in graphs {
+        let reach = |from| {
+            let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+            while let Some(at) = open.pop() {
+                open.extend(graph.get(at).into_iter().flatten().copied().filter(|next| seen.insert(*next)));
+            }
+            seen
+        };
+        let reached: BTreeMap<&str, BTreeSet<&str>> = graph.keys().map(|child| (*child, reach(child))).collect();
+        let mut done = BTreeSet::new();
+        for (child, below) in &reached {
+            let group: Vec<&str> = below
+                .iter()
+                .copied()
+                .filter(|other| reached.get(other).is_some_and(|back| back.contains(child)))
+                .collect();
+            if below.contains(child) && group.iter().all(|other| done.insert(*other)) {
+                found.push(format!("{folder}: {}", group.join(" ")));
+            }
+        }
+    }
+    found
 }

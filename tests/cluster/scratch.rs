@@ -1,7 +1,8 @@
-//! Shards that work on a node's own disk.
+//! Shards that work on a node's local disk.
 //!
-//! Rationale: `--scratch` is for folders over a network, so nothing but what is finished may come there, and nothing of it may be lost or
-//! made twice. Expected: bytes of one run on one machine, whatever becomes of nodes; each image drawn once. Source: none, equality is exact.
+//! Rationale: `--scratch` is for dataset folders on a network file system; only finished files may be written there,
+//! and no image may be lost or rendered twice. Expected: the bytes of one run on one machine, whatever happens to the
+//! nodes; each image rendered once. Source: none, equality is exact.
 
 use super::{PACKS, end, files, plan, plan_with, send, task, until, whole, whole_with};
 use crate::common::dataset::{fail, made, path, same, succeed, tree, verb};
@@ -11,12 +12,12 @@ use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-/// Job files for two shards that work below `$NODE_DISK`.
+/// Writes job files for two shards that work below `$NODE_DISK`.
 fn emit(folder: &Path, engine: &str, more: &[&str]) -> std::path::PathBuf {
     super::emit(folder, engine, 2, &[&["--scratch", "$NODE_DISK/it's furrow"][..], more].concat())
 }
 
-/// Fails where an image was drawn twice.
+/// Panics if an image was rendered twice.
 fn drawn_once(folder: &Path, count: u64) {
     let made = made(folder);
     let different: BTreeSet<u64> = made.iter().copied().collect();
@@ -30,8 +31,8 @@ fn start(folder: &Path, disk: &Path, more: &[&str]) -> Child {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
-/// A shard is out of time within its first pack and goes on on another node. Expected: what there was of the pack came to the shared folder;
-/// nothing is left on the nodes.
+/// A shard reaches its time limit during its first pack and resumes on another node. Expected: the pack's finished part
+/// is in the shared folder, and nothing is left on the nodes.
 #[test]
 fn a_shard_goes_on_on_another_node() {
     const COUNT: u64 = 16;
@@ -51,7 +52,7 @@ fn a_shard_goes_on_on_another_node() {
     assert_eq!(end(&mut child).code(), Some(75));
     let so_far = made(&folder).len();
     assert!(so_far < COUNT as usize / 2, "{so_far}");
-    // The node is gone, with all that is on its disk.
+    // The node is lost, with its disk.
     std::fs::remove_dir_all(disk("node 1")).unwrap();
     for number in [0, 1] {
         assert_eq!(shard(number, "node 2").status().unwrap().code(), Some(0));
@@ -68,8 +69,9 @@ fn a_shard_goes_on_on_another_node() {
     same(&files(&folder), &whole_with(COUNT, &PACKS));
 }
 
-/// A run is killed and started again in the same folder, with a push and formats. Expected: the same bytes at home and where it pushes; a unit
-/// is pushed once, but for the one that the kill may have hit; an image is drawn once, but for the one under way.
+/// A run is killed and started again in the same folder, with a push command and formats. Expected: the same bytes in
+/// the dataset's folder and at the push target; each work unit is pushed once, except possibly the one during the kill;
+/// each image is rendered once, except the one in progress.
 #[test]
 fn a_killed_run_goes_on_and_pushes_what_came_home() {
     const COUNT: u64 = 12;
@@ -83,18 +85,18 @@ fn a_killed_run_goes_on_and_pushes_what_came_home() {
     until("at home", || super::sealed(&folder) > 1);
     child.kill().unwrap();
     end(&mut child);
-    assert!(super::sealed(&folder) < 6, "all was done before it was killed");
+    assert!(super::sealed(&folder) < 6, "all images were finished before the kill");
     assert_eq!(end(&mut start(&folder, &disk, &["--push", &push])).code(), Some(0));
     let drawn = made(&folder);
     assert_eq!(drawn.iter().copied().collect::<BTreeSet<u64>>(), (0..6).map(|k| 2 * k).collect());
     assert_eq!(drawn.len(), 6, "{drawn:?}");
     assert_eq!(names(&disk), Vec::<String>::new());
-    // All at home: nothing is drawn or pushed.
+    // All files are in the dataset's folder: nothing is rendered or pushed.
     let before = (tree(&folder), std::fs::read_to_string(&log).unwrap());
     assert_eq!(end(&mut start(&folder, &disk, &["--push", &push])).code(), Some(0));
     assert!(before == (tree(&folder), std::fs::read_to_string(&log).unwrap()));
     assert!((7..=8).contains(&before.1.lines().count()), "{}", before.1);
-    // An image of which a byte was changed at home is made again.
+    // An image with a changed byte in the dataset's folder is rendered again.
     let photograph = folder.join("images/000004/rgb.png");
     let bytes = std::fs::read(&photograph).unwrap();
     std::fs::remove_file(&photograph).unwrap();
@@ -109,18 +111,18 @@ fn a_killed_run_goes_on_and_pushes_what_came_home() {
     same(&files(&elsewhere), &expected);
 }
 
-/// Starts shard 0 of 2 in `disk` and keeps what it says.
+/// Starts shard 0 of 2 in `disk` and captures its standard error.
 fn start_heard(folder: &Path, disk: &Path) -> Child {
     let order = ["--shard", "0/2", "--at-once", "1", "--quiet", "--scratch", path(disk)];
     let mut command = verb("render", folder, &order);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until a program says a line, and returns it.
+/// Waits until a program prints a line, and returns it.
 fn line(child: &mut Child) -> String {
     let mut said = Vec::new();
     let words = child.stderr.as_mut().unwrap();
-    // Byte by byte: nothing of what follows is taken.
+    // Byte by byte, so that nothing after the line is consumed.
     let mut byte = [0];
     while words.read_exact(&mut byte).is_ok() && byte != *b"\n" {
         said.push(byte[0]);
@@ -128,7 +130,7 @@ fn line(child: &mut Child) -> String {
     String::from_utf8(said).unwrap()
 }
 
-/// The code that a program ends with, and what it says until then.
+/// Waits for a program to end; returns its exit code and the rest of its standard error.
 fn ended(mut child: Child) -> (Option<i32>, String) {
     let status = end(&mut child);
     let mut said = String::new();
@@ -136,10 +138,12 @@ fn ended(mut child: Child) -> (Option<i32>, String) {
     (status.code(), said)
 }
 
-/// Three runs of one shard in one place; the first is stopped, then a third that waits, and the second goes on.
+/// Three runs of one shard in the same folder: first the third, which waits, is stopped, then the first, which works,
+/// and the second continues.
 ///
-/// Rationale: a scheduler may start a job twice. Expected: one works at a time, so nothing is drawn twice; who is stopped is told the dataset's
-/// folder and the command that goes on, and nothing of the copy; in the end nothing is left on the disk. Source: none, equality is exact.
+/// Rationale: a scheduler may start a job twice. Expected: only one run works at a time, so no image is rendered twice.
+/// A stopped run prints the dataset's folder and the command that resumes it, and does not mention the local copy. At
+/// the end nothing is left on the disk. Source: none, equality is exact.
 #[test]
 fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
     const COUNT: u64 = 24;
@@ -154,7 +158,7 @@ fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
         assert!(said.starts_with("warning: another run of shard 0/2 works in ") && said.contains("waits"), "{said}");
     }
     let command = format!("`trace dataset render {} --shard 0/2 --scratch {}`", path(&folder), path(&disk));
-    // The one that waits ends before the one at work is stopped: it might else get its turn before it hears of its own signal.
+    // The waiting run is stopped first; otherwise it might start working before it handles its own signal.
     for (signal, child, words) in
         [("TERM", third, "while another run of shard 0/2 was at work"), ("USR1", first, "of 12 images are there")]
     {
@@ -173,7 +177,7 @@ fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
     same(&files(&folder), &whole(COUNT));
 }
 
-/// Expected: a format that is added later is made of the images that are at home, without drawing them again.
+/// Expected: a format added later is made from the images in the dataset's folder, without rendering them again.
 #[test]
 fn formats_that_are_added_are_made_of_what_is_at_home() {
     let (keep, folder) = scratch();
@@ -184,11 +188,13 @@ fn formats_that_are_added_are_made_of_what_is_at_home() {
     succeed(verb("render", &folder, &["--quiet", "--scratch", path(&disk)]));
     succeed(verb("finish", &folder, &["--quiet"]));
     same(&files(&folder), &whole_with(4, &["--format", "imagefolder"]));
-    let drawn = furrow::dataset::timing_log::rows(&folder).unwrap().into_iter().filter(|row| row.draw_s > 0.0).count();
+    let drawn =
+        furrow_dataset::make::timing_log::rows(&folder).unwrap().into_iter().filter(|row| row.draw_s > 0.0).count();
     assert_eq!(drawn, 4);
 }
 
-/// Expected: GNU parallel's script (or that of xargs) takes the folder of each machine; without it, and for Kubernetes, it is refused.
+/// Expected: the script for GNU parallel (or xargs) uses each machine's local folder; an invalid folder and Kubernetes
+/// are refused.
 #[test]
 fn scripts_name_the_nodes_own_folder() {
     let (keep, folder) = scratch();

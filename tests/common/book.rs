@@ -1,10 +1,10 @@
-//! The documentation as its readers and the tests see it: pages, code blocks, commands.
+//! The documentation pages, their code blocks and their commands, parsed for the tests.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The pages whose blocks are run one after another.
+/// Pages whose code blocks the tests run one after another.
 pub const RUN: [&str; 6] = [
     "guide/first-picture.md",
     "guide/your-own-field.md",
@@ -14,17 +14,17 @@ pub const RUN: [&str; 6] = [
     "guide/datasets.md",
 ];
 
-/// The repository.
+/// Root directory of the repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The text of a file, by its path in the repository.
+/// Reads a text file, given its path in the repository.
 pub fn read(path: &str) -> String {
     std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// All pages of the book, by their paths in the repository, in order; `SUMMARY.md` is none of them.
+/// Paths in the repository of all pages of the book except `SUMMARY.md`, sorted.
 pub fn pages() -> Vec<String> {
     let mut found = BTreeSet::new();
     collect(&root().join("docs"), &mut found);
@@ -46,15 +46,15 @@ fn collect(folder: &Path, found: &mut BTreeSet<PathBuf>) {
 /// A fenced code block.
 #[derive(Debug)]
 pub struct Block {
-    /// Its language: `sh`, `ron`, `text` …
+    /// Language of the block: `sh`, `ron`, `text` …
     pub language: String,
-    /// What stands behind the language.
+    /// Rest of the info string after the language.
     pub note: String,
-    /// Its text.
+    /// Content of the block.
     pub text: String,
 }
 
-/// The fenced code blocks of a page, in order.
+/// Returns the fenced code blocks of a page, in order.
 pub fn blocks(text: &str) -> Vec<Block> {
     let mut all: Vec<Block> = Vec::new();
     let mut within = false;
@@ -74,7 +74,7 @@ pub fn blocks(text: &str) -> Vec<Block> {
     all
 }
 
-/// The page without its code blocks, which leave an empty line.
+/// Returns the page without its code blocks; each of their lines becomes an empty line.
 pub fn prose(text: &str) -> String {
     let mut within = false;
     let mut kept = String::new();
@@ -87,18 +87,18 @@ pub fn prose(text: &str) -> String {
     kept
 }
 
-/// What stands in backticks in a page's prose.
+/// Returns the inline code spans (text in backticks) of a page's prose.
 pub fn quoted(text: &str) -> Vec<String> {
     let prose = prose(text);
     prose.lines().flat_map(|line| line.split('`').skip(1).step_by(2)).map(str::to_owned).collect()
 }
 
-/// Targets of the links and pictures of a page, without those that stand in backticks.
+/// Returns the targets of a page's links and images, except those inside inline code.
 pub fn links(text: &str) -> Vec<String> {
     let mut all = Vec::new();
     let plain: Vec<String> =
         prose(text).lines().map(|line| line.split('`').step_by(2).collect::<Vec<_>>().join("·")).collect();
-    // A link's words may go over a line's end.
+    // The text of a link may continue on the next line.
     let mut rest = plain.join("\n");
     while let Some(at) = rest.find("](") {
         rest.drain(..at + 2);
@@ -108,7 +108,7 @@ pub fn links(text: &str) -> Vec<String> {
     all
 }
 
-/// Anchors of a page's headings, as GitHub and mdBook make them.
+/// Returns the anchors of a page's headings, as GitHub and mdBook generate them.
 pub fn anchors(text: &str) -> Vec<String> {
     let heading = |line: &str| {
         let words = line.trim_start_matches('#').trim().to_lowercase();
@@ -118,19 +118,19 @@ pub fn anchors(text: &str) -> Vec<String> {
     prose(text).lines().filter(|line| line.starts_with('#')).map(heading).collect()
 }
 
-/// The commands of a `sh` block: lines that end in `\` go on in the next.
+/// Returns the commands of a `sh` block. A line that ends in `\` continues on the next line.
 pub fn commands(block: &Block) -> Vec<String> {
     let joined = block.text.replace("\\\n", " ");
     joined.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect()
 }
 
-/// The program that a command begins with, where it is one of ours.
+/// Returns the name of the program a command runs, if it is `trace` or `train`.
 pub fn program(command: &str) -> Option<&'static str> {
     let first = command.split_whitespace().next().unwrap_or_default();
     ["trace", "train"].into_iter().find(|name| first == *name || first == format!("target/release/{name}"))
 }
 
-/// Runs a line of shell in a folder, with our programs on the path.
+/// Runs a shell command line in a folder, with the built programs on `PATH`.
 pub fn shell(line: &str, folder: &Path) -> Output {
     let programs = Path::new(env!("CARGO_BIN_EXE_trace")).parent().expect("a folder");
     let path = std::env::var_os("PATH").unwrap_or_default();

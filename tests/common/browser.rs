@@ -1,12 +1,12 @@
-//! A browser that tests look at pages with.
+//! A headless browser for tests of HTML pages.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Chromium by the names that systems have for it.
+/// Finds Chromium by the executable names in use on different systems.
 ///
-/// `None`, and a word about it, where there is none; with `FURROW_REQUIRE_PEERS=1` that is a failure instead.
+/// Prints a note and returns `None` if none is installed; with `FURROW_REQUIRE_PEERS=1` it panics instead.
 pub fn browser() -> Option<PathBuf> {
     let works = |name: &&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
     let found = ["chromium", "chromium-browser", "google-chrome"].into_iter().find(works).map(PathBuf::from);
@@ -18,8 +18,9 @@ pub fn browser() -> Option<PathBuf> {
     found
 }
 
-/// What a script inside a page has left in `document.body.dataset.probe` as JSON, in a window of this width. `folder` is for the browser's
-/// own files. The page must not have made the browser complain.
+/// Opens `page` in a window of the given width and returns the JSON that a script in the page stored in
+/// `document.body.dataset.probe`. `folder` holds the browser's profile. Panics if the browser's console reports
+/// anything.
 pub fn probe(browser: &Path, folder: &Path, page: &Path, width: i64) -> Value {
     let profile = folder.join(format!("profile-{width}"));
     let output = Command::new(browser)

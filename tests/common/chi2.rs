@@ -1,28 +1,31 @@
-//! Pearson's χ² test: do samples follow the density that is stated for them?
+//! Pearson's χ² test of whether samples follow the density stated for them.
 //!
-//! Samples are counted in cells and compared with the integral of the density over each cell; cells that expect fewer than five
-//! are pooled. The cells follow the samples: rings about their mean direction, cut at quantiles of a first draw, so that the
-//! sun's disc is resolved as well as a whole sphere. Densities are integrated by the midpoint rule, each cell split in four until
-//! that changes nothing, so they may be narrow or jump. Seeds are fixed: a test passes or fails for ever.
+//! Samples are counted in cells and compared with the integral of the density over each cell; cells with an expected
+//! count below five are pooled. The cells adapt to the samples: rings about their mean direction, split at quantiles of
+//! a pilot run, so that the sun's disc is resolved as well as a whole sphere.
 //!
-//! Method: conventions of pbrt, Mitsuba and nori; one false alarm in 10⁴ for all tests of the project together (Šidák 1967), so that
-//! drawing other numbers, as every change of a sampler does, seldom fails without a fault.
+//! Densities are integrated by the midpoint rule; each cell is split in four until the value no longer changes, so
+//! densities may be narrow or discontinuous. Seeds are fixed, so a test always passes or always fails.
+//!
+//! Method: conventions of pbrt, Mitsuba and nori. All tests of the project together have a false-alarm rate of 10⁻⁴
+//! (Šidák 1967), so a change to a sampler, which changes every random number, rarely fails without a fault.
 
-use furrow::math::{Frame, Vec3};
-use furrow::sampling::{Purpose, Stream};
+use furrow_base::math::{Frame, Vec3};
+use furrow_base::sampling::{Purpose, Stream};
 use std::f64::consts::{PI, TAU};
 
-/// Tests of the whole project that share the significance level, an upper bound.
+/// Upper bound on the number of tests in the project that share the significance level.
 const TESTS: f64 = 1000.0;
-/// Probability that a correct project fails.
+/// Probability that a correct project fails any of these tests.
 const ALPHA: f64 = 1e-4;
 const SEEDS: [u64; 3] = [1, 2, 3];
 const RINGS: usize = 16;
 const SECTORS: usize = 16;
 const PILOT: usize = 4096;
 
-/// Checks `n` directions drawn by `sample` from three numbers in [0, 1) against `pdf` per solid angle, for several seeds.
-/// A `None` is an outcome of its own whose probability is what `pdf` leaves of one. Panics with the worst cells.
+/// Compares `n` directions, which `sample` maps from three numbers in [0, 1), with the density `pdf` per solid angle,
+/// for several seeds. `None` (no direction) counts as a separate outcome with probability 1 − ∫ pdf. Panics with the
+/// worst cells.
 pub(crate) fn check_sphere(
     name: &str,
     n: usize,
@@ -33,13 +36,13 @@ pub(crate) fn check_sphere(
         let u = [stream.uniform32(), stream.uniform32(), stream.uniform32()];
         let dir = sample(u);
         if let Some(dir) = dir {
-            assert!((dir.length() - 1.0).abs() < 1e-4, "{name}: {dir} of {u:?} is no unit vector");
+            assert!((dir.length() - 1.0).abs() < 1e-4, "{name}: {dir} of {u:?} is not a unit vector");
         }
         dir
     };
     let mut stream = Stream::of(99, 0, Purpose::Test, 0);
     let pilot: Vec<Vec3> = (0..PILOT).filter_map(|_| draw(&mut stream)).collect();
-    assert!(!pilot.is_empty(), "{name}: nothing was drawn");
+    assert!(!pilot.is_empty(), "{name}: no sample has a direction");
     let frame = Frame::about(pilot.iter().sum::<Vec3>().try_normalize().unwrap_or(Vec3::Z));
     let rings = Rings::of(&pilot, &frame);
 
@@ -76,14 +79,14 @@ pub(crate) fn check_sphere(
         }
         let absorbed = (1.0 - total).max(0.0);
         if observed[probability.len()] == 0.0 {
-            assert!(absorbed < 0.003, "{name}: the density integrates to {total}, but every draw succeeds");
+            assert!(absorbed < 0.003, "{name}: the density integrates to {total}, but every sample has a direction");
         }
         let expected: Vec<f64> = probability.iter().map(|p| p * n as f64).chain([absorbed * n as f64]).collect();
         check_counts(&format!("{name}, seed {seed}"), &observed, &expected);
     }
 }
 
-/// Checks `n` points drawn by `sample` in the square `lo..hi` against `pdf` per area.
+/// Compares `n` points, which `sample` places in the square `lo..hi`, with the density `pdf` per area.
 pub(crate) fn check_square(
     name: &str,
     n: usize,
@@ -106,7 +109,7 @@ pub(crate) fn check_square(
             let p = sample([stream.uniform32(), stream.uniform32()]);
             let [x, y] = p.map(|v| {
                 let cell = (f64::from(v) - lo) / (hi - lo) * SIDE as f64;
-                assert!((0.0..=SIDE as f64).contains(&cell), "{name}: {p:?} lies outside");
+                assert!((0.0..=SIDE as f64).contains(&cell), "{name}: {p:?} is outside the square");
                 (cell as usize).min(SIDE - 1)
             });
             observed[y * SIDE + x] += 1.0;
@@ -116,7 +119,7 @@ pub(crate) fn check_square(
     }
 }
 
-/// Checks counts against expectations that have the same sum.
+/// Compares observed counts with expected counts that have the same sum.
 pub(crate) fn check_counts(name: &str, observed: &[f64], expected: &[f64]) {
     let mut cells = Vec::new();
     let mut pool = (0.0, 0.0);
@@ -128,11 +131,11 @@ pub(crate) fn check_counts(name: &str, observed: &[f64], expected: &[f64]) {
         }
     }
     match cells.iter_mut().min_by(|a, b| a.1.total_cmp(&b.1)) {
-        // A pool that is itself too small joins the smallest cell.
+        // A pool with an expected count below five joins the smallest cell.
         Some(least) if pool.1 < 5.0 => *least = (least.0 + pool.0, least.1 + pool.1),
         _ => cells.push(pool),
     }
-    assert!(cells.len() > 1, "{name}: one cell tests nothing");
+    assert!(cells.len() > 1, "{name}: a single cell tests nothing");
     let statistic: f64 = cells.iter().map(|(o, e)| (o - e).powi(2) / e).sum();
     let p = upper_gamma((cells.len() - 1) as f64 / 2.0, statistic / 2.0);
     let threshold = 1.0 - (1.0 - ALPHA).powf(1.0 / TESTS);
@@ -157,7 +160,7 @@ impl Rings {
         t.sort_by(f64::total_cmp);
         let mut ends = vec![0.0];
         ends.extend((1..RINGS).map(|k| t[k * t.len() / RINGS]));
-        // Wider and wider rings beyond the farthest, the first to catch the edge of what was just missed.
+        // Rings of growing width beyond the farthest pilot sample; the first catches samples just outside.
         let mut end = t[t.len() - 1] * 1.05;
         while end < 2.0 {
             ends.push(end);
@@ -176,7 +179,7 @@ impl Rings {
     }
 }
 
-/// 1 − cos θ and φ, with digits left where θ is small.
+/// Returns 1 − cos θ and φ, without cancellation for small θ.
 fn polar(dir: Vec3, frame: &Frame) -> (f64, f64) {
     let along = |axis: Vec3| (0..3).map(|i| f64::from(axis[i]) * f64::from(dir[i])).sum::<f64>();
     let (x, y, z) = (along(frame.x), along(frame.y), along(frame.z));
@@ -184,7 +187,7 @@ fn polar(dir: Vec3, frame: &Frame) -> (f64, f64) {
     (2.0 * half.sin().powi(2), y.atan2(x))
 }
 
-/// ∫∫ f over a rectangle.
+/// Integrates `f` over a rectangle.
 fn integrate(f: &impl Fn(f64, f64) -> f64, x: [f64; 2], y: [f64; 2]) -> f64 {
     fn midpoint(f: &impl Fn(f64, f64) -> f64, x: [f64; 2], y: [f64; 2]) -> f64 {
         const SIDE: usize = 4;
@@ -200,7 +203,7 @@ fn integrate(f: &impl Fn(f64, f64) -> f64, x: [f64; 2], y: [f64; 2]) -> f64 {
             [([x[0], mx], [y[0], my]), ([mx, x[1]], [y[0], my]), ([x[0], mx], [my, y[1]]), ([mx, x[1]], [my, y[1]])];
         let fine = parts.map(|(x, y)| midpoint(f, x, y));
         let sum: f64 = fine.iter().sum();
-        // At least two levels, for what falls between the points of one.
+        // Refines at least twice, so that features between the points of one level are found.
         if depth >= 2 && ((sum - coarse).abs() < 1e-6 + 1e-4 * sum.abs() || depth >= 8) {
             return sum;
         }
@@ -209,8 +212,8 @@ fn integrate(f: &impl Fn(f64, f64) -> f64, x: [f64; 2], y: [f64; 2]) -> f64 {
     refine(f, x, y, midpoint(f, x, y), 0)
 }
 
-/// Regularised upper incomplete gamma function Q(a, x): the probability that a χ² with 2a degrees of freedom exceeds 2x.
-/// By the series for x < a + 1 and Lentz's continued fraction above. Source: DLMF §8.7.1, §8.9.2.
+/// Regularised upper incomplete gamma function Q(a, x): the probability that a χ² variable with 2a degrees of freedom
+/// exceeds 2x. Uses the series for x < a + 1 and Lentz's continued fraction otherwise. Source: DLMF §8.7.1, §8.9.2.
 pub(crate) fn upper_gamma(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;

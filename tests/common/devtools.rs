@@ -1,4 +1,4 @@
-//! A browser that a test drives: Chromium's DevTools protocol over its pipe, messages of JSON that end in a zero byte.
+//! A browser that a test controls over a pipe with Chromium's DevTools protocol: JSON messages that end in a zero byte.
 
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
@@ -7,19 +7,19 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A page in a browser of its own.
+/// A page in its own browser process.
 pub struct Page {
     browser: Child,
     send: File,
     receive: BufReader<File>,
     session: Option<String>,
     last: u64,
-    /// What the page complained about.
+    /// Console messages and exceptions reported by the page.
     pub complaints: Vec<Value>,
 }
 
 impl Page {
-    /// Opens an address. `folder` is for the browser's own files.
+    /// Opens an address. `folder` holds the browser's profile and pipes.
     pub fn open(browser: &Path, folder: &Path, address: &str) -> Self {
         let pipes = ["in", "out"].map(|name| folder.join(name));
         for pipe in &pipes {
@@ -48,7 +48,7 @@ impl Page {
         page
     }
 
-    /// Calls a method and returns its result; what comes in between is kept where it is a complaint.
+    /// Calls a method and returns its result. Messages that arrive meanwhile are kept if they are complaints.
     pub fn call(&mut self, method: &str, parameters: &Value) -> Value {
         self.last += 1;
         let mut message = json!({ "id": self.last, "method": method, "params": parameters });
@@ -58,7 +58,7 @@ impl Page {
         self.send.write_all(format!("{message}\0").as_bytes()).unwrap();
         loop {
             let mut bytes = Vec::new();
-            assert!(self.receive.read_until(0, &mut bytes).unwrap() > 0, "the browser is gone");
+            assert!(self.receive.read_until(0, &mut bytes).unwrap() > 0, "the browser has closed the pipe");
             bytes.pop();
             let mut message: Value = serde_json::from_slice(&bytes).unwrap();
             if message["id"] == self.last {
@@ -73,7 +73,7 @@ impl Page {
         }
     }
 
-    /// The value of an expression in the page.
+    /// Evaluates an expression in the page and returns its value.
     pub fn ask(&mut self, expression: &str) -> Value {
         let parameters = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let answer = self.call("Runtime.evaluate", &parameters);
@@ -81,7 +81,7 @@ impl Page {
         answer["result"]["value"].clone()
     }
 
-    /// Waits until an expression in the page is true.
+    /// Waits until an expression in the page is true; panics after 120 seconds.
     pub fn wait(&mut self, expression: &str) {
         let begin = Instant::now();
         while self.ask(&format!("Boolean({expression})")) != true {
@@ -91,13 +91,13 @@ impl Page {
         }
     }
 
-    /// Gives the page a window of this size.
+    /// Sets the size of the page's window.
     pub fn resize(&mut self, width: u32, height: u32) {
         let size = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", &size);
     }
 
-    /// A picture of the window, PNG.
+    /// Takes a screenshot of the window, encoded as PNG.
     pub fn screenshot(&mut self) -> Vec<u8> {
         use base64::Engine;
         let answer = self.call("Page.captureScreenshot", &json!({ "format": "png" }));

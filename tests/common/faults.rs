@@ -1,4 +1,4 @@
-//! A file system that fails at a chosen change: `tests/faults/fail.c`, preloaded into the program.
+//! A file system that fails at a chosen operation: `tests/faults/fail.c`, preloaded into the program.
 
 use super::dataset::{path, same, succeed, tree};
 use super::program::scratch;
@@ -8,10 +8,10 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 use std::time::{Duration, SystemTime};
 
-/// Files by their paths below a folder.
+/// File contents, keyed by path relative to a folder.
 pub type Tree = BTreeMap<String, Vec<u8>>;
 
-/// The library that makes changes fail, compiled once.
+/// Path of the preloaded library, which is compiled once.
 fn library() -> &'static Path {
     static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
     LIBRARY.get_or_init(|| {
@@ -26,28 +26,30 @@ fn library() -> &'static Path {
     })
 }
 
-/// What the programs set for themselves and begin once more. Set already, they do not: the library does not live through it.
+/// Environment variables that the programs set for themselves before they start again. If the variables are already
+/// set, the programs do not restart; the preloaded library does not survive a restart.
 const AS_IT_BEGAN: [(&str, &str); 3] =
     [("MALLOC_TOP_PAD_", "67108864"), ("OMP_WAIT_POLICY", "passive"), ("XDG_RUNTIME_DIR", "/tmp")];
 
-/// How a program ended whose files could not all be written.
+/// Result of a program run with failing file operations.
 pub struct Ended {
-    /// What it said and its exit code.
+    /// Output and exit code of the program.
     pub output: Output,
-    /// How many changes it made or tried below the folder.
+    /// Number of file operations that the program made or attempted below the folder.
     pub changes: u64,
-    /// What the change was that failed: `make`, `write`, `flush`, `rename`, `link`; `none` where none did.
+    /// Kind of the operation that failed: `make`, `write`, `flush`, `rename`, `link`, or `none`.
     pub failed: String,
 }
 
 impl Ended {
-    /// What it said.
+    /// Returns the program's standard error output.
     pub fn said(&self) -> String {
         String::from_utf8_lossy(&self.output.stderr).into_owned()
     }
 }
 
-/// Runs a command of which the change number `at` below `folder` fails, and all later ones too where that `lasts`; 0 for none.
+/// Runs a command and makes its file operation number `at` below `folder` fail, and all later ones too if `lasts`; 0
+/// lets all succeed.
 pub fn run(mut command: Command, folder: &Path, at: u64, lasts: bool) -> Ended {
     let told = tempfile::NamedTempFile::new().expect("a file");
     command.env("LD_PRELOAD", library()).env("FAULT_FOLDER", folder).env("FAULT_COUNT", told.path());
@@ -61,7 +63,7 @@ pub fn run(mut command: Command, folder: &Path, at: u64, lasts: bool) -> Ended {
     Ended { output, changes: changes.parse().expect("a number"), failed: failed.into() }
 }
 
-/// Moments among so many changes: the first two, the last two, and some between.
+/// Selects operations to fail out of `changes`: the first two, the last two, and `between` others spread evenly.
 pub fn moments(changes: u64, between: u64) -> Vec<u64> {
     let mut all = vec![1, 2, changes - 1, changes];
     all.extend((1..=between).map(|k| k * changes / (between + 1)));
@@ -71,9 +73,10 @@ pub fn moments(changes: u64, between: u64) -> Vec<u64> {
     all
 }
 
-/// What must hold of a program that could not write: exit code 1, one error with a help, no file of its own that is not whole.
+/// Checks a program that could not write: exit code 1, a single error with a help line, and no temporary file left
+/// behind.
 pub fn failed_well(ended: &Ended, folder: &Path, at: u64) {
-    // A scene file with old words is warned about first.
+    // A scene file with outdated keywords causes a warning before the error.
     let said: Vec<String> = ended.said().lines().filter(|l| !l.starts_with("warning: ")).map(str::to_owned).collect();
     let said = said.join("\n");
     let what = format!("change {at}, {}: {said}", ended.failed);
@@ -85,9 +88,10 @@ pub fn failed_well(ended: &Ended, folder: &Path, at: u64) {
     }
 }
 
-/// Lets [`moments`] of a command's changes fail, each in a new folder: changes in the folder itself, or `within` it where that names a part. The
-/// command must fail well, and be gone on with to the bytes of an undisturbed run. `check` sees what was there after each fault, what an undisturbed
-/// run makes, and words on the fault.
+/// Makes each operation selected by [`moments`] fail, each in a new folder. Only operations below the part `within`
+/// count, if that is given, otherwise those below the whole folder. The command must fail cleanly, and running it again
+/// must produce the bytes of an undisturbed run. `check` receives the files present after the fault, the files of an
+/// undisturbed run, and a description of the fault.
 pub fn each_is_gone_on_from(
     make: &dyn Fn(&Path) -> Command,
     within: Option<&str>,
@@ -111,7 +115,8 @@ pub fn each_is_gone_on_from(
     }
 }
 
-/// The same command as the user nobody, to whom files of ours belong to somebody else; `None` where this machine does not let us.
+/// Returns the same command run as the user `nobody`, who does not own the test's files; `None` if this machine does
+/// not allow it.
 pub fn as_nobody(inner: &Command) -> Option<Command> {
     let begin = || {
         let mut command = Command::new("setpriv");
@@ -127,7 +132,8 @@ pub fn as_nobody(inner: &Command) -> Option<Command> {
     })
 }
 
-/// Sets the times of all files in a folder, in turn a day after the epoch and ten years ahead: what a clock that jumps leaves.
+/// Sets the modification times of a folder's files alternately to one day after the epoch and ten years in the future,
+/// as a jumping clock would.
 pub fn misdate(folder: &Path) {
     let long_ago = SystemTime::UNIX_EPOCH + Duration::from_secs(86_400);
     let ahead = SystemTime::now() + Duration::from_secs(10 * 365 * 86_400);
@@ -137,7 +143,7 @@ pub fn misdate(folder: &Path) {
     }
 }
 
-/// Lets everybody in: a temporary folder is its user's alone. `mode` is that of the folder itself.
+/// Opens a temporary folder, which is private to its user, to all users. `mode` is the mode of the folder itself.
 #[cfg(unix)]
 pub fn open_to_all(folder: &Path, mode: u32) {
     use std::os::unix::fs::PermissionsExt;

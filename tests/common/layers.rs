@@ -1,10 +1,10 @@
-//! EXR files by the names of their channels.
+//! EXR files as maps from channel name to values.
 
 use exr::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path as File;
 
-/// Every channel as single precision, and the header's comment.
+/// Reads every channel as single precision, and the comment of the header.
 pub fn read_layers(path: &File) -> (BTreeMap<String, Vec<f32>>, String) {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let layer = image.from_file(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).layer_data;
@@ -20,7 +20,7 @@ pub fn read_layers(path: &File) -> (BTreeMap<String, Vec<f32>>, String) {
     (channels.collect(), comment)
 }
 
-/// Writes channels: f32, or f16 where `half` says so by the name.
+/// Writes channels as f32, or as f16 where `half` returns true for the channel's name.
 pub fn write_layers(path: &File, size: (u32, u32), channels: &BTreeMap<String, Vec<f32>>, half: impl Fn(&str) -> bool) {
     let list = channels.iter().map(|(name, values)| {
         let samples = if half(name) {

@@ -1,23 +1,23 @@
-//! What a failed test leaves behind to look at: `target/test-failures/<name>/`, the picture, the reference and where they differ.
+//! Images that a failed test leaves in `target/test-failures/<name>/`: the result, the reference and their difference.
 
-use furrow::output::{Picture, write_png};
+use furrow_output::{Picture, write_png};
 use std::path::{Path, PathBuf};
 
-/// Where failures of this name are written.
+/// Returns the folder for failures of this name.
 pub fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("target/test-failures").join(name)
 }
 
-/// A colour for every number; 0 is black.
+/// Returns a distinct colour for each id; 0 is black.
 fn color(id: u32) -> [u8; 3] {
     if id == 0 {
         return [0; 3];
     }
-    let hash = furrow::sampling::rng::mix(u64::from(id));
+    let hash = furrow_base::sampling::rng::mix(u64::from(id));
     [hash, hash >> 8, hash >> 16].map(|v| 64 + (v & 0xff) as u8 / 4 * 3)
 }
 
-/// Writes two maps of numbers and a map of where they differ (white), and says where.
+/// Writes two id maps and a map of the differing pixels (white); returns their folder.
 pub fn keep(name: &str, width: u32, image: &[u32], reference: &[u32]) -> String {
     let folder = folder(name);
     let height = image.len() as u32 / width;
@@ -25,12 +25,12 @@ pub fn keep(name: &str, width: u32, image: &[u32], reference: &[u32]) -> String 
     let difference: Vec<[u8; 3]> =
         image.iter().zip(reference).map(|(a, b)| if a == b { [0; 3] } else { [255; 3] }).collect();
     for (file, pixels) in [("image", paint(image)), ("reference", paint(reference)), ("difference", difference)] {
-        write_png(&folder.join(format!("{file}.png")), width, height, &Picture::Rgb(&pixels), name).expect("a picture");
+        write_png(&folder.join(format!("{file}.png")), width, height, &Picture::Rgb(&pixels), name).expect("an image");
     }
     folder.display().to_string()
 }
 
-/// Panics where two maps of numbers differ, and leaves pictures of them.
+/// Panics if two id maps differ, after writing images of them.
 pub fn same(name: &str, width: u32, image: &[u32], reference: &[u32]) {
     if image != reference {
         let differ: Vec<usize> = (0..image.len().min(reference.len())).filter(|i| image[*i] != reference[*i]).collect();

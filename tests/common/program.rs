@@ -1,37 +1,38 @@
-//! The program itself and the small page that most tests give it.
+//! Runs the `trace` program and the small scene file that most tests use.
 
-use furrow::accel::EmbreeAccel;
-use furrow::film::Film;
-use furrow::geometry::Window;
-use furrow::integrator::{PathTracer, World};
-use furrow::render::{self, LabelMap, Settings, Watch};
-use furrow::sampling::Points;
-use furrow::scene::Field;
-use furrow::scene::assemble::{self, Options};
+use furrow_base::geometry::Window;
+use furrow_base::sampling::Points;
+use furrow_field::Field;
+use furrow_field::assemble::{self, Options};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::Film;
+use furrow_render::integrator::{PathTracer, World};
+use furrow_render::render::{self, LabelMap, Settings, Watch};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
 
-/// A few plants on a square of soil.
+/// Scene file with a few plants on a square of soil.
 pub const SMALL: &str = "tests/ref/small.ron";
 
-/// The files of an image, by name.
+/// Names of the output files of an image.
 pub const FILES: [&str; 7] =
     ["leaves.png", "nir.png", "overlay.png", "plants.png", "radiance.exr", "rgb.png", "semantics.png"];
 
-/// The text of the small page, its paths made relative to the package.
+/// Text of the small scene file, with paths relative to the package.
 pub fn small_text() -> String {
-    std::fs::read_to_string(SMALL).expect("the small page").replace("../../", "")
+    std::fs::read_to_string(SMALL).expect("the small scene file").replace("../../", "")
 }
 
-/// `trace` with these arguments.
+/// Returns the command `trace` with these arguments.
 pub fn trace(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments);
     command
 }
 
-/// Runs `trace` on the small page into `out`, one sample a pixel unless said otherwise, and expects it to succeed.
+/// Runs `trace` on the small scene file into `out`, with one sample per pixel unless `--spp` is given, and panics
+/// unless it succeeds.
 pub fn run(out: &Path, arguments: &[&str]) -> Output {
     let mut command = trace(&["--scene", SMALL, "--out", out.to_str().expect("a path")]);
     if !arguments.contains(&"--spp") {
@@ -42,7 +43,7 @@ pub fn run(out: &Path, arguments: &[&str]) -> Output {
     output
 }
 
-/// Names in a folder, sorted; hidden ones too. Nothing where there is no folder.
+/// Returns the sorted file names in a folder, hidden ones included; empty if the folder does not exist.
 pub fn names(folder: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut names: Vec<String> =
@@ -51,19 +52,19 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A folder that goes away with the test.
+/// Returns a temporary folder, deleted with the test, and an output path in it that does not exist yet.
 pub fn scratch() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("image");
     (folder, out)
 }
 
-/// A field from a page's text, without the program.
+/// Builds a field from the text of a scene file, without running the program.
 pub fn field(text: &str, options: &Options) -> Field {
     assemble::field_of(text, options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Film and labels of a whole field at this many threads.
+/// Renders the film and labels of a whole field on `threads` threads.
 pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
     let scene = &field.scene;
     let pool = render::pool(threads).expect("a pool");
@@ -79,7 +80,7 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
     })
 }
 
-/// SHA-256 of numbers, hex.
+/// Returns the SHA-256 of the numbers as hexadecimal text.
 pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
     use sha2::{Digest, Sha256};
     use std::fmt::Write;
@@ -93,12 +94,12 @@ pub fn hash(numbers: impl IntoIterator<Item = u32>) -> String {
     })
 }
 
-/// Every bit of a film, as numbers.
+/// Returns every bit of a film, as numbers.
 pub fn bits(film: &Film) -> Vec<u32> {
     let pixels = film.pixels.iter().flat_map(|p| {
-        let bands = [p.mean, p.variance, p.albedo].map(furrow::math::Spectrum::to_array);
+        let bands = [p.mean, p.variance, p.albedo].map(furrow_base::math::Spectrum::to_array);
         let floats = bands.into_iter().flatten().chain(p.normal.to_array()).chain([p.depth]).map(f32::to_bits);
-        // Parts and their counts as one number.
+        // The part ids and their counts, hashed into one number.
         let tally = p.tally.iter().flat_map(|(part, count)| [part, count]);
         floats.chain([tally.fold(0u32, |sum, n| sum.wrapping_mul(0x0100_0193).wrapping_add(n))])
     });

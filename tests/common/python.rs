@@ -1,16 +1,17 @@
-//! Python programs that tests ask for a second opinion.
+//! Python interpreters that run independent reference implementations for the tests.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A Python that runs `probe` (a line of Python) without fault: `target/venv/bin/python`, then `$FURROW_PYTHON`, then `python3`.
+/// Finds a Python that runs `probe` (one line of Python) without error: `target/venv/bin/python`, then
+/// `$FURROW_PYTHON`, then `python3`.
 ///
-/// `None`, and a word about it, where there is none; with `FURROW_REQUIRE_PEERS=1` that is a failure instead.
+/// Prints a note and returns `None` if there is none; with `FURROW_REQUIRE_PEERS=1` it panics instead.
 pub fn python(probe: &str) -> Option<PathBuf> {
     first(std::iter::empty(), probe)
 }
 
-/// The first Python that runs `probe`, those of `before` first.
+/// Finds the first Python that runs `probe`; tries the candidates in `before` first.
 fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
     let named = std::env::var_os("FURROW_PYTHON").map(PathBuf::from);
@@ -33,24 +34,24 @@ fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> 
     None
 }
 
-/// A Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv-torch/bin/python`, which `tests/peers.sh` makes, then those of
-/// [`python`], to which it is equal otherwise.
+/// Finds a Python with PyTorch: `$FURROW_TORCH_PYTHON`, then `target/venv-torch/bin/python`, which `tests/peers.sh`
+/// creates, then the candidates of [`python`]. Behaves like [`python`] if none is found.
 pub fn torch() -> Option<PathBuf> {
     torch_with("safetensors, efficientnet_lite_pytorch, timm")
 }
 
-/// The same with other modules beside PyTorch and numpy.
+/// Like [`torch`], but requires other modules beside PyTorch and numpy.
 pub fn torch_with(modules: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv-torch/bin/python");
     let named = std::env::var_os("FURROW_TORCH_PYTHON").map(PathBuf::from);
     first(named.into_iter().chain([own]), &format!("import torch, numpy, {modules}"))
 }
 
-/// Runs a script of `tests/` and expects it to be content; shows what it says.
+/// Runs a script of `tests/`, prints its output and panics unless it succeeds.
 pub fn ask(python: &Path, script: &str, arguments: &[&str]) {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script);
     let mut command = Command::new(python);
-    // No stray files in the sources; single threads, as many tests run at once.
+    // No `.pyc` files in the source tree; one thread each, because many tests run at once.
     command.arg(script).args(arguments).env("PYTHONDONTWRITEBYTECODE", "1").env("OMP_NUM_THREADS", "1");
     let output = command.output().expect("Python");
     eprint!("{}", String::from_utf8_lossy(&output.stdout));

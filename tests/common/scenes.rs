@@ -1,22 +1,22 @@
 //! Small scenes built in code.
 
-use furrow::accel::EmbreeAccel;
-use furrow::bsdf::Bsdf;
-use furrow::film::{Film, Filter};
-use furrow::geometry::{Mesh, Window};
-use furrow::integrator::{Integrator, World};
-use furrow::light::Light;
-use furrow::material::Material;
-use furrow::math::{Vec2, Vec3, vec2, vec3};
-use furrow::render::{self, Settings, Watch};
-use furrow::sampling::{Points, Stream};
-use furrow::scene::tag::Tag;
-use furrow::scene::{Part, Scene};
-use furrow::sensor::{Camera, Distortion, Pose};
+use furrow_base::geometry::{Mesh, Window};
+use furrow_base::math::{Vec2, Vec3, vec2, vec3};
+use furrow_base::sampling::{Points, Stream};
+use furrow_optics::bsdf::Bsdf;
+use furrow_optics::light::Light;
+use furrow_optics::sensor::{Camera, Distortion, Pose};
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::film::{Film, Filter};
+use furrow_render::integrator::{Integrator, World};
+use furrow_render::material::Material;
+use furrow_render::render::{self, Settings, Watch};
+use furrow_render::scene::tag::Tag;
+use furrow_render::scene::{Part, Scene};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A square of side `side` about `centre`, facing up.
+/// Builds a square with side length `side` around `centre`, facing up.
 pub fn square(centre: Vec3, side: f32) -> Mesh {
     let h = side / 2.0;
     let at = |x: f32, y: f32| centre + vec3(x * h, y * h, 0.0);
@@ -27,7 +27,7 @@ pub fn square(centre: Vec3, side: f32) -> Mesh {
     )
 }
 
-/// A sphere with true normals, `n` bands.
+/// Builds a sphere with exact normals and `n` latitude bands.
 pub fn sphere(centre: Vec3, radius: f32, n: u32) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=n {
@@ -46,7 +46,8 @@ pub fn sphere(centre: Vec3, radius: f32, n: u32) -> Mesh {
     mesh
 }
 
-/// A camera of `size` pixels at `position` that looks at `target` with a horizontal field of view in degrees.
+/// Builds a camera of `size` pixels at `position` that looks at `target`; `fov_deg` is its horizontal field of view in
+/// degrees.
 pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> Camera {
     let focal = f64::from(size.0) / 2.0 / (fov_deg.to_radians() / 2.0).tan();
     let centre = [f64::from(size.0) / 2.0, f64::from(size.1) / 2.0];
@@ -54,7 +55,7 @@ pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> C
     Camera::new(size, [focal; 2], centre, Distortion::default(), pose).expect("a camera")
 }
 
-/// A scene of unmasked meshes, each with one scattering.
+/// Builds a scene of meshes without masks, each with one BSDF.
 pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Scene {
     let materials = parts.iter().map(|(_, b)| Material::Plain(*b)).collect();
     let part = |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part {
@@ -68,12 +69,12 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
     Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
 }
 
-/// Renders all of a scene on two threads.
+/// Renders a whole scene on two threads with Sobol points.
 pub fn shoot(scene: &Scene, integrator: &dyn Integrator, spp: u32, seed: u64) -> Film {
     shoot_with(scene, integrator, Points::Sobol, spp, seed)
 }
 
-/// The same with numbers of a kind.
+/// Renders a whole scene on two threads with the given kind of sample points.
 pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, spp: u32, seed: u64) -> Film {
     with_world(scene, 2, |world, watch| {
         let window = Window::full(scene.camera.width(), scene.camera.height());
@@ -82,7 +83,7 @@ pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, sp
     })
 }
 
-/// Calls `f` in a pool with a scene that answers rays.
+/// Calls `f` in a thread pool with a scene whose acceleration structure is built.
 pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<'_>, &Watch<'_>) -> T + Send) -> T {
     render::pool(threads).expect("a pool").install(|| {
         let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
@@ -91,17 +92,17 @@ pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<
     })
 }
 
-/// The pixel's centre.
+/// Returns the centre of the film, in pixels.
 pub fn middle(film: &Film) -> Vec2 {
     vec2(film.window.width() as f32 / 2.0, film.window.height() as f32 / 2.0)
 }
 
-/// A direction, evenly over the sphere.
+/// Returns a random direction, uniform on the sphere.
 pub fn unit(s: &mut Stream) -> Vec3 {
     vec3(s.normal() as f32, s.normal() as f32, s.normal() as f32).normalize()
 }
 
-/// A point of the cube that reaches so far to all sides of the origin.
+/// Returns a random point of the cube [−reach, reach]³.
 pub fn point(s: &mut Stream, reach: f32) -> Vec3 {
     vec3(s.range32(-reach, reach), s.range32(-reach, reach), s.range32(-reach, reach))
 }

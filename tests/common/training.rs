@@ -1,28 +1,28 @@
-//! Small trainings and pictures made of numbers.
+//! Small training runs and synthetic images.
 
 use super::dataset::{path, succeed};
 use super::program::{SMALL, trace};
-use furrow::dataset::classes::Classes;
-use furrow::sampling::{Purpose, Stream};
-use furrow::train::data::{Band, Pick, Selection, Shape};
-use furrow::train::fit::hyper::NormalizationMode;
-use furrow::train::fit::{Callbacks, Hyperparameters, Plan};
-use furrow::train::net::{Network, Role, parameters};
-use furrow::train::run::TrainedModel;
-use furrow::train::session::{self, Machine};
-use furrow::train::weights;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_dataset::model::classes::Classes;
+use furrow_train::data::{Band, Pick, Selection, Shape};
+use furrow_train::fit::hyper::NormalizationMode;
+use furrow_train::fit::{Callbacks, Hyperparameters, Plan};
+use furrow_train::net::{Network, Role, parameters};
+use furrow_train::run::TrainedModel;
+use furrow_train::session::{self, Machine};
+use furrow_train::weights;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// The size that small networks learn at.
+/// Input size, in pixels, at which small networks are trained.
 pub const SIZE: (u32, u32) = (64, 48);
 
-/// A CPU with one thread that loads.
+/// A CPU with one data-loading thread.
 pub fn machine() -> Machine {
     Machine { device: "cpu".into(), loaders: 1, memory: 1 << 28 }
 }
 
-/// Renders eight images of the small page into a folder that stays until the next time.
+/// Renders eight images of the small scene into a folder that is kept until the next run.
 pub fn set(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if folder.exists() {
@@ -35,14 +35,14 @@ pub fn set(name: &str) -> PathBuf {
     folder
 }
 
-/// Trains a network for six steps on a set.
+/// Trains a network for six steps on a dataset.
 pub fn learn(network: Network, bands: &str, normalization: NormalizationMode, set: &Path, out: &Path) -> TrainedModel {
     let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
     let plan = Plan { network, shape, ..Plan::default() };
     learn_with(set, out, plan, Hyperparameters { normalization, ..Hyperparameters::default() })
 }
 
-/// Trains a plan for six steps of two images on a set.
+/// Trains a plan on a dataset for six steps with batches of two images.
 pub fn learn_with(set: &Path, out: &Path, plan: Plan, hyper: Hyperparameters) -> TrainedModel {
     let selection = Selection { pick: Some(Pick::All), ..Selection::of(set) };
     let shape = Shape { width: SIZE.0, height: SIZE.1, ..plan.shape };
@@ -51,10 +51,11 @@ pub fn learn_with(set: &Path, out: &Path, plan: Plan, hyper: Hyperparameters) ->
     let callbacks =
         Callbacks { step: &|_, _| (), validation: &|_, _| (), warn: &|_| (), stop: &AtomicBool::new(false) };
     session::fit(&plan, None, &machine(), out, &callbacks).expect("a training");
-    TrainedModel::open(out).expect("what was learnt")
+    TrainedModel::open(out).expect("a trained model")
 }
 
-/// The same network as nobody trained it: first values, but biases, gains, shifts and statistics that are not the usual ones.
+/// Returns the same network with random weights: initial weights, but biases, gains, shifts and statistics away from
+/// their usual initial values.
 pub fn stirred(learnt: &TrainedModel, seed: u64) -> TrainedModel {
     let card = &learnt.card;
     let list = parameters(card.network, card.input.bands.len(), card.classes.len());
@@ -76,7 +77,7 @@ pub fn stirred(learnt: &TrainedModel, seed: u64) -> TrainedModel {
     TrainedModel { card, values }
 }
 
-/// Pictures of 8-bit numbers, images × height × width × bands: waves and noise, no two alike.
+/// Synthetic 8-bit images, laid out images × height × width × bands: waves and noise, all different.
 pub fn pictures(images: usize, (width, height): (u32, u32), bands: usize, seed: u64) -> Vec<u8> {
     let mut pixels = Vec::new();
     for image in 0..images {
@@ -103,7 +104,7 @@ pub fn pictures(images: usize, (width, height): (u32, u32), bands: usize, seed: 
     pixels
 }
 
-/// What a network takes of such pictures: from 0 to 1 and normalised, lying as they did.
+/// Network input for such images: scaled to 0–1 and normalised, in the same layout.
 pub fn normalised(learnt: &TrainedModel, pictures: &[u8], (width, height): (u32, u32)) -> Vec<f32> {
     let bands = learnt.card.input.bands.len();
     let mut pixels: Vec<f32> = pictures.iter().map(|v| f32::from(*v) / 255.0).collect();

@@ -1,4 +1,4 @@
-"""The numbers that `tests/compare.rs` holds the program's to: two made-up pictures, measured by programs of others.
+"""Reference values of `tests/compare.rs`: two synthetic images, compared with independent programs.
 
     python3 -m venv venv && venv/bin/pip install scikit-image==0.26.0 flip-evaluator==1.7 && venv/bin/python tests/compare/reference.py
 """

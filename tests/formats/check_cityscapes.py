@@ -1,4 +1,4 @@
-"""Holds DATASET/cityscapes against the native maps: names, classes, and instances as cityscapesScripts counts them."""
+"""Compares DATASET/cityscapes with the native maps: names, classes, and instances as cityscapesScripts counts them."""
 
 import json
 import re
@@ -30,7 +30,7 @@ for path in photographs:
     assert np.array_equal(labels("labelIds"), own.semantics)
     assert np.array_equal(labels("labelTrainIds"), own.semantics)
     instances = labels("instanceIds").astype(int)
-    # An id below 1000 is a class without instances, another holds its class in front of three digits.
+    # An id below 1000 is a class without instances; otherwise the class is in the digits before the last three.
     classes = np.where(instances < 1000, instances, instances // 1000)
     assert np.array_equal(classes, own.semantics)
     for plant in own.seen():

@@ -1,4 +1,4 @@
-"""Opens DATASET/coco with pycocotools and holds masks, boxes and keypoints against the native maps; truth judged by itself is perfect."""
+"""Opens DATASET/coco with pycocotools and compares masks, boxes and keypoints with the native maps. The truth evaluated against itself has perfect scores."""
 
 import sys
 from pathlib import Path
@@ -17,7 +17,7 @@ states = {0: 0, 1: 0, 2: 0}
 
 
 def point(keypoint):
-    """x, y, v of one of our keypoints; nothing where there is none."""
+    """x, y, v of one of our keypoints; zeros if it is missing."""
     state = STATES[keypoint["state"]] if keypoint else 0
     return (keypoint["x"], keypoint["y"], state) if state else (0, 0, 0)
 
@@ -38,7 +38,7 @@ def same(coco, annotation, mask, seen, points):
 
 
 def judge(coco, kind, most, **settings):
-    """COCOeval of the truth against itself: average precision and recall at the largest number of detections."""
+    """Runs COCOeval of the truth against itself; precision and recall at the largest number of detections must be 1."""
     truth = [dict(a, score=1.0) for a in coco.dataset["annotations"]]
     if kind == "keypoints":
         truth = [a for a in truth if a["num_keypoints"] > 0]
@@ -53,12 +53,12 @@ def judge(coco, kind, most, **settings):
     judge.evaluate()
     judge.accumulate()
     precision, recall = judge.eval["precision"][..., -1], judge.eval["recall"][..., -1]
-    # It divides by a sum that has the least number added.
+    # COCOeval divides by a sum plus machine epsilon, so the precision is not exactly 1.
     assert (precision > -1).any() and np.allclose(precision[precision > -1], 1, atol=1e-12)
     assert (recall[recall > -1] == 1).all()
 
 
-# Its own numbers of detections serve for plants; those of keypoints are one number.
+# COCOeval's default detection limits suit plants; keypoints need a single limit.
 DEFAULT = [1, 10, 100]
 ALL = [1, 100, 10000]
 

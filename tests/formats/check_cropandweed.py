@@ -1,4 +1,4 @@
-"""Reads DATASET/cropandweed as CropAndWeed's own scripts do and holds boxes, labels and parameters against the native maps."""
+"""Reads DATASET/cropandweed like CropAndWeed's own scripts and compares boxes, labels and parameters with the native maps."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ root = dataset / "cropandweed"
 images = native.read(dataset)
 labels = {l["label"]: l for l in json.loads((root / "labels.json").read_text())["labels"]}
 FIELDS = ["left", "top", "right", "bottom", "label_id", "stem_x", "stem_y"]
-# Sugar beet by its leaves, white goosefoot (fat hen): numbers of CropAndWeed.
+# Class numbers of CropAndWeed: sugar beet at its leaf count, and white goosefoot (fat hen).
 BEET, GOOSEFOOT = 7, 33
 plants = 0
 used = set()
@@ -28,7 +28,7 @@ for split in native.SPLITS:
     for name, own in zip(names, own_images):
         kind, session, image = name.split("-")
         assert kind == "ave" and int(session) * 10000 + int(image) == own.record["index"]
-        # JPEG: alike, not the same.
+        # JPEG: similar, not equal.
         photograph = native.picture(root / f"images/{name}.jpg")
         assert photograph.shape == own.rgb.shape
         assert np.abs(photograph.astype(float) - own.rgb).mean() < 6
@@ -58,7 +58,7 @@ for split in native.SPLITS:
             (params,) = csv.DictReader(file)
         moisture = own.record["conditions"]["soil"]["moisture"]["mean"]
         assert int(params["moisture"]) == (moisture >= 1 / 3) + (moisture >= 2 / 3)
-        assert int(params["lighting"]) == 0, "the sun is out"
+        assert int(params["lighting"]) == 0, "the lighting parameter must be 0"
         assert int(params["soil"]) in (0, 1, 2) and int(params["separability"]) in (0, 1, 2)
 
 print(f"cropandweed: {plants} plants, labels {sorted(used)}")

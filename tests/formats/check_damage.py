@@ -1,4 +1,4 @@
-"""Holds DATASET/damage against the label maps: damage is on blades and seed leaves, and nowhere else."""
+"""Compares DATASET/damage with the label maps: damage is only on blades and cotyledons."""
 
 import sys
 from pathlib import Path
@@ -23,7 +23,7 @@ for name, image in native.read(dataset).items():
         assert maps[kind].shape == image.semantics.shape
         assert (maps[kind][~blades] == 0).all()
         most[kind] = max(most[kind], maps[kind].max())
-    # Two shares of one place, each rounded.
+    # Two fractions of the same point, each rounded.
     assert (maps["chlorosis"] + maps["necrosis"]).max() <= 256
     assert set(np.unique(maps["edges"])) <= {0, 255}
 print("damage: most of", most)

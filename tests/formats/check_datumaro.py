@@ -1,4 +1,4 @@
-"""Opens DATASET/{coco,panoptic,cityscapes} with datumaro and holds its masks against the native maps."""
+"""Opens DATASET/{coco,panoptic,cityscapes} with datumaro and compares its masks with the native maps."""
 
 import shutil
 import sys
@@ -17,7 +17,7 @@ CLASSES = {"soil": 0, "crop": 1, "weed": 2}
 
 
 def opened(folder, kind):
-    """Pairs of an item and the native image that it must be."""
+    """Pairs of an item and the native image that it must equal."""
     read = dm.Dataset.import_from(str(dataset / folder), kind)
     labels = [label.name for label in read.categories()[AnnotationType.label]]
     items = list(read)
@@ -30,11 +30,11 @@ def opened(folder, kind):
 
 
 def masks(item, labels):
-    """Class and pixels of each mask."""
+    """Class and pixels of each mask of an item."""
     return [(labels[a.label], a.image.astype(bool), a) for a in item.annotations if a.type == AnnotationType.mask]
 
 
-# Importers sort the annotations by id or the other way round.
+# Importers sort the annotations by id, ascending or descending.
 count = 0
 for item, own, labels in opened("coco", "coco_instances"):
     found = {a.attributes["plant"]: (label, mask) for label, mask, a in masks(item, labels)}
@@ -43,7 +43,7 @@ for item, own, labels in opened("coco", "coco_instances"):
         label, mask = found[plant["number"]]
         assert label == plant["class"] and np.array_equal(mask, own.plant_mask(plant))
     count += len(found)
-# It takes files of this name alone.
+# datumaro reads only files of this name.
 leaves = Path(tempfile.mkdtemp())
 shutil.copytree(dataset / "coco/images", leaves / "images")
 (leaves / "annotations").mkdir()
@@ -63,7 +63,7 @@ count = 0
 for item, own, labels in opened("panoptic", "coco_panoptic"):
     found = {a.id: (label, mask, a) for label, mask, a in masks(item, labels)}
     sizes = sum(mask.sum() for _, mask, _ in found.values())
-    assert sizes == own.semantics.size, "every pixel has one segment"
+    assert sizes == own.semantics.size, "every pixel must have one segment"
     for plant in own.seen():
         label, mask, a = found.pop(plant["number"])
         assert label == plant["class"] and np.array_equal(mask, own.plant_mask(plant))
@@ -77,7 +77,7 @@ count = 0
 for item, own, labels in opened("cityscapes", "cityscapes"):
     assert labels == list(CLASSES)
     found = {label: mask for label, mask, _ in masks(item, labels)}
-    # Black is background to datumaro: soil has no mask.
+    # Black is background in datumaro, so soil has no mask.
     assert set(found) == {name for name, n in CLASSES.items() if n and (own.semantics == n).any()}
     for label, mask in found.items():
         assert np.array_equal(mask, own.semantics == CLASSES[label])

@@ -1,4 +1,4 @@
-"""A drive with a stereo pair, as COLMAP's own reader and OpenCV's stereo matcher see it: check_drive.py DATASET"""
+"""Checks a drive with a stereo pair using COLMAP's own reader and OpenCV's stereo matcher: check_drive.py DATASET"""
 import json
 import pathlib
 import sys
@@ -15,7 +15,7 @@ def record(name):
     return json.loads((dataset / "images" / name / "record.json").read_text())
 
 
-# COLMAP: the model is read, and its cameras project the plants' stems to where the records have them.
+# COLMAP: reads the model; its cameras must project the plants' stems to the positions in the records.
 model = pycolmap.Reconstruction(str(dataset / "colmap/000000"))
 assert len(model.images) == 4 and len(model.cameras) == 2, model.summary()
 points = 0
@@ -30,7 +30,7 @@ for image in model.images.values():
         points += 1
 assert points >= 4, points
 
-# transforms.json: the same points by its matrices and intrinsics, in OpenGL's axes.
+# transforms.json: the same points, projected with its matrices and intrinsics in OpenGL's axes.
 for frame in json.loads((dataset / "nerf/000000/transforms.json").read_text())["frames"]:
     path = (dataset / "nerf/000000" / frame["file_path"]).resolve()
     assert path.is_file(), path
@@ -42,7 +42,7 @@ for frame in json.loads((dataset / "nerf/000000/transforms.json").read_text())["
             told = [plant["stem"]["x"], plant["stem"]["y"]]
             assert numpy.abs(numpy.subtract(seen, told)).max() < 0.01, (seen, told)
 
-# MOTS: a plant has one number in all images; every mask is as large as the record says.
+# MOTS: a plant has the same number in all images; every mask has the area in the record.
 tracks = {}
 for camera in ("camera", "right"):
     for line in (dataset / f"mots/000000-{camera}.txt").read_text().splitlines():
@@ -51,7 +51,7 @@ for camera in ("camera", "right"):
         tracks.setdefault(track, set()).add((camera, frame))
 assert max(len(seen) for seen in tracks.values()) == 4, tracks
 
-# OpenCV: its matcher knows nothing of our geometry.
+# OpenCV: its matcher does not know our geometry.
 left, right = (cv2.imread(str(dataset / f"images/{name}/rgb.png"), cv2.IMREAD_GRAYSCALE) for name in ("000000", "000001"))
 matcher = cv2.StereoSGBM_create(minDisparity=0, numDisparities=64, blockSize=7, P1=8 * 49, P2=32 * 49, uniquenessRatio=10)
 found = matcher.compute(left, right).astype(numpy.float32) / 16

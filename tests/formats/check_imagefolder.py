@@ -1,4 +1,4 @@
-"""Opens DATASET/imagefolder with Hugging Face datasets and holds pictures and columns against the native maps and records."""
+"""Opens DATASET/imagefolder with Hugging Face datasets and compares images and columns with the native maps and records."""
 
 import os
 import sys
@@ -38,7 +38,7 @@ for read in (datasets.load_dataset(str(root)), datasets.load_dataset("imagefolde
             assert own.split == split
             assert np.array_equal(np.array(row["image"]), own.rgb)
             assert np.array_equal(np.array(row["mask"]), own.semantics)
-            # 16 bit: numbers are not squeezed into 8.
+            # 16 bit: plant numbers are not truncated to 8 bits.
             assert row["plants"].mode == "I;16" and np.array_equal(np.array(row["plants"]), own.plants)
             assert np.array_equal(np.array(row["leaves"]), own.leaves)
             folder = dataset / "images" / own.name

@@ -1,4 +1,4 @@
-"""Do the tables of images, plants and leaves hold what the records do, of days, cameras, samples and the condition of plants?
+"""Compares the tables of images, plants and leaves with the records: days, cameras, samples and the condition of plants.
 
 check_index.py DATASET
 """
@@ -18,7 +18,7 @@ for record, row in zip(records, images.to_dict("records"), strict=True):
     assert (row["day"], row["frame"], row["camera"]) == (capture["day"], capture["frame"], capture["camera"])
     assert row["spp"] == (sampling["spp"] if sampling else asked), row["spp"]
 plants = [plant for record in records for plant in record["plants"]]
-# Each row tells its image as the table of images does, also as CSV.
+# Each row names its image as the table of images does, also in CSV.
 ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
 told = {row["image"]: row for row in images[ORIGIN].to_dict("records")}
 read = lambda name: pandas.read_csv(root / "traits" / name, dtype={"image": str})
@@ -35,7 +35,7 @@ for plant, row in zip(plants, table.to_dict("records"), strict=True):
         assert pandas.isna(row[name]) if condition is None else abs(row[name] - condition[name]) < 1e-6, name
     marked += condition is not None and row["wilt"] > 0
 assert set(images["day"]) == {9, 21} and marked > 0, (set(images["day"]), marked)
-# Curves of growth, as the guide draws them from the table alone.
+# Growth curves, computed from the table alone as in the guide.
 curves = table[table["camera"] == images["camera"][0]].pivot_table("leaf_area_m2", "day", "id")
 expected = {}
 for record in records:
@@ -43,7 +43,7 @@ for record in records:
         if record["capture"]["camera"] == images["camera"][0]:
             areas = expected.setdefault((record["capture"]["day"], plant["id"]), [])
             areas.append(plant["grown"]["traits"]["leaf_area_m2"])
-assert expected and curves.count().max() == 2, "a plant is to be seen on both days"
+assert expected and curves.count().max() == 2, "some plant must be visible on both days"
 for (day, plant), areas in expected.items():
     assert abs(curves.loc[day, plant] - sum(areas) / len(areas)) < 1e-7
 print(f"{len(images)} images, {len(plants)} plants, {marked} of them wilted")

@@ -1,4 +1,4 @@
-"""Opens FOLDER/image.exr with cryptomatte-api and OpenEXR and holds it against FOLDER/expected.json."""
+"""Opens FOLDER/image.exr with cryptomatte-api and OpenEXR and compares it with FOLDER/expected.json."""
 
 import json
 import sys

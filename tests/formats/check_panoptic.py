@@ -1,4 +1,4 @@
-"""Holds the numbers of DATASET/panoptic against its pictures, as panopticapi reads them, and against the native maps."""
+"""Compares the segments of DATASET/panoptic with its images, decoded like panopticapi, and with the native maps."""
 
 import json
 import sys

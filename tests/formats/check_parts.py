@@ -1,4 +1,4 @@
-"""Holds DATASET/parts against the native maps: organs are where plants are, and nowhere else."""
+"""Compares DATASET/parts with the native maps: organs are only on plants."""
 
 import json
 import sys
@@ -23,7 +23,7 @@ for name, image in native.read(dataset).items():
     assert parts.shape == image.semantics.shape
     assert set(np.unique(parts)) - {0} <= set(names)
     assert (np.isin(parts, organs) == (image.plants > 0)).all()
-    # What belongs to no leaf is stem, hypocotyl, flower or fruit, and a leaf is none of them.
+    # Plant pixels without a leaf are stem, hypocotyl, flower or fruit; leaf pixels are none of these.
     of = lambda *kinds: np.isin(parts, [number for number, name in names.items() if name in kinds])
     plants, leaves = image.plants > 0, image.leaves > 0
     assert (of(*(ORGANS - LEAVES))[plants] == ~leaves[plants]).all()

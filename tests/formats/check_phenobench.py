@@ -1,4 +1,4 @@
-"""Opens DATASET/phenobench with PhenoBench's own loader and holds it against the native maps."""
+"""Opens DATASET/phenobench with PhenoBench's own loader and compares it with the native maps."""
 
 import os
 import sys
@@ -16,7 +16,7 @@ TARGETS = ["semantics", "plant_instances", "leaf_instances", "plant_bboxes", "le
 
 
 def of_255(share):
-    """Rounded, halves up; Python's own goes to the even number."""
+    """Rounds halves up; Python's own `round` rounds them to even."""
     return int(255 * share + 0.5)
 
 
@@ -32,7 +32,7 @@ for split in ("train", "val"):
         own = images[item["image_name"].removesuffix(".png")]
         assert own.split == split
         assert np.array_equal(np.array(item["image"]), own.rgb)
-        # Partial plants are mapped back to their class.
+        # Maps partial plants back to their class.
         assert np.array_equal(item["semantics"], own.semantics)
         assert np.array_equal(item["plant_instances"], own.plants)
         written = native.picture(root / split / "semantics" / item["image_name"])
@@ -47,13 +47,13 @@ for split in ("train", "val"):
             number = {"crop": 1, "weed": 2}[plant["class"]]
             assert set(written[mask]) == {number + 2 * partial}
             x, y, w, h = plant["seen"]["box"]
-            # The loader takes 1 off, and leaves partial plants out.
+            # The loader subtracts 1 and omits partial plants.
             assert (boxes.pop((x, y, w - 1, h - 1), None) == number) or partial
             partials, whole_plants = partials + partial, whole_plants + (not partial)
             # ignore_partial
             assert set(kept["semantics"][mask]) == {255 if partial else number}
             assert set(kept["plant_instances"][mask]) == {0 if partial else plant["number"]}
-            # What the evaluation asks: one value an instance, above a half where the plant counts.
+            # Rule of the evaluation: one value per instance; the plant counts if it is above one half.
             (seen,) = set(item["plant_visibility"][mask])
             assert seen == of_255(share) and (seen / 255 > 0.5) == (not partial), (seen, share)
             for leaf in plant["leaves"]:

@@ -1,4 +1,4 @@
-"""Reads DATASET/ply with plyfile: every point is seen by the camera at the pixel it came from, with that pixel's colour and labels."""
+"""Reads DATASET/ply with plyfile: the camera sees every point at the pixel it was made from, and colour and labels are those of that pixel."""
 
 import sys
 from pathlib import Path
@@ -15,7 +15,7 @@ for name, image in native.read(dataset).items():
     place = np.stack([points[axis] for axis in "xyz"], 1).astype(float) - camera["position_m"]
     right, down, depth = (place @ np.array(camera["world_to_camera"]).T).T
     assert (depth > 0).all()
-    # The small scene's lens does not distort, nor does its shutter roll.
+    # The small scene has no lens distortion and no rolling shutter.
     assert not any(camera.get("distortion", {"k1": 0}).values())
     column = camera["fx_px"] * right / depth + camera["cx_px"]
     row = camera["fy_px"] * down / depth + camera["cy_px"]
@@ -29,7 +29,7 @@ for name, image in native.read(dataset).items():
     assert (points["plant"] == image.plants[y, x]).all() and (points["leaf"] == image.leaves[y, x]).all()
     normals = np.stack([points[axis] for axis in ("nx", "ny", "nz")], 1)
     assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-4
-    # The side that the camera sees.
+    # The normal faces the camera.
     assert ((normals * -place).sum(1) > 0).all()
     assert ((points["part"] > 10) == (points["plant"] > 0)).all()
-print("ply: points lie where their pixels look")
+print("ply: points project to their pixels")

@@ -1,4 +1,4 @@
-"""Holds DATASET/skeletons against records and traits: parents come first, ends are the leaf's keypoints, lengths are its sizes."""
+"""Compares DATASET/skeletons with records and traits: parents come first, ends are the leaf's keypoints, lengths are its sizes."""
 
 import json
 import sys
@@ -26,14 +26,14 @@ for name, image in native.read(dataset).items():
             assert all(j["parent"] < k for k, j in enumerate(joints) if k > 0)
             at = {j["name"]: np.array(j["world_m"]) for j in joints}
             pixel = {j["name"]: j["pixel"] for j in joints}
-            # The image's pinhole, which does not distort in the small scene.
+            # Projection of the image's pinhole camera; the small scene has no lens distortion.
             for key, place in at.items():
                 x, y, z = np.array(camera["world_to_camera"]) @ (place - camera["position_m"])
                 u, v = camera["fx_px"] * x / z + camera["cx_px"], camera["fy_px"] * y / z + camera["cy_px"]
                 assert np.abs(np.array(pixel[key]) - (u, v)).max() < 0.02
             for end, point in (("B", "base"), ("PK", "tip")):
                 assert abs(pixel[end][0] - leaf[point]["x"]) < 1e-3 and abs(pixel[end][1] - leaf[point]["y"]) < 1e-3
-            # Bending keeps the links' lengths: petiole and blade.
+            # Bending preserves the lengths of petiole and blade.
             chain = [n for n in names if not n.startswith(("STL", "STR"))]
             assert [joints[names.index(n)]["parent"] for n in chain[1:]] == list(range(len(chain) - 1))
             links = {b: np.linalg.norm(at[b] - at[a]) for a, b in zip(chain, chain[1:])}

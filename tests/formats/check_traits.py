@@ -1,4 +1,4 @@
-"""Reads DATASET/traits with pandas and holds its rows against the records, and its areas against the label maps."""
+"""Reads DATASET/traits with pandas and compares its rows with the records, and its areas with the label maps."""
 
 import sys
 from pathlib import Path
@@ -22,7 +22,7 @@ assert list(plants.columns[:11]) == [*ORIGIN, "plant", "id", "class", "species"]
 assert list(leaves.columns[:10]) == [*ORIGIN, "plant", "leaf", "id"]
 assert list(views.columns[:7]) == ORIGIN
 for rows in (plants, leaves, views):
-    # One image a field: no camera, no day, no frame.
+    # One image per field: no camera, no day, no frame.
     assert (rows["field"] == rows["number"]).all() and rows[["camera", "day", "frame"]].isna().all(axis=None)
     assert all(images[name].record["index"] == number for name, number in zip(rows["image"], rows["number"]))
 
@@ -37,7 +37,7 @@ for ours, theirs in (same | {name: name for name in traits}).items():
 for row in plants.itertuples():
     shown = images[row.image].plants == row.plant
     assert row.pixels == shown.sum()
-    # Leaves that neither stand in view nor hide in it have no rows, but count for the plant.
+    # Leaves outside the view have no rows, but count for the plant.
     own = leaves[(leaves["image"] == row.image) & (leaves["plant"] == row.plant)]
     assert own["area_m2"].sum() <= row.leaf_area_m2 * 1.001
     if len(own) == row.leaves:
@@ -48,13 +48,14 @@ for row in plants.itertuples():
         assert own["top_m"].max() <= row.top_m + 1e-6
 
 if len(leaves):
-    # A blade is no larger than the rectangle that it is cut from, and no smaller than a thread.
+    # A blade has at most the area of its bounding rectangle, and more than zero.
     assert (leaves["area_m2"] <= 1.05 * leaves["length_m"] * leaves["width_m"]).all()
     assert (leaves["area_m2"] > 0).all()
     assert leaves["inclination_deg"].between(0, 90).all() and leaves["azimuth_deg"].between(0, 360).all()
     assert (leaves["visible_area_m2"] <= leaves["area_m2"]).all()
 
-# Seen from above, the pixels of a plant wholly in sight cover about what it covers: each a square as wide as its depth makes it.
+# Seen from above, the pixels of a completely visible plant cover approximately its projected area; each is a square
+# whose side follows from its depth.
 compared = 0
 for name, image in images.items():
     view = views[views["image"] == name].iloc[0]
@@ -69,4 +70,4 @@ for name, image in images.items():
             assert 0.8 < row.cover_m2 / covered < 1.25, (name, row.plant, row.cover_m2 / covered)
             compared += 1
 assert compared > 0 or not len(plants)
-print(f"traits: {len(plants)} plants, {len(leaves)} leaves, {compared} covers held against pixels")
+print(f"traits: {len(plants)} plants, {len(leaves)} leaves, {compared} areas compared with pixels")

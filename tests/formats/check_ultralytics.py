@@ -1,5 +1,5 @@
-"""Opens DATASET/yolo, yolo-detect and yolo-pose with Ultralytics' own dataset class and holds what it loads against the native maps; loss.json must
-say what is lost of the masks that it paints."""
+"""Opens DATASET/yolo, yolo-detect and yolo-pose with Ultralytics' own dataset class and compares the result with the native maps;
+loss.json must state the loss of the masks that it rasterizes."""
 
 import json
 import os
@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 scratch = tempfile.mkdtemp()
-# Before it is imported: where it keeps its settings.
+# Set before the import: the folder of its settings.
 os.environ["YOLO_CONFIG_DIR"] = scratch
 
 import numpy as np
@@ -19,7 +19,7 @@ from ultralytics.utils.ops import resample_segments
 
 import native
 
-# A font for plots would be downloaded.
+# Prevents the download of a font for plots.
 utils.check_font = lambda *_: None
 
 dataset = Path(sys.argv[1])
@@ -29,7 +29,7 @@ points = 0
 
 
 def painted(truth, segment):
-    """Intersection over union of a mask and what is painted for a polygon, which loses nothing of it."""
+    """IoU of a mask and its rasterized polygon, which must contain the whole mask."""
     height, width = truth.shape
     mask = utils.polygon2mask((height, width), [(segment * [width, height]).reshape(-1)]).astype(bool)
     assert (mask | ~truth).all()
@@ -37,27 +37,27 @@ def painted(truth, segment):
 
 
 def ious(own, segments):
-    # As it does before it trains: the same number of corners for all.
+    # As before training: the same number of vertices for all polygons.
     most = max([1000, *(len(segment) + 1 for segment in segments)])
     for plant, segment in zip(own.seen(), segments, strict=True):
         truth = own.plant_mask(plant)
         iou = painted(truth, segment)
         more = painted(truth, resample_segments([segment.copy()], n=most)[0])
-        # The truth is painted whole, so its pixels over the overlap are the pixels painted.
+        # The rasterized polygon contains the whole mask, so its area is the mask's area divided by the IoU.
         beside = truth.sum() / more - truth.sum() / iou
         assert beside <= 2 + 0.01 * truth.sum(), (iou, more, truth.sum())
         yield plant, iou
 
 
 def keypoint(point, size):
-    """As a row has it."""
+    """A label in the layout of a row."""
     if not point or point["state"] == "outside":
         return [0, 0, 0]
     return [point["x"] / size[0], point["y"] / size[1], 2 if point["state"] == "visible" else 1]
 
 
 for name, task in [("yolo", "segment"), ("yolo-detect", "detect"), ("yolo-pose", "pose")]:
-    # It leaves a cache beside the labels.
+    # Ultralytics leaves a cache beside the labels.
     root = Path(scratch) / name
     shutil.copytree(dataset / name, root)
     data = utils.check_det_dataset(root / "data.yaml", autodownload=False)

@@ -1,4 +1,4 @@
-"""Pascal VOC as torchvision reads it: boxes and masks are those of the native files."""
+"""Reads Pascal VOC with torchvision: boxes and masks equal those of the native files."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Opens DATASET/yolo and DATASET/yolo-detect with supervision and holds classes, boxes and masks against the native maps."""
+"""Opens DATASET/yolo and DATASET/yolo-detect with supervision and compares classes, boxes and masks with the native maps."""
 
 import sys
 from pathlib import Path
@@ -36,10 +36,11 @@ for name in ["yolo", "yolo-detect"]:
             for i, plant in enumerate(own.seen()):
                 assert read.classes[detections.class_id[i]] == plant["class"]
                 x, y, w, h = plant["seen"]["box"]
-                # A hundredth of a pixel within, and six digits.
+                # Six digits: within a hundredth of a pixel.
                 assert np.abs(detections.xyxy[i] - [x, y, x + w, y + h]).max() < 0.02
                 if name == "yolo":
-                    # It rounds corners, so it paints more, and cuts; nothing of the plant is lost.
+                    # supervision rounds vertices, so it rasterizes more pixels and clips at the border; no pixel of the
+                    # plant is lost.
                     assert (detections.mask[i] | ~own.plant_mask(plant)).all()
                 plants += 1
 

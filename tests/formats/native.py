@@ -1,4 +1,4 @@
-"""A dataset's own files, which every other format is held against."""
+"""Reads a dataset's native files, with which every other format is compared."""
 
 import json
 from pathlib import Path
@@ -14,13 +14,13 @@ def picture(path):
 
 
 def numbers(path):
-    """Numbers of plants: 16-bit grey, or R + 256 G + 65536 B."""
+    """Plant numbers: 16-bit grey, or R + 256 G + 65536 B."""
     found = picture(path).astype(int)
     return found @ [1, 1 << 8, 1 << 16] if found.ndim == 3 else found
 
 
 class Native:
-    """One image: record and maps as they were written."""
+    """One image: its record and maps."""
 
     def __init__(self, folder):
         self.record = json.loads((folder / "record.json").read_text())
@@ -35,7 +35,7 @@ class Native:
         return [p for p in self.record["plants"] if p["seen"]["pixels"] > 0]
 
     def seen_leaves(self):
-        """Pairs of plant and leaf, leaves of no pixel left out."""
+        """Pairs of plant and leaf, without leaves that have no pixel."""
         return [(p, l) for p in self.seen() for l in p["leaves"] if l["seen"]["pixels"] > 0]
 
     def plant_mask(self, plant):
@@ -46,13 +46,13 @@ class Native:
 
 
 def inside(seen):
-    """Share of a plant or leaf that lies within the frame."""
+    """Fraction of a plant or leaf inside the frame."""
     whole, unoccluded = seen.get("whole"), seen.get("unoccluded")
     return unoccluded / whole if whole else 1.0
 
 
 def read(dataset):
-    """All images by name."""
+    """All images of a dataset by name."""
     images = [Native(folder) for folder in sorted((Path(dataset) / "images").iterdir())]
     return {image.name: image for image in images}
 

@@ -1,12 +1,12 @@
 """Compares the mean radiance of scene.xml and scene-exact.xml: python brightness.py TOLERANCE FOLDER ...
 
-Both are rendered by Mitsuba, so that nothing but the scattering differs. With 48 samples a pixel the means of these images are known to 0.2 %.
+Mitsuba renders both, so only the BSDFs differ. With 48 samples per pixel, the means of these images are accurate to 0.2 %.
 """
 
 import sys
 
 sys.dont_write_bytecode = True
-import check  # names LLVM and the variant, registers our plugins
+import check  # selects LLVM and the variant, registers our plugins
 import mitsuba as mi
 import numpy as np
 

@@ -1,6 +1,6 @@
-"""Furrow's scattering as plugins of Mitsuba 3, written from the formulas and not from the renderer's code.
+"""Furrow's BSDFs as plugins of Mitsuba 3, written from the formulas and not from the renderer's code.
 
-`scene-exact.xml`, as `trace export --format mitsuba` writes it, names them:
+`scene-exact.xml`, written by `trace export --format mitsuba`, uses them:
 
     import mitsuba as mi
     mi.set_variant("llvm_ad_rgb")        # any vectorised variant
@@ -8,19 +8,19 @@
     mi.render(mi.load_file("scene-exact.xml"))
 
 Sources of the formulas: Oren & Nayar 1994; Walter et al. 2007 (GGX) with the height-correlated masking of Heitz 2014;
-Fresnel's equations. Directions are drawn by the cosine alone: unlike the renderer's way, but with the same mean.
+Fresnel's equations. Directions are sampled by the cosine only: unlike in the renderer, but with the same mean.
 """
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-# Cosine at which a shading normal that turns away from the eye is left.
+# Smallest cosine to the eye of a shading normal; a normal that turns away further is tilted back to it.
 GRAZE = 0.02
 
 
 def _mean_fresnel(ior):
-    """2 ∫ F(μ) μ dμ from outside, midpoint rule."""
+    """Hemispherical Fresnel reflectance from outside: 2 ∫ F(μ) μ dμ by the midpoint rule."""
     mu = (np.arange(4096) + 0.5) / 4096
     transmitted = np.sqrt(1 - (1 - mu**2) / ior**2)
     s = (mu - ior * transmitted) / (mu + ior * transmitted)
@@ -29,13 +29,13 @@ def _mean_fresnel(ior):
 
 
 def _texture(props, name):
-    """A texture by its name; colours are textures too."""
+    """Returns a texture property by name; a colour becomes a constant texture."""
     value = props[name]
     return value if isinstance(value, mi.Texture) else mi.load_dict({"type": "rgb", "value": list(value)})
 
 
 class _Coat:
-    """A rough dielectric interface seen from outside, and what it lets through to a base."""
+    """A rough dielectric interface seen from outside, and its transmission to the base."""
 
     def __init__(self, alpha_u, alpha_v, ior):
         self.alpha, self.ior = (alpha_u, alpha_v), ior
@@ -56,7 +56,7 @@ class _Coat:
 
 
 class _SurfaceLayer:
-    """A thin layer of white bodies: single scattering (Chandrasekhar 1960), the half scattered onwards counted as let through."""
+    """A thin layer of white scatterers: single scattering (Chandrasekhar 1960); the half scattered forward counts as transmitted."""
 
     def __init__(self, depth, scale):
         self.depth, self.scale = depth, scale
@@ -72,9 +72,9 @@ class _SurfaceLayer:
 
 
 class _Surface(mi.BSDF):
-    """The frame of a point, with its relief; what does not agree about the sides scatters nothing."""
+    """A surface with relief; directions whose sides differ between shading and geometric normal scatter nothing."""
 
-    # Whether slopes add to those over the ground plane, or act along the texture.
+    # Whether slopes are added to those over the ground plane, or are relative to the texture's axes.
     OVER_PLANE = False
 
     def __init__(self, props):
@@ -88,7 +88,7 @@ class _Surface(mi.BSDF):
             self.m_flags = self.m_flags | kind
 
     def local(self, si, active):
-        """Our frame, the geometric normal in world coordinates, and the eye in both."""
+        """The shading frame, and the direction to the eye in world and in shading coordinates."""
         eye = si.to_world(si.wi)
         n = si.sh_frame.n
         n = dr.select(dr.dot(n, si.n) < 0, -n, n)
@@ -153,7 +153,7 @@ class _Surface(mi.BSDF):
 
 
 class Soil(_Surface):
-    """Oren & Nayar's rough surface, a share of it under a film of water."""
+    """Oren & Nayar's rough surface, partly covered by a film of water."""
 
     TRANSMITS = False
     OVER_PLANE = True
@@ -186,7 +186,7 @@ class Soil(_Surface):
 
 
 class Leaf(_Surface):
-    """A sheet that reflects and transmits evenly, each side under a coat and a layer of hairs and bloom."""
+    """A sheet with diffuse reflection and transmission; each side has a coat and a layer of trichomes and wax bloom."""
 
     TRANSMITS = True
 

@@ -2,26 +2,22 @@
 
 Each folder holds an exported scene and `ours.bin`: for each pixel R, G, B, NIR, the variances of these means, class, plant
 and leaf, float32.
-
-What is estimated is the ratio of two means over a region: each class, and each plant and each leaf of at least 40 pixels. Leaves
-count because what is wrong with a large leaf and a small one may cancel over their plant.
-
-Mitsuba renders BLOCKS images of independent seeds; plants cover little of an image, so the window that holds them is rendered a
-second time with more samples, by which plants and leaves are judged. Every pixel of it draws numbers of its own, so the variance of a
-region's mean is the sum of its pixels' variances. Ours is one image of Sobol points; the variance stated of it, that of
-independent samples, is no smaller than its spread: over 16 seeds that was half the stated error for a beet under lamps, and 0.5
+The estimated quantity is the ratio of two means over a region: each class, and each plant and leaf of at least 40 pixels. Leaves
+are tested because errors of a large leaf and a small one may cancel over their plant.
+Mitsuba renders BLOCKS images with independent seeds. Plants cover little of an image, so the window around them is rendered a
+second time with more samples, which are used for plants and leaves. Its pixels use independent random numbers, so the variance of
+a region's mean is the sum of its pixels' variances. Our image uses Sobol points; its reported variance, that of independent
+samples, is not below the true one: over 16 seeds the true standard error was half the reported one for a beet under lamps, and 0.5
 to 1.0 of it for its leaves.
-
-- Labels: the surface at each pixel's centre is of the same class and plant, but for one pixel in a thousand.
-- Regions: the difference stays below TOLERANCE of the mean (0 where the scene is exact) and so many standard errors that a
-  scene without any fault fails with the chance FALSE_ALARM: Student's t, divided among all regions and bands of the scene
-  (Bonferroni), of as many degrees of freedom as the variances were measured with (Welch & Satterthwaite). Where a few bright pixels
-  make most of a variance these are few and the limit is wide: 8 standard errors for a leaf in the sun, whose glint Mitsuba finds by chance.
-  Under lamps they are thousands: over 64 images of a beet its mean is as good as normal (skewness −0.4 to 0.1, excess kurtosis
-  below 0.5, standard deviation 1.08 times the stated).
-- Pixels: no more than 0.5 % lie beyond what t allows 0.05 %, 3 % where TOLERANCE is above 0.
-
-A scene that disagrees leaves pictures in OUT: ours, theirs, z. Exit code 1.
+- Labels: the surface at each pixel's centre has the same class and plant, except in one pixel in a thousand.
+- Regions: the difference is below TOLERANCE of the mean (0 where the scene is exact) plus a limit in standard errors, which a
+  correct scene exceeds with probability FALSE_ALARM: Student's t, divided among all regions and bands of the scene (Bonferroni),
+  with the degrees of freedom of the measured variances (Welch & Satterthwaite). If a few bright pixels dominate a variance, these
+  are few and the limit is wide: 8 standard errors for a leaf in the sun, whose glint Mitsuba finds by chance. Under lamps they are
+  thousands: over 64 images of a beet its mean is practically normal (skewness −0.4 to 0.1, excess kurtosis below 0.5, standard
+  deviation 1.08 times the reported one).
+- Pixels: at most 0.5 % exceed the limit that t exceeds with probability 0.05 %, or 3 % if TOLERANCE is above 0.
+A scene that disagrees leaves images in OUT: ours, theirs, z. Exit code 1.
 """
 
 import glob
@@ -33,16 +29,16 @@ import time
 
 sys.dont_write_bytecode = True
 BLOCKS = 8
-# Samples a pixel and block: of the whole image, and of the plants' window.
+# Samples per pixel and block: for the whole image, and for the window of the plants.
 SPP, SPP_PLANTS = 16, 64
-# Of our image, as the test takes them.
+# Samples per pixel of our image, as rendered by the test.
 SPP_OURS = 128
-# Chance that a scene on which both agree fails by its regions.
+# Probability that the regions of a correct scene fail.
 FALSE_ALARM = 1e-5
 
 
 def find_llvm():
-    """Names the newest LLVM to Dr.Jit; the 15 of Debian 12 aborts on recent processors."""
+    """Selects the newest LLVM for Dr.Jit; version 15 of Debian 12 aborts on recent processors."""
     if "DRJIT_LIBLLVM_PATH" in os.environ:
         return
     paths = glob.glob("/usr/lib/*/libLLVM[-.]*so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*")
@@ -65,7 +61,7 @@ import bsdfs
 
 
 def labels(scene, width, height):
-    """Class name and plant of the surface at each pixel's centre, through masks."""
+    """Class name and plant of the surface at each pixel's centre, with masks applied."""
     sensor = scene.sensors()[0]
     k = dr.arange(mi.UInt32, width * height)
     at = mi.Point2f((mi.Float(k % width) + 0.5) / width, (mi.Float(k // width) + 0.5) / height)
@@ -94,12 +90,12 @@ def labels(scene, width, height):
 
 
 def cropped(path, window):
-    """The scene, its film cut to `window` (x, y, width, height)."""
+    """Loads the scene with its film cropped to `window` (x, y, width, height)."""
     names = ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height")
     crop = "".join(f'<integer name="{name}" value="{value}"/>' for name, value in zip(names, window))
     with open(path, encoding="utf-8") as file:
         text = re.sub("<film [^>]*>", lambda film: film[0] + crop, file.read(), count=1)
-    # Beside the scene: it names its files relative to itself.
+    # Written beside the scene, because it names its files relative to itself.
     with tempfile.NamedTemporaryFile("w", suffix=".xml", dir=os.path.dirname(path), encoding="utf-8") as file:
         file.write(text)
         file.flush()
@@ -107,15 +103,15 @@ def cropped(path, window):
 
 
 def render(scene, spp, bands, first):
-    """BLOCKS independent images of a scene: block, row, column, band."""
+    """Renders BLOCKS independent images of a scene; axes: block, row, column, band."""
     images = [np.array(mi.render(scene, spp=spp, seed=first + k)).astype(float) for k in range(BLOCKS)]
     return np.stack([image.reshape(*image.shape[:2], -1)[..., :bands] for image in images])
 
 
 def compare(path, tolerance, out):
-    """Whether the two agree, and a line for each region."""
+    """Returns whether the two agree, and prints a line for each region."""
     begin = time.time()
-    # As it is written: shapes that are merged lose their names, by which they are labelled.
+    # Without merging: merged shapes would lose their names, which hold the labels.
     scene = mi.load_file(path, optimize=False)
     width, height = scene.sensors()[0].film().size()
     width, height = int(width), int(height)
@@ -151,7 +147,7 @@ def compare(path, tolerance, out):
     chance = FALSE_ALARM / (len(regions) * len(bands))
     for name, where, images in regions:
         a, b = mean[where].mean(0), images[:, where].mean((0, 1))
-        # One row a pixel: its variance, ours and theirs, and the degrees of freedom of each.
+        # One row per pixel: its variance, ours and theirs, and the degrees of freedom of each.
         variances = np.concatenate([variance[where], images[:, where].var(0, ddof=1) / BLOCKS])
         freedom = np.repeat([[SPP_OURS - 1], [BLOCKS - 1]], where.sum(), axis=0)
         sigma = np.sqrt(variances.sum(0)) / where.sum()

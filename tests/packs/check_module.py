@@ -1,4 +1,4 @@
-"""A packed dataset as `furrow.Dataset` and torch's loader read it: the same images as the archives hold."""
+"""Reads a packed dataset with `furrow.Dataset` and torch's loader: the images equal those in the archives."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""A packed dataset as webdataset and Hugging Face's datasets read it, its tables as pandas, polars and DuckDB do."""
+"""Reads a packed dataset with webdataset and Hugging Face's datasets, and its tables with pandas, polars and DuckDB."""
 
 import json
 import sys
@@ -35,7 +35,7 @@ assert sorted(seen) == sorted(key for key, record in records.items() if record["
 first = next(iter(seen.values()))
 assert first["rgb.png"].size == (48, records[first["__key__"]]["height"])
 
-# Random access by the index.
+# Random access through the archive index.
 for seal in root.glob("seals/*.json"):
     index = json.loads(seal.read_text())
     with open(root / "packs" / f"{index['pack']}.tar", "rb") as archive:

@@ -1,4 +1,4 @@
-"""JPEG photographs as `furrow` reads them. Arguments: a dataset in folders, the same in packs, its scene file, the module's folder."""
+"""Reads JPEG images with `furrow`. Arguments: a dataset in folders, the same in packs, its scene file, the module's folder."""
 
 import sys
 from pathlib import Path

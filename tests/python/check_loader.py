@@ -1,4 +1,4 @@
-"""A dataset in PyTorch's DataLoader. Argument: a dataset of two images."""
+"""Reads a dataset with PyTorch's DataLoader. Argument: a dataset of two images."""
 
 import sys
 
@@ -7,7 +7,7 @@ import torch
 
 
 def arrays(sample):
-    """What a batch holds: all but the record."""
+    """The arrays of a sample, without the record."""
     return {name: value for name, value in sample.items() if name != "record"}
 
 

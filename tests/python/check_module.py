@@ -1,4 +1,4 @@
-"""The module `furrow`: what it reads and renders is what the program writes. Arguments: a dataset of two images, a folder."""
+"""Checks that the module `furrow` reads and renders the same as the program. Arguments: a dataset of two images, a folder."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ for name in names[1:5]:
 assert first["plants"].dtype == first["leaves"].dtype == np.int32
 assert {p["number"] for p in first["record"]["plants"] if p["seen"]["pixels"]} == set(np.unique(first["plants"])) - {0}
 assert np.array_equal(data[-1]["image"], samples[1]["image"]) and not np.array_equal(first["image"], samples[1]["image"])
-first["image"][:] = 0  # Its memory is the caller's.
+first["image"][:] = 0  # The caller owns the memory.
 splits = [len(furrow.Dataset(dataset, split=name)) for name in ("train", "val", "test")]
 assert splits == [1, 1, 0], splits
 assert furrow.Dataset(dataset, split="val")[0]["record"]["split"] == "val"
@@ -40,7 +40,7 @@ for wrong, error in [(lambda: data[2], IndexError), (lambda: furrow.Dataset(fold
     else:
         raise AssertionError(error)
 
-# What is damaged is told as the module's own error, with its place.
+# Damaged files raise the module's own error with the position of the fault.
 def told(path: str, content: bytes) -> str:
     copy = folder / "broken"
     shutil.rmtree(copy, ignore_errors=True)
@@ -67,7 +67,7 @@ for path, content in [
     words = told(path, content)
     assert str(folder / "broken") in words and path.split("/")[-1] in words, words
 
-# Rendering leaves no file behind, and is what the program does with the same field.
+# Rendering leaves no files behind, and equals the program's output for the same field.
 rendered = furrow.render("field", index=1, spp=1, width=64)
 assert rendered["image"].shape[1] == 64 and rendered["record"]["index"] == "1", rendered["record"]
 assert not list(folder.iterdir()) or "out" not in [p.name for p in folder.iterdir()]
@@ -79,12 +79,12 @@ try:
 except furrow.Error as error:
     assert "did you mean field" in str(error), error
 else:
-    raise AssertionError("a scene that is not there")
+    raise AssertionError("a missing scene file was accepted")
 os.environ["FURROW_TRACE"] = "/nowhere/trace"
 try:
     furrow.render("field")
 except furrow.Error as error:
     assert "/nowhere/trace" in str(error), error
 else:
-    raise AssertionError("a program that is not there")
+    raise AssertionError("a missing program was accepted")
 assert "torch" not in sys.modules

@@ -1,4 +1,4 @@
-"""`furrow.stream`: the samples of a dataset, without it. Arguments: a scene file, a dataset of two images of it."""
+"""Checks that `furrow.stream` yields the samples of a dataset. Arguments: a scene file, a dataset of two images of it."""
 
 import os
 import subprocess
@@ -16,37 +16,37 @@ popen = subprocess.Popen
 
 
 def remembered(*arguments, **named):
-    """The program, remembered."""
+    """Starts the program and stores the process."""
     started.append(popen(*arguments, **named))
     return started[-1]
 
 
 furrow.subprocess.Popen = remembered
 
-# Twenty of a stream that has no end; then the program is gone, and so is what it kept.
+# Twenty samples of an endless stream; afterwards the program and its temporary files are gone.
 with tempfile.TemporaryDirectory() as folder:
     os.environ["TMPDIR"] = tempfile.tempdir = folder
     samples = furrow.stream(scene, threads=2, **SIZE)
     first = [next(samples) for _ in range(20)]
-    assert started[0].poll() is None, "an endless stream"
+    assert started[0].poll() is None, "the endless stream has ended"
     begin = time.monotonic()
     del samples
-    assert started[0].poll() is not None and time.monotonic() - begin < 30, "it runs on"
+    assert started[0].poll() is not None and time.monotonic() - begin < 30, "the program still runs"
     assert not os.listdir(folder), os.listdir(folder)
     os.environ.pop("TMPDIR")
     tempfile.tempdir = None
 assert [s["record"]["index"] for s in first] == list(range(20))
 
-# What a dataset of the same order has.
+# Compared with a dataset of the same order.
 for ours, other in zip(first, furrow.Dataset(dataset)):
     assert list(ours) == list(other), list(ours)
     assert ours["record"] == other["record"]
     for name in ours:
         if name != "record":
             assert ours[name].dtype == other[name].dtype and np.array_equal(ours[name], other[name]), name
-            ours[name][:] = 0  # Its memory is the caller's.
+            ours[name][:] = 0  # The caller owns the memory.
 
-# Parts, and an end.
+# Shards, and a finite stream.
 indices = [s["record"]["index"] for s in furrow.stream(scene, first=2, count=5, shard=(1, 2), **SIZE)]
 assert indices == [3, 5], indices
 assert started[1].returncode == 0
@@ -56,7 +56,7 @@ assert "nir" not in bare and "image" in bare, list(bare)
 bare = next(furrow.stream(scene, labels_only=True, count=1))
 assert "image" not in bare and bare["semantics"].ndim == 2 and bare["record"]["index"] == 0, list(bare)
 
-# The program's own words.
+# Errors contain the program's own message.
 for flags, words in [({"count": 0}, "0 is not in"), ({"shard": (3, 2)}, "k/N"), ({"without": ["none-such"]}, "none-such")]:
     try:
         next(furrow.stream(scene, **flags))
@@ -64,7 +64,7 @@ for flags, words in [({"count": 0}, "0 is not in"), ({"shard": (3, 2)}, "k/N"), 
         assert words in str(error), error
     else:
         raise AssertionError(flags)
-# Killed by someone else, it is an error and no end.
+# If the program is killed, the stream raises an error instead of ending.
 samples = furrow.stream(scene, **SIZE)
 next(samples)
 started[-1].kill()
@@ -74,11 +74,11 @@ try:
 except furrow.Error as error:
     assert "ended with -9" in str(error), error
 else:
-    raise AssertionError("a stream that was cut")
+    raise AssertionError("a truncated stream ended without an error")
 os.environ["FURROW_TRACE"] = "/nowhere/trace"
 try:
     next(furrow.stream(scene))
 except furrow.Error as error:
     assert "/nowhere/trace" in str(error), error
 else:
-    raise AssertionError("a program that is not there")
+    raise AssertionError("a missing program was accepted")

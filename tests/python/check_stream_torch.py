@@ -1,4 +1,4 @@
-"""The guide's example of training on a stream, at a small size. Arguments: its file, a scene file."""
+"""Runs the guide's example of training on a stream at a small size. Arguments: its file, a scene file."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ stream, seen = furrow.stream, []
 
 
 def small(_, **flags):
-    """The stream that the example asks for, of smaller images of another scene."""
+    """Replaces the example's stream by smaller images of another scene."""
     seen.append(flags)
     return stream(scene, **{**flags, "width": 64, "height": 48, "spp": 1, "threads": 1})
 
@@ -21,9 +21,9 @@ space = {"__name__": "example"}
 exec(compile(Path(example).read_text(), example, "exec"), space)
 assert space["step"] + 1 == space["STEPS"] and torch.isfinite(space["loss"]), space["loss"]
 
-# Workers share the fields among them: none comes twice.
+# Workers divide the fields among them: none occurs twice.
 class Indices(torch.utils.data.IterableDataset):
-    """Numbers of the images that the example's data set gives."""
+    """Indices of the images from the example's dataset."""
 
     def __iter__(self):
         fields = space["Fields"]("field")

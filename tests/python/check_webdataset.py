@@ -1,4 +1,4 @@
-"""An archive of three images, as the package webdataset reads it. Argument: the archive."""
+"""Reads an archive of three images with the package webdataset. Argument: the archive."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""A training's TensorBoard file, as TensorBoard reads it, against its `log.csv`: check_events.py RUN."""
+"""Compares a training's TensorBoard file, read by TensorBoard, with its `log.csv`: check_events.py RUN."""
 
 import csv
 import io
@@ -10,14 +10,14 @@ from tensorboard.compat.proto.event_pb2 import Event
 
 run = sys.argv[1]
 found, pictures, versions = {}, [], []
-# The loader checks the sums of every record, and stops at the first that is wrong.
+# The loader verifies the checksum of every record, and stops at the first invalid one.
 for raw in RawEventFileLoader(f"{run}/training.tfevents").Load():
     event = Event.FromString(raw)
     assert event.wall_time > 1.7e9
     if event.HasField("file_version"):
         versions.append(event.file_version)
     if event.HasField("session_log"):
-        # As TensorBoard's reader does it: what was told of this step and later ones counts no more.
+        # Like TensorBoard's reader: earlier values of this step and later ones are discarded.
         found = {key: value for key, value in found.items() if key[1] < event.step}
         pictures = [step for step in pictures if step < event.step]
     for value in event.summary.value:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 from sklearn import metrics
 
-# Each warns of the ratios of nothing that are asked for here.
+# scikit-learn warns about each undefined ratio requested here.
 warnings.simplefilter("ignore")
 
 
@@ -21,7 +21,7 @@ def same(ours, theirs, what):
 
 
 def check_class(ours, truth, predicted, name):
-    """Scores of one class, given as true and predicted masks."""
+    """Checks the scores of one class, given true and predicted masks."""
     p, r, f, _ = metrics.precision_recall_fscore_support(
         truth, predicted, pos_label=1, average="binary", zero_division=np.nan
     )
@@ -41,7 +41,7 @@ def check_scores(case):
     assert matrix.tolist() == case["confusion"], f"{matrix} against {case['confusion']}"
     same(ours["global_accuracy"], metrics.accuracy_score(truth, predicted), "GA")
     same(ours["class_accuracy"], metrics.balanced_accuracy_score(truth, predicted), "CA")
-    # Of the labels that are there, which is what it takes by itself.
+    # Averaged over the labels that occur, which is the default.
     same(ours["mean_iou"], metrics.jaccard_score(truth, predicted, average="macro"), "mean I/U")
     for k, scores in enumerate(ours["classes"]):
         check_class(scores, truth == k, predicted == k, f"class {k}")

@@ -1,9 +1,10 @@
-"""An exported ONNX file against what the program computes, and against `reference.py`.
+"""Compares an exported ONNX file with the program's output and with `reference.py`.
 
     check_onnx.py FOLDER...
 
-Where maxima are too close, nothing is decided, as told there. Each folder holds `network.onnx`, `model.json` and `weights.safetensors`, and `io.safetensors`: 8-bit pictures `images_K` (images x
-height x width x bands, as floats) and `scores_K`, what the program makes of them.
+Images with nearly equal maxima are not compared, as documented in `reference.py`. Each folder holds `network.onnx`, `model.json`
+and `weights.safetensors`, and `io.safetensors`: 8-bit images `images_K` (images x height x width x bands, as floats) and
+`scores_K`, the program's output for them.
 """
 
 import json
@@ -16,13 +17,13 @@ import reference
 from reference import TOLERANCE, run_numpy
 from safetensors.numpy import load_file
 
-# ONNX Runtime folds batch norms into convolutions and sums in blocks of its own: its rounding decides more often than that of two
-# programs that compute the same. So all decided pictures must agree, and of all pictures most.
+# ONNX Runtime folds batch norms into convolutions and sums in its own block order, so its rounding changes maxima more
+# often. All decided images must agree, and most of the others.
 reference.GAP = 2e-5
 
 
 def normalise(images, how):
-    """As the documentation says it, in double precision: images x bands x height x width, from 8-bit pixels."""
+    """Normalises 8-bit pixels as documented, in double precision, to images x bands x height x width."""
     x = images.transpose(0, 3, 1, 2).astype(np.float64) / 255
     if how == "band" or how == "image":
         axes = (2, 3) if how == "band" else (1, 2, 3)
@@ -62,13 +63,13 @@ def check(folder):
             apart = np.abs(scores - other)[decided].max(initial=0) / largest
             print(f"{card['network']} {images.shape}: {decided.sum()} decided, apart from {name} by {apart:.1e} of {largest:.2f}")
             assert apart < TOLERANCE, f"{folder}: case {case}: {apart} from {name}"
-            # A maximum in another place moves values near it; a wrong graph moves all.
+            # A maximum at another position changes values near it; a wrong graph changes all values.
             mean = np.abs(scores - other).mean(axis=(1, 2, 3)).max() / largest
             assert mean < 2e-3, f"{folder}: case {case}: {mean} from {name} in the mean"
         agree += (np.abs(scores - ours).max(axis=(1, 2, 3)) < TOLERANCE * largest).sum()
         all_pictures += len(images)
     print(f"{card['network']}: {decided_at_all} of {all_pictures} pictures decided, {agree} agree with the program")
-    assert decided_at_all > 0, f"{folder}: no picture decides anything"
+    assert decided_at_all > 0, f"{folder}: all images have nearly equal maxima"
     assert agree * 4 >= all_pictures * 3, f"{folder}: only {agree} of {all_pictures} pictures agree with the program"
 
 

@@ -1,4 +1,4 @@
-"""A TorchScript file in Python's torch against what the program computes: check_torchscript.py NETWORK.pt IO.safetensors."""
+"""Compares a TorchScript file, run in Python's torch, with the program's output: check_torchscript.py NETWORK.pt IO.safetensors."""
 
 import json
 import sys
@@ -8,7 +8,7 @@ import torch
 from safetensors.numpy import load_file
 
 module = torch.jit.load(sys.argv[1])
-# It follows its values to whatever device they are loaded on.
+# The code names no device, so it runs on the device to which its weights are loaded.
 assert "device" not in module.code, module.code
 facts = json.load(open(sys.argv[1] + ".json"))
 io = load_file(sys.argv[2])

@@ -1,23 +1,23 @@
-"""The networks, written once more from their papers and independently of `src/train`: parameter counts and values must agree.
+"""Independent implementation of the networks, written from their papers: parameter counts and outputs must agree with `crates/train/src`.
 
     reference.py [--engine numpy|torch] [--encoder FILE] FOLDER...
     reference.py --write-vit FILE
 
-Each folder holds `model.json` and `weights.safetensors` as `train fit` leaves them, and `io.safetensors`: `images` (images x bands x
-height x width, normalised) and `scores`, what the program makes of them. Two engines:
+Each folder holds `model.json` and `weights.safetensors`, written by `train fit`, and `io.safetensors`: `images` (images x bands x
+height x width, normalised) and `scores`, the program's output for them. Two engines:
 
-numpy   convolutions as sums over shifted pictures, everything in double precision.
+numpy   convolutions as sums over shifted images, everything in double precision.
 torch   `torch.nn` modules named as in the papers' public implementations (SegNet's encoder as torchvision's `vgg16_bn`, the
         U-Net's as torchvision's `resnet18`, its decoder as segmentation_models_pytorch's `UnetDecoder`), in double precision; the
         encoder of `lite-unet` is that of PyPI's `efficientnet-lite-pytorch` and that of `vit-unet` timm's
-        `vit_small_patch14_dinov2`, other people's code.
+        `vit_small_patch14_dinov2`, independent packages.
 
-With `--encoder` the values of the transformer of `vit-unet` are those of a file under timm's names, which `train` began with, whatever
-the program made of them; `--write-vit` writes such a file, of random values.
+With `--encoder`, the transformer weights of `vit-unet` are read from a file under timm's names, from which `train` started; the
+program's own weights are ignored. `--write-vit` writes such a file with random values.
 
-A pooling that puts maxima back where they lay is discontinuous: where the two largest of four values are nearly equal, rounding
-decides. Images in which that happens (a gap below GAP of the layer's deviation, in double precision) decide nothing and are counted
-apart; two images at least must decide.
+Max unpooling is discontinuous: if the two largest of four values are nearly equal, rounding decides the position. Images with such
+maxima (a gap below GAP of the layer's deviation, in double precision) are not compared and are counted separately; at least two
+images must be decided.
 """
 
 import json
@@ -35,7 +35,7 @@ GAP = 3e-6
 
 
 class Arrays:
-    """The operations in numpy; `learnt` counts the numbers that were asked for, `doubt` the images with close maxima."""
+    """The operations in numpy; `used` counts the parameters that were read, `doubt` marks the images with nearly equal maxima."""
 
     def __init__(self, weights):
         self.weights, self.used, self.doubt = weights, {}, None
@@ -76,7 +76,7 @@ class Arrays:
         windows = windows.transpose(0, 1, 2, 4, 3, 5).reshape(n, c, h // 2, w // 2, 4)
         ordered = np.sort(windows, axis=-1)
         gap = ordered[..., 3] - ordered[..., 2]
-        # Equal values that are no zeros of a ReLU would be as bad; zeros are the same wherever they lie.
+        # Only positive values count: zeros of a ReLU are equal wherever they are.
         close = ((gap < GAP * x.std()) & (ordered[..., 3] > 0)).any(axis=(1, 2, 3))
         self.doubt = close if self.doubt is None else self.doubt | close
         return ordered[..., 3], (windows.argmax(axis=-1), h, w)
@@ -121,7 +121,7 @@ def kernel_cubic(t, a=-0.75):
 
 
 def resized(x, height, width, kernel):
-    """Between pixels' centres, the edge's values beyond the edge, nothing averaged where it becomes smaller."""
+    """Resizes with sample points at pixel centres, edge values beyond the border, and no averaging when shrinking."""
     for axis, to in ((2, height), (3, width)):
         size = x.shape[axis]
         at = (np.arange(to) + 0.5) * size / to - 0.5
@@ -185,7 +185,7 @@ def numpy_unet(o, x):
     return numpy_decoder(o, x, skips, size)
 
 
-# EfficientNet-B0's table 1, as Lite has it: blocks, kernel, stride, expansion.
+# EfficientNet-B0, table 1, with the changes of Lite: blocks, kernel, stride, expansion.
 LITE = [(1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), (4, 5, 2, 6), (1, 3, 1, 6)]
 
 
@@ -292,7 +292,7 @@ def torch_networks():
                     layers += [nn.Conv2d(inputs, outputs, 3, padding=1), nn.BatchNorm2d(outputs), nn.ReLU()]
                     inputs = outputs
                 self.down.append(nn.Sequential(*layers))
-            # The mirror: each block ends with the width of the block before it.
+            # The decoder mirrors the encoder: each block ends with the width of the previous encoder block.
             self.up = nn.ModuleList()
             for i, block in reversed(list(enumerate(cfg))):
                 last = cfg[i - 1][-1] if i else classes
@@ -315,7 +315,7 @@ def torch_networks():
             return x
 
         def names(self):
-            """Our name of each module that has parameters, in their order."""
+            """Our names of the modules with parameters, in order."""
             convolutions = [f"enc{b}_{i}" for b, n in enumerate([2, 2, 3, 3, 3]) for i in range(n)]
             convolutions += [f"dec{b}_{i}" for b, n in enumerate([3, 3, 3, 2, 1]) for i in range(n)]
             return [f"{c}.{part}" for c in convolutions for part in ("conv", "bn")] + ["head.conv"]
@@ -417,7 +417,7 @@ def torch_networks():
             return names + ["head.conv"]
 
     class LiteUNet(Base):
-        """The encoder is the public one, of the package whose weights it begins with."""
+        """The encoder is that of the package that publishes its initial weights."""
 
         def __init__(self, bands, classes):
             super().__init__()
@@ -452,9 +452,9 @@ def torch_networks():
             return names + ["head.conv"]
 
     class VitUNet(Base):
-        """The encoder is timm's; where positions lie, and that its last norm is here twice, is written here."""
+        """The encoder is timm's; the layout of the position embedding and the duplicated last norm are defined here."""
 
-        twice = 384  # The class token's position, which is added to the token.
+        twice = 384  # timm has a position embedding of the class token; our weights have it added to the token, so it is not counted.
 
         def __init__(self, bands, classes):
             super().__init__()
@@ -498,10 +498,10 @@ def torch_networks():
             return names + ["head.conv"]
 
         def load_encoder(self, weights):
-            """Under timm's names, as `train` reads them; returns our names of all that was read."""
+            """Loads weights under timm's names, like `train`; returns our names of the loaded weights."""
             ours = {n: torch.tensor(a) for n, a in weights.items() if n.startswith(("stem", "enc"))}
             state = {"patch_embed.proj." + n[5:]: a for n, a in ours.items() if n.startswith("stem.")}
-            # The class token holds its position's embedding here.
+            # In our files the class token includes its position embedding.
             position = ours["enc.position"].flatten(2).transpose(1, 2)
             state["cls_token"] = ours["enc.class"].reshape(1, 1, 384)
             state["pos_embed"] = torch.cat([torch.zeros(1, 1, 384), position], dim=1)
@@ -532,7 +532,7 @@ def write_vit(path):
 
     torch.manual_seed(1)
     vit = timm.create_model("vit_small_patch14_dinov2", pretrained=False, num_classes=0)
-    # As far from zero and one as trained ones are.
+    # Random offsets, about as far from zero and one as in trained weights.
     save_file({name: array + 0.05 * torch.randn(array.shape) for name, array in vit.state_dict().items()}, path)
 
 
@@ -574,13 +574,13 @@ def check(folder, engine, encoder):
     apart = np.abs(scores - io["scores"]).max(axis=(1, 2, 3))
     largest = max(1.0, np.abs(scores).max())
     decided = np.ones(len(apart), bool) if doubt is None else ~doubt
-    assert decided.sum() >= 2, f"{folder}: only {decided.sum()} of {len(decided)} images decide anything"
+    assert decided.sum() >= 2, f"{folder}: only {decided.sum()} of {len(decided)} images have clearly separated maxima"
     worst = apart[decided].max() / largest
     print(
         f"{engine} {card['network']} {len(card['input']['bands'])} bands: {learnt} parameters, "
         f"{decided.sum()} of {len(decided)} images, apart by {worst:.1e} of {largest:.2f} (all images {apart.max() / largest:.1e})"
     )
-    assert np.abs(scores).std() > 1e-3, f"{folder}: the values say nothing"
+    assert np.abs(scores).std() > 1e-3, f"{folder}: the outputs are nearly constant"
     assert worst < TOLERANCE, f"{folder}: values differ by {worst} of the largest"
 
 

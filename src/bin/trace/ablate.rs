@@ -1,43 +1,47 @@
-//! `trace ablate`: one dataset, and the same fields again with one thing changed at a time.
+//! `trace ablate`: renders one dataset, and the same fields again with one change at a time.
 
 use crate::dataset::order::{self, ImageArgs};
 use crate::dataset::render::{WorkArgs, generate};
-use furrow::ablation::{Change, EDITS, Edit, FULL};
-use furrow::cli::signal::Signals;
-use furrow::dataset::generate::Shard;
-use furrow::dataset::{Set, finish};
-use furrow::job::Renderer;
-use furrow::output::write_atomically;
-use furrow::settings::{RenderOptions, Techniques};
-use furrow::train::table::variants;
-use furrow::{Error, Result, cli};
+use crate::variants::variants;
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::Set;
+use furrow_dataset::make::finish;
+use furrow_dataset::make::generate::Shard;
+use furrow_field::ablation::{Change, EDITS, Edit, FULL};
+use furrow_job::Renderer;
+use furrow_output::write_atomically;
+use furrow_render::settings::{RenderOptions, Techniques};
 use std::path::{Path, PathBuf};
 
-/// Makes a dataset in DIR/full and one for each edit in DIR/NAME: the same fields, plants, light and noise with one thing changed.
+/// Renders a dataset in DIR/full and one for each edit in DIR/NAME: the same fields, plants, light and noise with one
+/// change.
 ///
-/// All have the same files, and where geometry stays the same labels bit for bit. Stopped, killed or damaged, the same command makes
-/// what is missing. Each is a dataset like any other: `trace dataset verify` checks it, `trace dataset emit` sends it to a cluster.
+/// All have the same files and, if the geometry is unchanged, bit-identical labels. Repeating the command after a stop,
+/// crash or damage completes the datasets. Each one is an ordinary dataset: `trace dataset verify` checks it, `trace
+/// dataset emit` writes cluster jobs for it.
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(crate) struct Args {
     #[command(flatten)]
     images: ImageArgs,
-    /// Only these edits, separated by commas, beside the full dataset.
+    /// Only these edits in addition to the full dataset, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', conflicts_with = "except")]
     only: Vec<String>,
-    /// All edits but these, separated by commas.
+    /// All edits except these, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     except: Vec<String>,
-    /// Tell the edits, one a line, and make nothing.
+    /// List the edits, one per line, and render nothing.
     #[arg(long, exclusive = true)]
     list: bool,
-    /// Names of the sets of real images that DIR/ablation.ron, the experiment file for `train table`, asks for.
+    /// Names of the sets of real images that DIR/ablation.ron, the experiment file for `train table`, refers to.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', default_value = "real", value_parser = set_name)]
     real: Vec<String>,
-    /// Begin the datasets and render nothing: for shards, and for a cluster.
+    /// Create the datasets without rendering: for shards, and for a cluster.
     #[arg(long, conflicts_with = "shard")]
     plan: bool,
-    /// Render of each dataset the images whose number leaves k when divided by N, and finish nothing.
+    /// Render the images of each dataset whose number modulo N equals k, without finishing the datasets.
     #[arg(long, value_name = "k/N", value_parser = Shard::parse)]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -50,19 +54,19 @@ Examples:
   trace ablate --scene scenes/synthetic-d.ron --count 100 --out ab --width 480 --height 360 --spp 32
   trace ablate --scene scenes/synthetic-d.ron --count 100 --out ab --only no-sky,flat-leaves
 
-On several machines that share a folder, each with the same arguments:
-  trace ablate … --out ab --plan                        begin all datasets
-  trace ablate … --out ab --shard 0/8                   … to 7/8, each anywhere, as often as needed
-  trace ablate … --out ab                               what is missing, and what belongs to all images
+On several machines with a shared folder, each with the same arguments:
+  trace ablate … --out ab --plan                        create all datasets
+  trace ablate … --out ab --shard 0/8                   … to 7/8, each on any machine, repeated as needed
+  trace ablate … --out ab                               render what is missing, write lists and reports
 or one dataset at a time: trace dataset emit ab/no-sky --scheduler slurm --shards 8
 
-What it all means to a network, learnt from each and judged on real images:
+Train a network on each dataset and test it on real images:
   train table ab/ablation.ron --out ab/answer --real real=DIR
 
-100 images of 480 x 360 and 32 samples take two cores of 2 GHz about four hours with all edits, one of it for spp-256; learning from them,
-three seeds of 600 steps each, about three and a half more.";
+100 images of 480 x 360 and 32 samples with all edits take about four hours on two cores of 2 GHz, one of them for spp-256; training on them,
+with three seeds of 600 steps each, takes about three and a half more.";
 
-/// Makes what is missing; returns the paths of the files that belong to all images of a dataset.
+/// Renders what is missing. Returns the paths of the dataset-wide files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if args.list {
         cli::print(&list())?;
@@ -73,7 +77,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(out)?;
     let say = |text: String| {
         if !args.work.quiet {
-            furrow::tell!("{text}");
+            furrow_cli::tell!("{text}");
         }
     };
     let mut sets: Vec<Set> = Vec::new();
@@ -88,7 +92,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut paths = vec![page(out, &args.real)?];
     for (i, (edit, set)) in edits.iter().zip(&sets).enumerate() {
         if args.plan {
-            paths.push(set.folder.join(furrow::dataset::recipe::FILE));
+            paths.push(set.folder.join(furrow_dataset::model::recipe::FILE));
             continue;
         }
         say(format!("{} of {}: {}, {}", i + 1, edits.len(), edit.name, edit.about));
@@ -100,7 +104,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The edits, one a line.
+/// Lists the edits, one per line.
 fn list() -> String {
     let line = |edit: &Edit| {
         let labels = if edit.keeps_labels { "" } else { " (other labels)" };
@@ -109,8 +113,8 @@ fn list() -> String {
     [&FULL].into_iter().chain(EDITS).map(line).collect()
 }
 
-/// The full dataset and the edits that were asked for, in the order of the table. Where all are, those that would change nothing here
-/// or cannot be made here are left out, and told.
+/// Returns the full dataset and the selected edits, in the order of the table. If all edits are selected, those that
+/// would change nothing here or cannot be rendered here are left out with a message.
 fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
     for name in args.only.iter().chain(&args.except) {
         Edit::named(name)?;
@@ -126,16 +130,16 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
         if matches!(edit.change, Change::Rendering(_)) && options == full {
             if named {
                 return Err(Error::misuse(format!(
-                    "--only {}: the full dataset is drawn like that already",
+                    "--only {}: the full dataset is already rendered like this",
                     edit.name
                 ))
                 .help("leave it out, or give other arguments"));
             }
             if !args.work.quiet {
-                furrow::tell!("{} is left out: the full dataset is drawn like that", edit.name);
+                furrow_cli::tell!("{} is left out: the full dataset is already rendered like this", edit.name);
             }
         } else if let (false, Err(e)) = (named, possible(&options, &full)) {
-            furrow::tell!("warning: {} is left out: {e}", edit.name);
+            furrow_cli::tell!("warning: {} is left out: {e}", edit.name);
         } else {
             all.push(edit);
         }
@@ -143,7 +147,7 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
     Ok(all)
 }
 
-/// Whether this machine has what these options need beyond those of the full dataset.
+/// Checks that this machine supports what these options need beyond those of the full dataset.
 fn possible(options: &RenderOptions, full: &RenderOptions) -> Result<()> {
     let more = options.quality.denoise && !full.quality.denoise || options.engine != full.engine;
     if !more {
@@ -152,13 +156,13 @@ fn possible(options: &RenderOptions, full: &RenderOptions) -> Result<()> {
     Renderer::open(&RenderOptions { techniques: Techniques::default(), ..options.clone() }).map(drop)
 }
 
-/// Writes the experiment file for all datasets that lie in the folder. Networks learn from red, green and blue: where only near
-/// infrared differs there is nothing to learn.
+/// Writes the experiment file for all datasets in the folder. Networks are trained on red, green and blue, so datasets
+/// that differ only in near infrared are not included.
 fn page(out: &Path, reals: &[String]) -> Result<PathBuf> {
     let mut sets = Vec::new();
     for edit in [&FULL].into_iter().chain(EDITS) {
         let folder = out.join(edit.name);
-        if folder.join(furrow::dataset::recipe::FILE).is_file() && !matches!(edit.change, Change::Photograph(_)) {
+        if folder.join(furrow_dataset::model::recipe::FILE).is_file() && !matches!(edit.change, Change::Photograph(_)) {
             sets.push((Set::open(&folder)?, edit.about));
         }
     }
@@ -167,7 +171,7 @@ fn page(out: &Path, reals: &[String]) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// A name of a set in an experiment file.
+/// Parses the name of a set in an experiment file.
 fn set_name(text: &str) -> Result<String, String> {
     let good = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
     let taken = [&FULL].into_iter().chain(EDITS).any(|edit| edit.name == text);
@@ -177,12 +181,12 @@ fn set_name(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
-/// A dataset that `--plan` has begun. Shards that began it at the same time would meet each other's unfinished files.
+/// Opens a dataset created by `--plan`. Shards that created it concurrently would find each other's unfinished files.
 fn begun(folder: &Path) -> Result<Set> {
-    if folder.join(furrow::dataset::recipe::FILE).is_file() {
+    if folder.join(furrow_dataset::model::recipe::FILE).is_file() {
         return Set::open(folder);
     }
-    Err(Error::input("no dataset was begun here")
+    Err(Error::input("there is no dataset here")
         .in_file(folder)
-        .help("the same command with --plan instead of --shard begins all of them; then run the shards"))
+        .help("run the same command with --plan instead of --shard first, which creates all datasets"))
 }

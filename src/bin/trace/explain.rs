@@ -1,14 +1,15 @@
-//! `trace explain`: what may stand in scene files, species files and texture recipes.
+//! `trace explain`: reference of the fields of scene files, species files and texture recipes.
 
-use furrow::reference::{answer, distribution, scene, species, texture};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::reference::{answer, distribution, scene, species, texture};
 use std::path::PathBuf;
 
-/// What to explain.
+/// The path to explain.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// A path such as soil.clods or crops.rows.spacing_m, of a scene file unless it begins with species, texture or distribution; the tree of
-    /// all paths unless given.
+    /// Path such as soil.clods or crops.rows.spacing_m: in a scene file, unless it starts with species, texture or
+    /// distribution. Default: the tree of all paths.
     #[arg(value_name = "PATH")]
     path: Option<String>,
 }

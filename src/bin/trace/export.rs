@@ -1,29 +1,31 @@
-//! `trace export`: writes one field as a scene of another program.
+//! `trace export`: exports one field as a scene of another program.
 
 use crate::field::FieldArgs;
 use clap::ValueEnum;
-use furrow::ablation::FULL;
-use furrow::job::Threads;
-use furrow::output::{self, Export};
-use furrow::scene::Field;
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_field::Field;
+use furrow_field::ablation::FULL;
+use furrow_job::Threads;
+use furrow_output::Export;
 use std::path::{Path, PathBuf};
 
-/// What to write, and how.
+/// What to export.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     field: FieldArgs,
-    /// The other program's format.
+    /// Format of the export.
     #[arg(long, value_enum)]
     format: Format,
-    /// Folder for the files; `out/`, the scene file's name and the format's unless given.
+    /// Folder for the files. Default: `out/`, the scene file's name and the format's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Keep the joints of leaves and stems as skins with weights, so that plants bend in the other program; with `--format gltf`.
+    /// Export the joints of leaves and stems as skins with weights, so that plants can bend in the other program; with
+    /// `--format gltf`.
     #[arg(long)]
     skins: bool,
-    /// Points a square metre of surface; with `--format ply`, 100000 unless given.
+    /// Points per square metre of surface; with `--format ply`. Default: 100000.
     #[arg(long, value_name = "POINTS", value_parser = density)]
     density: Option<f64>,
     /// Print nothing but errors and the paths of the files.
@@ -31,21 +33,21 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// The formats. A further one is a file in `src/output/`, a name here and a line in [`Format::write`].
+/// Export formats. To add one: a file in `crates/output/src/`, a name here and a line in [`Format::write`].
 #[derive(Clone, Copy, ValueEnum)]
 enum Format {
-    /// glTF 2.0: scene.glb with meshes, textures, labels, sun, lamps and camera; for Blender and others.
+    /// glTF 2.0: scene.glb with meshes, textures, labels, sun, lamps and camera; for Blender and other programs.
     Gltf,
     /// Mitsuba 3: scene.xml with meshes, textures, lights and camera.
     Mitsuba,
-    /// A cloud of points on all surfaces, hidden ones too: points.ply with place, normal, colour and labels.
+    /// Point cloud of all surfaces, including hidden ones: points.ply with position, normal, colour and labels.
     Ply,
 }
 
-/// Points a square metre where none are asked for: 3 mm apart.
+/// Default number of points per square metre: 3 mm apart.
 const DENSITY: f64 = 1e5;
 
-/// Points a square metre.
+/// Parses a number of points per square metre.
 fn density(text: &str) -> Result<f64, String> {
     let points = text.parse().ok().filter(|points: &f64| (1.0..=1e9).contains(points));
     points.ok_or_else(|| "write points/m² from 1 to 1000000000, such as 100000".into())
@@ -54,9 +56,9 @@ fn density(text: &str) -> Result<f64, String> {
 impl Format {
     fn write(self, folder: &Path, field: &Field, density: f64) -> Result<Export> {
         match self {
-            Self::Ply => output::cloud::write(folder, field, density),
-            Self::Gltf => output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
-            Self::Mitsuba => output::mitsuba::write(folder, &field.scene, &field.provenance()),
+            Self::Ply => furrow_output::cloud::write(folder, field, density),
+            Self::Gltf => furrow_output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
+            Self::Mitsuba => furrow_output::mitsuba::write(folder, &field.scene, &field.provenance()),
         }
     }
 
@@ -65,22 +67,22 @@ impl Format {
     }
 }
 
-/// Grows a field and writes it down; returns the paths of the files.
+/// Builds a field and exports it. Returns the paths of the files.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join(args.format.name()));
     cli::check_folder(&out)?;
     let tell = |words: &str| {
         if !args.quiet {
-            furrow::tell!("{words}");
+            furrow_cli::tell!("{words}");
         }
     };
     if args.skins && !matches!(args.format, Format::Gltf) {
-        let words = format!("--skins says nothing with --format {}, which holds no joints", args.format.name());
+        let words = format!("--skins has no effect with --format {}, which has no joints", args.format.name());
         return Err(Error::misuse(words).help("use --format gltf, or leave --skins out"));
     }
     if args.density.is_some() && !matches!(args.format, Format::Ply) {
-        let words = format!("--density says nothing with --format {}, which holds surfaces", args.format.name());
+        let words = format!("--density has no effect with --format {}, which contains surfaces", args.format.name());
         return Err(Error::misuse(words).help("use --format ply, or leave --density out"));
     }
     let density = args.density.unwrap_or(DENSITY);

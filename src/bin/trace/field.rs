@@ -1,23 +1,25 @@
-//! Which field: the flags that every verb with a scene file shares.
+//! Selection of a field: flags shared by all commands that take a scene file.
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use furrow::ablation::Edit;
-use furrow::input::shipped;
-use furrow::job::{Field, SceneFile};
-use furrow::scene::drive::FIRST;
-use furrow::{Error, Result, cli};
+use furrow_base::input::shipped;
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_field::ablation::Edit;
+use furrow_field::drive::FIRST;
+use furrow_job::{Field, SceneFile};
 use std::path::{Path, PathBuf};
 
-/// A scene's distribution over fields, at one size.
+/// A scene file's distribution over fields, at one image size.
 #[derive(clap::Args)]
 pub(crate) struct SceneArgs {
-    /// Scene file (RON): what grows, what shines, who looks. A bare name such as `field` also finds those that ship.
+    /// Scene file (RON): soil, plants, lights and cameras. A bare name such as `field` also finds a shipped one.
     #[arg(long, value_name = "FILE", required = true, value_parser = scene_file())]
     scene: Option<PathBuf>,
-    /// Seed, instead of the scene file's.
+    /// Seed that overrides the scene file's.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
-    /// Image width in pixels; the field of view stays, the height follows unless given.
+    /// Image width in pixels. The field of view is unchanged, and the height scales with the width unless --height is
+    /// given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) width: Option<u32>,
     /// Image height in pixels.
@@ -25,22 +27,22 @@ pub(crate) struct SceneArgs {
     pub(crate) height: Option<u32>,
 }
 
-/// How much memory a field may take.
+/// Memory limit of a field.
 #[derive(clap::Args)]
 pub(crate) struct MemoryArgs {
-    /// Most memory that a field may take, GiB; three quarters of this machine's unless given. One that would take more is refused before
-    /// it grows. No file depends on it.
+    /// Maximum memory of a field, GiB. Default: three quarters of this machine's memory. A field that would need more
+    /// is refused before it is built. The files do not depend on it.
     #[arg(long = "memory", value_name = "GIB", value_parser = bytes)]
     pub(crate) bytes: Option<u64>,
 }
 
-/// Bytes, written in GiB.
+/// Parses a size in GiB; returns bytes.
 fn bytes(text: &str) -> Result<u64, String> {
     let gib = text.parse().ok().filter(|gib: &f64| (0.1..=1e6).contains(gib));
     gib.map(|gib| (gib * (1_u64 << 30) as f64) as u64).ok_or_else(|| "write GiB from 0.1 to 1000000, such as 24".into())
 }
 
-/// A scene file of the user's, or one that ships.
+/// Parses a path of a scene file, or the name of a shipped one.
 pub(crate) fn scene_file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(shipped::scene_file)
 }
@@ -51,7 +53,7 @@ impl SceneArgs {
         self.scene.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// Checks, before anything grows, that the scene file is there.
+    /// Checks, before any work starts, that the scene file exists.
     pub(crate) fn check(&self) -> Result<()> {
         cli::check_scene(self.path())
     }
@@ -64,17 +66,17 @@ pub(crate) struct FieldArgs {
     scene: SceneArgs,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// Which field of the distribution.
+    /// Index of the field in the distribution.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
-    /// On which day, counted from the emergence of the first crop; on the first of the scene file's days, or as its plants are written,
-    /// unless given.
+    /// Day, counted from the emergence of the first crop. Default: the first of the scene file's days, or else the
+    /// growth stages written in it.
     #[arg(long, value_name = "DAY", value_parser = clap::value_parser!(u32).range(0..=1000))]
     day: Option<u32>,
-    /// Which frame of a drive, from 0.
+    /// Frame of a drive, from 0.
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-    /// Which of the scene file's cameras, by its name; the first unless given.
+    /// Name of one of the scene file's cameras. Default: the first.
     #[arg(long, value_name = "NAME", default_value = FIRST)]
     camera: String,
 }
@@ -85,12 +87,12 @@ impl FieldArgs {
         self.scene.path()
     }
 
-    /// Checks, before anything grows, that the scene file is there.
+    /// Checks, before any work starts, that the scene file exists.
     pub(crate) fn check(&self) -> Result<()> {
         self.scene.check()
     }
 
-    /// Grows the field as an edit has it, of the scene file with these options; its warnings are told as soon as they are known.
+    /// Builds the field with an edit and these scene options. Warnings are passed to `tell` as soon as they are known.
     pub(crate) fn grow_as(
         &self,
         edit: &'static Edit,

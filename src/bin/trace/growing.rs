@@ -1,32 +1,33 @@
-//! What is under way of a field before its first sample: a line on a terminal; a log gets one now and then where the work has several parts.
+//! Progress display while a field is built, before its first sample: one line on a terminal, or an occasional line in a
+//! log.
 
-use furrow::scene::assemble::BuildProgress;
+use furrow_field::assemble::BuildProgress;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt;
 use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Between two looks at it.
+/// Refresh interval on a terminal.
 pub(crate) const EVERY: Duration = Duration::from_millis(100);
-/// Between two lines of a log.
+/// Minimum interval between lines of a log.
 pub(crate) const LOGGED: Duration = Duration::from_secs(30);
 
-/// A line that goes with it.
+/// A progress line.
 pub(crate) struct Line {
     progress: Arc<BuildProgress>,
     bar: ProgressBar,
-    /// When the log's last line was written; `None` where no log is wanted.
+    /// Time of the last line in the log; `None` if no log is written.
     log: Option<Mutex<Option<Instant>>>,
 }
 
 impl Line {
-    /// Begins it; it stays empty where nobody looks.
+    /// Starts the display; it stays hidden with `quiet` or without a terminal.
     pub(crate) fn begin(quiet: bool) -> Self {
         let progress = Arc::<BuildProgress>::default();
         let terminal = std::io::stderr().is_terminal();
         let bar = if terminal && !quiet { ProgressBar::new_spinner() } else { ProgressBar::hidden() };
-        bar.set_style(style("{spinner} {msg}{growing}  {elapsed} gone", &progress, |_| true));
+        bar.set_style(style("{spinner} {msg}{growing}  {elapsed} elapsed", &progress, |_| true));
         if !bar.is_hidden() {
             bar.enable_steady_tick(EVERY);
         }
@@ -34,34 +35,35 @@ impl Line {
         Self { progress, bar, log }
     }
 
-    /// Says what work is under way, fields that grow for it among it; in a log at once, and then as often as it has lines.
+    /// Shows the current step, together with fields being built for it. A log gets its first line at once, later ones
+    /// at intervals of [`LOGGED`].
     pub(crate) fn say(&self, work: &str) {
         self.bar.set_message(format!("{work}  "));
         let Some(log) = &self.log else { return };
         let mut last = log.lock().unwrap_or_else(PoisonError::into_inner);
         if last.is_none_or(|last| last.elapsed() >= LOGGED) {
             *last = Some(Instant::now());
-            furrow::tell!("{work}");
+            furrow_cli::tell!("{work}");
         }
     }
 
-    /// What it shows; fields are to tell it.
+    /// Returns the build progress that is displayed, for fields to update.
     pub(crate) fn progress(&self) -> &Arc<BuildProgress> {
         &self.progress
     }
 
-    /// Takes it away while something else is written.
+    /// Hides the line while something else is written.
     pub(crate) fn pause(&self, write: impl FnOnce()) {
         self.bar.suspend(write);
     }
 
-    /// Takes it away.
+    /// Removes the line.
     pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// A bar's style, which shows what is under way at `{growing}` of its template, as long as that is wanted.
+/// Style of a bar that shows the build progress at `{growing}` in its template, while `wanted` returns `true`.
 pub(crate) fn style(
     template: &str,
     progress: &Arc<BuildProgress>,
@@ -70,7 +72,7 @@ pub(crate) fn style(
     let progress = Arc::clone(progress);
     let growing = move |state: &ProgressState, out: &mut dyn fmt::Write| {
         if wanted(state) {
-            // It is written to memory.
+            // Writing to memory cannot fail.
             let _ = write!(out, "{progress}");
         }
     };

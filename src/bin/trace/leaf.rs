@@ -1,44 +1,48 @@
 //! `trace leaf`: cuts a leaf out of a photograph, as a texture for a species file.
 
-use furrow::output::{read_color_photo, write_atomically};
-use furrow::texture::{Cutting, cut_out, doubts, draw};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_optics::texture::{Cutting, cut_out, doubts, draw};
+use furrow_output::{read_color_photo, write_atomically};
 use std::path::PathBuf;
 
-/// Which photograph, and how.
+/// The photograph, and options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Photograph (PNG or JPEG) of one leaf on white paper or on soil, lying flat.
     photo: PathBuf,
-    /// The picture to write, a PNG with opacity: the blade upright, its base at the bottom.
+    /// Output image, a PNG with alpha channel: the blade upright, its base at the bottom.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// The base is at the wider end; the narrower one, the stalk's, is taken unless given.
+    /// The base is at the wider end. Default: at the narrower end, with the petiole.
     #[arg(long)]
     flip: bool,
-    /// Keep the petiole; it is cut off unless given, for a species file grows one of its own.
+    /// Keep the petiole. Default: it is cut off, because plants of a species file have petioles of their own.
     #[arg(long)]
     stalk: bool,
-    /// Keep holes; they are filled unless given, since mirrored light looks like holes.
+    /// Keep holes. Default: they are filled, because specular highlights look like holes.
     #[arg(long)]
     holes: bool,
-    /// Height of the picture, pixels; as in the photograph unless given.
+    /// Height of the output image, pixels. Default: as in the photograph.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(32..=8192))]
     height: Option<u32>,
-    /// Something grey or white in the photograph: x,y,width,height in pixels. Colours then are reflectances, and the species file may say
-    /// `calibrated: true`.
+    /// Grey or white reference in the photograph: x,y,width,height in pixels. Colours are then reflectances, and the
+    /// species file may use `calibrated: true`.
     #[arg(long, value_name = "X,Y,W,H", value_parser = cli::crop)]
-    grey: Option<furrow::geometry::Window>,
-    /// Reflectance of that: 0.18 of a grey card, about 0.85 of white paper.
+    grey: Option<furrow_base::geometry::Window>,
+    /// Reflectance of the reference: 0.18 for a grey card, about 0.85 for white paper.
     #[arg(long, value_name = "SHARE", default_value_t = 0.85, value_parser = share, requires = "grey")]
     reflectance: f32,
 }
 
 fn share(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|v: &f32| *v > 0.0 && *v <= 1.0).ok_or_else(|| "write a share above 0, at most 1".into())
+    text.parse()
+        .ok()
+        .filter(|v: &f32| *v > 0.0 && *v <= 1.0)
+        .ok_or_else(|| "write a fraction above 0, at most 1".into())
 }
 
-/// Cuts the leaf out; returns the picture's path.
+/// Cuts the leaf out. Returns the path of the image.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_png(&args.out, &args.photo)?;
     let (width, height, rgb) = read_color_photo(&args.photo)?;
@@ -46,14 +50,14 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let cutting = Cutting { flip: args.flip, stalk: args.stalk, holes: args.holes, height: args.height, grey };
     let leaf = cut_out(width, height, &rgb, &cutting).map_err(|e| e.in_file(&args.photo))?;
     for doubt in doubts(width, height, &rgb) {
-        furrow::tell!("warning: {}: {doubt}", args.photo.display());
+        furrow_cli::tell!("warning: {}: {doubt}", args.photo.display());
     }
-    furrow::tell!("{} × {} pixels; width over length of the blade {:.2}", leaf.width, leaf.height, aspect(&leaf));
+    furrow_cli::tell!("{} × {} pixels; the blade's width/length is {:.2}", leaf.width, leaf.height, aspect(&leaf));
     write_atomically(&args.out, &draw::encode(&leaf, "cut out of a photograph by furrow"))?;
     Ok(vec![args.out.clone()])
 }
 
-/// Width over length of what is opaque: `width_mm` over `blade_mm` in a species file.
+/// Ratio of width to length of the opaque part: `width_mm` divided by `blade_mm` in a species file.
 fn aspect(leaf: &draw::Drawn) -> f32 {
     let (mut lo, mut hi) = ([u32::MAX; 2], [0; 2]);
     for (i, _) in leaf.rgba.chunks_exact(4).enumerate().filter(|(_, p)| p[3] > 127) {

@@ -1,13 +1,13 @@
-//! Letters of 5 × 7 dots, for words in pictures. Small letters look like capitals, but for those of units.
+//! A 5 × 7 bitmap font for text in images. Lower-case letters are drawn as capitals, except m.
 
-/// Dots of a letter across.
+/// Width of a letter in dots.
 pub(crate) const WIDTH: usize = 5;
-/// Dots of a letter down.
+/// Height of a letter in dots.
 pub(crate) const HEIGHT: usize = 7;
-/// From one letter to the next.
+/// Distance between letters in dots.
 pub(crate) const PITCH: usize = 6;
 
-/// The rows of a letter from the top, the leftmost dot in bit 4; empty for what is not here.
+/// Rows of a letter from the top, with the leftmost dot in bit 4; empty for unsupported characters.
 pub(crate) fn glyph(letter: char) -> [u8; HEIGHT] {
     match if letter == 'm' { letter } else { letter.to_ascii_uppercase() } {
         'm' => [0x00, 0x00, 0x1a, 0x15, 0x15, 0x15, 0x15],
@@ -57,7 +57,8 @@ pub(crate) fn glyph(letter: char) -> [u8; HEIGHT] {
     }
 }
 
-/// Writes words into a picture of this width, from its top left corner on; a dot is so many pixels wide and high. What would lie outside is left out.
+/// Draws text into an image of this width, with its top left corner at (x, y). A dot is `dot` × `dot` pixels. Text
+/// outside the image is clipped.
 pub(crate) fn draw(
     pixels: &mut [[u8; 3]],
     width: usize,

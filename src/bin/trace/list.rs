@@ -1,21 +1,22 @@
-//! `trace species`, `trace cameras`, `trace soils`: what a scene file may name, one a line.
+//! `trace species`, `trace cameras`, `trace soils`: list the names that scene files can use, one per line.
 
-use furrow::input::shipped;
-use furrow::ron_file::RonFile;
-use furrow::sampling::{Purpose, Stream};
-use furrow::scene::desc::Role;
-use furrow::scene::shipped::all_species;
-use furrow::sensor::{AdcDesc, CameraDesc, MosaicDesc, SensorDesc};
-use furrow::soil::SoilColor;
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_base::input::shipped;
+use furrow_base::ron_file::RonFile;
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_cli::cli;
+use furrow_field::desc::Role;
+use furrow_field::shipped::all_species;
+use furrow_grow::soil::SoilColor;
+use furrow_optics::sensor::{AdcDesc, CameraDesc, MosaicDesc, SensorDesc};
 use std::path::PathBuf;
 
-/// Species: file, scientific and English name, EPPO code, role, growth stages.
+/// Lists the species: file, scientific and English name, EPPO code, role, growth stages.
 pub(crate) fn species() -> Result<Vec<PathBuf>> {
     let mut rows = Vec::new();
     let (all, faults) = all_species()?;
     for (_, fault) in faults {
-        furrow::tell!("warning: {fault}");
+        furrow_cli::tell!("warning: {fault}");
     }
     for species in all {
         let desc = &species.desc;
@@ -28,7 +29,7 @@ pub(crate) fn species() -> Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-/// Cameras: name, size, field of view, sensor.
+/// Lists the cameras: name, size, field of view, sensor.
 pub(crate) fn cameras() -> Result<Vec<PathBuf>> {
     let mut rows = Vec::new();
     for (name, model) in CameraDesc::NAMED {
@@ -46,13 +47,13 @@ pub(crate) fn cameras() -> Result<Vec<PathBuf>> {
             chip(&RonFile::of(name).parse()?, model.readout_ms),
         ]);
     }
-    let any = "the scene file says size, intrinsics, pose and sensor";
+    let any = "size, intrinsics, pose and sensor come from the scene file";
     rows.push(["Pinhole", "any size", "any field of view", "any sensor", any].map(str::to_owned));
     cli::print_rows(&rows)?;
     Ok(Vec::new())
 }
 
-/// What the sensor of a camera does, in words.
+/// Describes the sensor of a camera.
 fn chip(sensor: &SensorDesc, readout_ms: f64) -> String {
     let shutter =
         if readout_ms > 0.0 { format!("rolling shutter of {readout_ms} ms") } else { "global shutter".to_owned() };
@@ -64,7 +65,7 @@ fn chip(sensor: &SensorDesc, readout_ms: f64) -> String {
     format!("{mosaic}, {bits}, {shutter}")
 }
 
-/// Soils: measured colours with their reflectances, and pictures of layers.
+/// Lists the soils: measured colours with their reflectances, and layer textures.
 pub(crate) fn soils() -> Result<Vec<PathBuf>> {
     let mut rows: Vec<[String; 3]> = Vec::new();
     for color in SoilColor::ALL {

@@ -1,12 +1,13 @@
-//! `trace reference`: the pages of the documentation that are generated from the program.
+//! `trace reference`: writes the documentation pages that are generated from the program.
 
 use clap::CommandFactory;
-use furrow::output::write_files;
-use furrow::reference::{manual, scene, species, texture};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::reference::{manual, scene, species, texture};
+use furrow_output::write_files;
 use std::path::PathBuf;
 
-/// Where to.
+/// Output folder.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder for the pages.

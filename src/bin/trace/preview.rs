@@ -4,56 +4,56 @@ use crate::field::{MemoryArgs, scene_file};
 use crate::letters;
 use crate::quality::{samples, threads};
 use crate::render::plants;
-use furrow::cli::{self, signal::Signals};
-use furrow::job::{Renderer, Request, SceneFile, Threads};
-use furrow::output::{self, Picture};
-use furrow::render::Watch;
-use furrow::settings::{Quality, RenderOptions};
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_cli::cli::{self, signal::Signals};
+use furrow_job::{Renderer, Request, SceneFile, Threads};
+use furrow_output::Picture;
+use furrow_render::render::Watch;
+use furrow_render::settings::{Quality, RenderOptions};
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const PAPER: [u8; 3] = [251, 250, 247];
 const INK: [u8; 3] = [34, 38, 31];
-/// Between pictures, pixels.
+/// Gap between images, pixels.
 const GAP: usize = 8;
-/// Pixels of a letter's dot.
+/// Size of a letter's dot, pixels.
 const DOT: usize = 2;
-/// Height of the line of words above a picture.
+/// Height of the line of text above an image, pixels.
 const LINE: usize = DOT * letters::HEIGHT + GAP;
-/// Most fields on a sheet.
+/// Maximum number of fields on a sheet.
 const MOST: u64 = 400;
-/// Most pixels of a sheet.
+/// Maximum number of pixels of a sheet.
 const MOST_PIXELS: usize = 1 << 28;
 
-/// Which fields, and how they are drawn.
+/// Fields to render, and rendering options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Scene file (RON).
     #[arg(value_name = "FILE", value_parser = scene_file())]
     scene: PathBuf,
-    /// Indices of the fields: from the first up to, and without, the last.
+    /// Indices of the fields: from the first, up to but excluding the last.
     #[arg(long, value_name = "FROM..TO", value_parser = indices, default_value = "0..12")]
     indices: Range<u64>,
-    /// The sheet, a PNG file; `out/` and the scene file's name with `-sheet.png` unless given.
+    /// The sheet, a PNG file. Default: `out/` and the scene file's name with `-sheet.png`.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Seed, instead of the scene file's.
+    /// Seed that overrides the scene file's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Width of each picture in pixels; the field of view stays.
+    /// Width of each image in pixels. The field of view is unchanged.
     #[arg(long, default_value_t = 320, value_parser = clap::value_parser!(u32).range(16..=4096))]
     width: u32,
-    /// Pictures side by side.
+    /// Number of images side by side.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     columns: u32,
-    /// Samples a pixel.
+    /// Samples per pixel.
     #[arg(long, default_value_t = 8, value_parser = samples())]
     spp: u32,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// Threads; 0 for one on each core. The file does not depend on it.
+    /// Number of threads; 0 for one per core. The file does not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     /// Print nothing but errors and the path of the sheet.
@@ -61,24 +61,24 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// `0..12`.
+/// Parses a range such as `0..12`.
 fn indices(text: &str) -> std::result::Result<Range<u64>, String> {
     let range = text.split_once("..").and_then(|(from, to)| Some(from.trim().parse().ok()?..to.trim().parse().ok()?));
     match range {
         Some(range) if !range.is_empty() && range.end - range.start <= MOST => Ok(range),
-        Some(range) if !range.is_empty() => Err(format!("at most {MOST} fields stand on a sheet")),
-        _ => Err("write the first index and that behind the last, such as 0..12".into()),
+        Some(range) if !range.is_empty() => Err(format!("a sheet has room for at most {MOST} fields")),
+        _ => Err("write the first index and the one after the last, such as 0..12".into()),
     }
 }
 
-/// One field's picture.
+/// Image of one field.
 struct Shot {
     words: String,
     width: usize,
     pixels: Vec<[u8; 3]>,
 }
 
-/// Renders the fields and writes the sheet; returns its path.
+/// Renders the fields and writes the sheet. Returns its path.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_scene(&args.scene)?;
     let out = args.out.clone().unwrap_or_else(|| {
@@ -93,13 +93,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if !args.quiet
         && let Some(plants) = scene.plants_in_view(MOST)
     {
-        furrow::tell!("{}", plants.told());
+        furrow_cli::tell!("{}", plants.told());
     }
     let (mut shots, mut seed, mut told) = (Vec::new(), 0, BTreeSet::new());
     let mut warn = |words: &String| {
-        // Fields of one scene file have most of them in common.
+        // Most warnings are the same for all fields of a scene file.
         if !args.quiet && told.insert(words.clone()) {
-            furrow::tell!("warning: {words}");
+            furrow_cli::tell!("warning: {words}");
         }
     };
     for index in args.indices.clone() {
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let grown = field.grown();
         seed = grown.seed;
         if !args.quiet {
-            furrow::tell!("index {index}: {}", plants(grown.plants.len()));
+            furrow_cli::tell!("index {index}: {}", plants(grown.plants.len()));
         }
         grown.warnings.iter().for_each(&mut warn);
         shots.push(Shot {
@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         env!("CARGO_PKG_VERSION"),
         args.spp
     );
-    output::write_png(
+    furrow_output::write_png(
         &out,
         sheet.width as u32,
         (sheet.pixels.len() / sheet.width) as u32,
@@ -136,13 +136,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(vec![out])
 }
 
-/// A picture that is drawn into.
+/// An RGB image.
 struct Sheet {
     width: usize,
     pixels: Vec<[u8; 3]>,
 }
 
-/// Puts pictures side by side, each below its words.
+/// Arranges images in a grid, each below its text.
 fn compose(shots: &[Shot], columns: usize) -> Result<Sheet> {
     let columns = columns.min(shots.len()).max(1);
     let wide = shots.iter().map(|shot| shot.width.max(shot.words.len() * letters::PITCH * DOT)).max().unwrap_or(0);

@@ -1,51 +1,52 @@
-//! `trace --scene …`: one field, rendered, labelled and written; or one pixel of it, explained.
+//! `trace --scene …`: renders, labels and writes one field; or explains one of its pixels.
 
 use crate::field::FieldArgs;
 use crate::growing::Line;
 use crate::quality::{QualityArgs, TechniqueArgs, threads};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use furrow::ablation::{Edit, FULL};
-use furrow::cli::signal::Signals;
-use furrow::film::Film;
-use furrow::geometry::Window;
-use furrow::job::{Field, Image, Renderer, Request, Threads, View};
-use furrow::render::Watch;
-use furrow::settings::{Engine, Quality};
-use furrow::{Error, Result, cli};
+use furrow_base::geometry::Window;
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_field::ablation::{Edit, FULL};
+use furrow_job::{Field, Image, Renderer, Request, Threads, View};
+use furrow_render::film::Film;
+use furrow_render::render::Watch;
+use furrow_render::settings::{Engine, Quality};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// What to render, and how.
+/// What to render, and options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     field: FieldArgs,
     #[command(flatten)]
     quality: QualityArgs,
-    /// Folder for the files; `out/` and the scene file's name unless given.
+    /// Folder for the files. Default: `out/` and the scene file's name.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Threads; 0 for one on each core. The files do not depend on it.
+    /// Number of threads; 0 for one per core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     #[command(flatten)]
     technique: TechniqueArgs,
-    /// What the image shows.
+    /// Integrator of the image: path tracing, or a debug view.
     #[arg(long, default_value = View::Path.name(), value_parser = views())]
     integrator: View,
-    /// Change one thing of the field, by its name; `trace ablate --list` tells them.
+    /// Apply one edit to the field, by name; `trace ablate --list` lists them.
     #[arg(long, value_name = "NAME", conflicts_with = "enough")]
     edit: Option<String>,
-    /// Also write the image without its noise, beside the noisy one; needs Open Image Denoise, for `--integrator path`.
+    /// Also write a denoised image next to the noisy one; needs Open Image Denoise, with `--integrator path`.
     #[arg(long)]
     denoise: bool,
     /// Render only this part of the image: x,y,width,height in pixels.
     #[arg(long, value_parser = cli::crop, allow_hyphen_values = true, value_name = "X,Y,W,H")]
     crop: Option<Window>,
-    /// Explain one pixel instead of rendering: its label, surface and light.
+    /// Explain one pixel instead of rendering: its label, surface and radiance.
     #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out", "enough", "denoise"])]
     pixel: Option<(u32, u32)>,
     /// Print nothing but errors and the paths of the files.
@@ -58,17 +59,17 @@ fn views() -> impl TypedValueParser<Value = View> {
     PossibleValuesParser::new(values).map(|name| View::named(&name).unwrap_or_default())
 }
 
-/// Renders one field, or explains one pixel of it; returns the paths of the files.
+/// Renders one field, or explains one of its pixels. Returns the paths of the files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
     args.field.check()?;
     let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
     let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
     if args.pixel.is_some() && options.engine == Engine::Raster {
-        return Err(Error::misuse("--pixel says nothing with --engine raster, which has no rays")
+        return Err(Error::misuse("--pixel has no effect with --engine raster, which has no rays")
             .help("use --engine trace, or leave it out"));
     }
-    // Before hours are spent on what could not be rendered or written then.
+    // Checked first, before hours are spent on an image that could not be rendered or written.
     args.integrator.check(&options)?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder());
     if args.pixel.is_none() {
@@ -111,7 +112,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let paths = image.write(&out)?;
     let taken = begin.elapsed();
     if options.engine == Engine::Raster {
-        args.say(&format!("{}, drawn on {}", grown(args.field.path(), &field), renderer.kernels()));
+        args.say(&format!("{}, rendered on {}", grown(args.field.path(), &field), renderer.kernels()));
     }
     args.say(&summary(&image, &options.quality, sampled.into_inner(), taken, &out));
     for warning in missed(&options.quality, &image.film, taken) {
@@ -123,17 +124,17 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 impl Args {
     fn say(&self, text: &str) {
         if !self.quiet {
-            furrow::tell!("{text}");
+            furrow_cli::tell!("{text}");
         }
     }
 }
 
-/// So many plants, in words.
+/// Formats a number of plants.
 pub(crate) fn plants(number: usize) -> String {
     format!("{number} plant{}", if number == 1 { "" } else { "s" })
 }
 
-/// What was grown, and how long that took.
+/// Describes the field, with the times for growing its plants and building the BVH.
 fn grown(path: &Path, field: &Field) -> String {
     let (grow, build) = field.times();
     let scene = &field.grown().scene;
@@ -148,14 +149,14 @@ fn grown(path: &Path, field: &Field) -> String {
     )
 }
 
-/// How good the image is, how long it took, and where it lies.
+/// Summarises quality, time and output folder of the image.
 fn summary(image: &Image<'_>, quality: &Quality, samples: u64, taken: Duration, out: &Path) -> String {
     let drawn = image.times.sample.as_secs_f64();
     let taken = taken.as_secs_f64();
     if samples == 0 {
-        return format!("drawn in {drawn:.2} s; {taken:.1} s in all; files in {}", out.display());
+        return format!("rendered in {drawn:.2} s; {taken:.1} s in all; files in {}", out.display());
     }
-    // One sample has no spread to tell an error by.
+    // One sample per pixel gives no error estimate.
     let (_, mean, most) = image.film.samples();
     let error =
         if most > 1 { format!("{:.1} %", 100.0 * image.film.median_relative_error()) } else { "unknown".into() };
@@ -163,18 +164,18 @@ fn summary(image: &Image<'_>, quality: &Quality, samples: u64, taken: Duration, 
     format!(
         "{samples:.0} Msamples in {drawn:.1} s: {:.2} Msamples/s; {}median relative error {error}; {taken:.1} s in all; files in {}",
         samples / drawn,
-        if quality.is_fixed() { String::new() } else { format!("{mean:.0} samples a pixel; ") },
+        if quality.is_fixed() { String::new() } else { format!("{mean:.0} samples per pixel; ") },
         out.display()
     )
 }
 
-/// What was asked for and not reached.
+/// Warnings about goals that were not reached.
 fn missed(quality: &Quality, film: &Film, taken: Duration) -> Vec<String> {
     let mut all = Vec::new();
     let error = film.median_relative_error();
     if quality.target_error.is_some_and(|target| error > target) {
         let help = if quality.time.is_some() { "a longer --time or a larger --max-spp" } else { "a larger --max-spp" };
-        all.push(format!("the error is {:.2} %: {help} gets nearer", 100.0 * error));
+        all.push(format!("the error is {:.2} %: use {help} to reduce it", 100.0 * error));
     }
     if let Some(time) = quality.time.filter(|time| taken > *time) {
         all.push(format!("this took {:.1} s, longer than the {} s of --time", taken.as_secs_f64(), time.as_secs_f64()));
@@ -182,16 +183,16 @@ fn missed(quality: &Quality, film: &Film, taken: Duration) -> Vec<String> {
     all
 }
 
-/// A bar where the number of samples is known, else a count of them.
+/// Progress bar if the number of samples is known, otherwise a counter.
 fn progress(quality: &Quality, window: Window, quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
     let samples = u64::from(window.width()) * u64::from(window.height()) * u64::from(quality.spp);
     let (bar, template) = if quality.is_fixed() {
-        (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} gone, {eta} left")
+        (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
     } else {
-        (ProgressBar::new_spinner(), "{spinner} {human_pos} samples  {elapsed} gone")
+        (ProgressBar::new_spinner(), "{spinner} {human_pos} samples  {elapsed} elapsed")
     };
     bar.with_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

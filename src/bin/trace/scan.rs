@@ -1,24 +1,24 @@
-//! `trace scan`: what a LiDAR measures of one field.
+//! `trace scan`: simulates a LiDAR scan of one field.
 
 use crate::field::FieldArgs;
 use clap::builder::PossibleValuesParser;
-use furrow::ablation::FULL;
-use furrow::job::Threads;
-use furrow::output;
-use furrow::scene::assemble::Scanner;
-use furrow::sensor::{LIDARS, LidarDesc};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_field::ablation::FULL;
+use furrow_field::assemble::Scanner;
+use furrow_job::Threads;
+use furrow_optics::sensor::{LIDARS, LidarDesc};
 use std::path::PathBuf;
 
-/// Which field, and with which LiDAR.
+/// The field and the LiDAR.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     field: FieldArgs,
-    /// A LiDAR at the place of the first camera, upright, for a scene file without `lidar`.
+    /// LiDAR at the position of the first camera, upright, for a scene file without `lidar`.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(LIDARS))]
     lidar: Option<String>,
-    /// Folder for `scan.ply`; `out/`, the scene file's name and `scan` unless given.
+    /// Folder for `scan.ply`. Default: `out/`, the scene file's name and `scan`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print nothing but errors and the path of the file.
@@ -26,14 +26,14 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Grows a field about its LiDAR and scans it; returns the path of the file.
+/// Builds a field around its LiDAR and scans it. Returns the path of the file.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join("scan"));
     cli::check_folder(&out)?;
     let tell = |words: &str| {
         if !args.quiet {
-            furrow::tell!("{words}");
+            furrow_cli::tell!("{words}");
         }
     };
     let threads = Threads::all()?;
@@ -42,9 +42,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), tell)?;
     let (lidar, echoes) = field.scan()?;
     if echoes.is_empty() {
-        tell("warning: no pulse came back; see range, beams and min_intensity of the LiDAR: trace explain lidar");
+        tell("warning: there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }
-    let paths = output::scan::write(&out, field.grown(), lidar, &echoes)?;
+    let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes)?;
     let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());
     tell(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
     Ok(paths)

@@ -1,35 +1,37 @@
-//! `trace sequence`: all images of a drive through one field or several, or of their days, as a dataset.
+//! `trace sequence`: renders all images of a drive through one or several fields, or of several days, as a dataset.
 
 use crate::dataset::bill::{self, DryRunArgs};
 use crate::dataset::order::{ContentArgs, LookArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
-use furrow::cli::signal::Signals;
-use furrow::dataset::generate::Shard;
-use furrow::dataset::plan::Order;
-use furrow::dataset::{finish, format};
-use furrow::job::SceneFile;
-use furrow::scene::days::DaysDesc;
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::format;
+use furrow_dataset::make::finish;
+use furrow_dataset::make::generate::Shard;
+use furrow_dataset::make::plan::Order;
+use furrow_field::days::DaysDesc;
+use furrow_job::SceneFile;
 use std::path::PathBuf;
 
-/// Which drives, and how they are written.
+/// Drives to render, and dataset options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Days on which all images are taken, instead of the scene file's: `8..40/4` for every fourth from 8 to 40, `8,12,20` one by one. They
-    /// count from the emergence of the first crop.
+    /// Days on which all images are rendered, instead of the scene file's: `8..40/4` for every fourth from 8 to 40, or
+    /// `8,12,20`. They count from the emergence of the first crop.
     #[arg(long, value_name = "DAYS", value_parser = days)]
     days: Option<Days>,
-    /// How many fields are seen, from number 0.
+    /// Number of fields, starting with index 0.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     fields: u64,
     /// Folder of the dataset.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Formats to write beside the native one, separated by commas. Unless given colmap, flow, mots, nerf and tum, but for those that have
-    /// nothing to tell: colmap, flow and nerf where a field has one image a day, colmap and nerf with --labels-only.
+    /// Formats to write in addition to the native one, separated by commas. Default: colmap, flow, mots, nerf and tum,
+    /// except those that would be empty: colmap, flow and nerf if a field has one image per day, colmap and nerf with
+    /// --labels-only.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT", value_parser = formats())]
     format: Vec<String>,
     #[command(flatten)]
@@ -44,10 +46,10 @@ pub(crate) struct Args {
     dry: DryRunArgs,
 }
 
-/// Formats of a sequence for which none is named, each with whether it tells of several images of one day.
+/// Default formats of a sequence, each with a flag whether it needs several images of one day.
 const USUAL: [(&str, bool); 5] = [("colmap", true), ("flow", true), ("mots", false), ("nerf", true), ("tum", false)];
 
-/// Those of [`USUAL`] that have something to tell of fields of so many images each, on so many days.
+/// Returns those of [`USUAL`] that would not be empty, for fields with `captures` images each on `days` days.
 fn usual_formats(captures: u64, days: usize, labels_only: bool) -> Vec<String> {
     let a_day = captures / days.max(1) as u64;
     let tells = |(name, of_one_day): &(&str, bool)| {
@@ -57,7 +59,7 @@ fn usual_formats(captures: u64, days: usize, labels_only: bool) -> Vec<String> {
     USUAL.into_iter().filter(tells).map(|(name, _)| name.to_owned()).collect()
 }
 
-/// Days, in order.
+/// Days in ascending order.
 #[derive(Clone)]
 struct Days(Vec<u32>);
 
@@ -65,14 +67,14 @@ fn days(text: &str) -> Result<Days, String> {
     DaysDesc::read(text).map(Days).map_err(|e| e.to_string())
 }
 
-/// Makes what is missing of the dataset, or tells what it will cost.
+/// Renders what is missing of the dataset, or estimates its cost.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.scene.check()?;
     let days = args.days.as_ref().map_or(&[][..], |days| &days.0);
     let scene = SceneFile::open(args.scene.path())?.days(days);
     let captures = scene.captures();
     if captures == 1 && scene.seen_days().is_empty() {
-        return Err(Error::input("it takes one image of each field, which is no sequence")
+        return Err(Error::input("it renders one image of each field, which is not a sequence")
             .help("add `drive: (frames: 20, path: AlongRows())` to it, further `cameras`, or days with --days 8..40/4; see: trace explain drive")
             .in_file(args.scene.path()));
     }

@@ -2,44 +2,45 @@
 
 use crate::fit;
 use crate::machine::MachineArgs;
-use furrow::cli::signal::Signals;
-use furrow::train::adapt::Asked;
-use furrow::train::data::Selection;
-use furrow::train::deploy::pictures;
-use furrow::train::run::{self, TrainedModel};
-use furrow::train::torch::{Precision, device};
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_train::adapt::Asked;
+use furrow_train::data::Selection;
+use furrow_train::deploy::pictures;
+use furrow_train::run::{self, TrainedModel};
+use furrow_train::torch::{Precision, device};
 use std::path::PathBuf;
 
-/// Which network, on which photographs.
+/// Arguments of `train adapt`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run that it begins with, or the name of a network that ships (`train zoo`).
+    /// Folder of the run to start from, or name of a network that ships (`train zoo`).
     run: PathBuf,
-    /// PNG or JPEG files of any size, folders of them, or images of a set, whose labels are not read: DIR, DIR@PICK. May be given several
-    /// times.
+    /// Images without labels: PNG or JPEG files of any size, folders of them, or images of a dataset, DIR or DIR@PICK, whose labels are not
+    /// read. May be given several times.
     #[arg(long, value_name = "IMAGES", required = true)]
     images: Vec<PathBuf>,
-    /// Labelled images that it goes on learning beside them: the training set of the run unless given. May be given several times.
+    /// Labelled images to keep training on as well; by default the training set of the run. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     sets: Vec<Selection>,
-    /// Validation set: images with labels, whose loss, I/U and predictions are logged while it trains; the best pass is kept, and a training
-    /// ends early as that of the run does. Without one the last weights are kept. May be given several times.
+    /// Validation set: labelled images whose loss, I/U and predictions are logged during training. The best pass is kept, and
+    /// training stops early by the rule of the run. Without it the last weights are kept. May be given several times.
     #[arg(long, value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     val: Vec<Selection>,
     /// Folder of the adapted network.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Training steps.
+    /// Number of training steps.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
-    /// Learning rate at the start; a fifth of the run's unless given.
+    /// Initial learning rate; by default a fifth of the run's.
     #[arg(long, value_name = "RATE")]
     rate: Option<f64>,
-    /// Share of the predicted pixels of each class that are taken for labels, the surest first: above 0, at most 1.
+    /// Fraction of the predicted pixels of each class that are used as labels, the most confident first: above 0, at most 1.
     #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
     keep: f64,
-    /// Photographs that are used at most, evenly picked.
+    /// Maximum number of images used; they are picked evenly.
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     most: u32,
     /// Seed.
@@ -52,7 +53,7 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Adapts.
+/// Adapts the network; returns the paths of the files written.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;
@@ -74,7 +75,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         asked.adapt(&pictures, &args.machine.machine(), &args.out, callbacks)
     })?;
     if !args.quiet {
-        furrow::tell!("{}: {}", args.out.display(), fit::in_words(&results));
+        furrow_cli::tell!("{}: {}", args.out.display(), fit::in_words(&results));
     }
     let mut paths = [run::WEIGHTS, run::MODEL].map(|file| args.out.join(file)).to_vec();
     paths.extend(fit::write_page(&args.out)?);

@@ -1,23 +1,24 @@
 //! `train baseline`.
 
 use crate::report;
-use furrow::cli::signal::Signals;
-use furrow::dataset::classes::Classes;
-use furrow::train::baseline::{Kind, files};
-use furrow::train::data::{Band, Pick, Selection, Shape};
-use furrow::train::fit::settings::{self, parse_size};
-use furrow::train::run;
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::model::classes::Classes;
+use furrow_train::baseline::{Kind, files};
+use furrow_train::data::{Band, Pick, Selection, Shape};
+use furrow_train::fit::settings::{self, parse_size};
+use furrow_train::run;
 use std::path::PathBuf;
 
-/// Which baseline, fitted to which images, evaluated on which.
+/// Arguments of `train baseline`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// exg: pixels above an excess-green (ExG) threshold are crop; exg-size: of these, large connected components are crop, small ones
     /// weed.
     #[arg(value_parser = kind)]
     kind: Kind,
-    /// Training set that its thresholds are fitted to; may be given several times.
+    /// Training set to fit the thresholds to; may be given several times.
     #[arg(long, value_name = "DIR[@PICK]", required = true, value_parser = Selection::parse)]
     from: Vec<Selection>,
     /// Test set.
@@ -26,7 +27,7 @@ pub(crate) struct Args {
     /// Size that images are resized to, pixels.
     #[arg(long, value_name = "WxH", default_value = settings::default_of("size"), value_parser = parse_size)]
     size: (u32, u32),
-    /// Folder for what came out.
+    /// Folder for the report and the fitted baseline.
     #[arg(long, value_name = "DIR", default_value = "out/baseline")]
     out: PathBuf,
 }
@@ -51,9 +52,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let json = args.out.join("baseline.json");
     run::write_json(&json, &rule)?;
     let title = format!("{} on {}", args.kind.name(), args.set.folder.display());
-    let lead = "The score of an ExG threshold; a network that scores lower has learned nothing about shape.";
+    let lead = "Scores of an ExG threshold; a network that scores lower has learned nothing about shape.";
     let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept(), &Classes::default().colors())?;
     paths.push(json);
-    furrow::tell!("{}", report.summary().markdown().trim_end());
+    furrow_cli::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

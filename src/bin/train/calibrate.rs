@@ -1,21 +1,22 @@
 //! `train calibrate`.
 
 use crate::machine::MachineArgs;
-use furrow::train::data::Selection;
-use furrow::train::run::{self, TrainedModel};
-use furrow::train::session;
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_train::data::Selection;
+use furrow_train::run::{self, TrainedModel};
+use furrow_train::session;
 use std::path::PathBuf;
 
-/// Which network, on which images.
+/// Arguments of `train calibrate`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`).
+    /// Folder of a run, or name of a network that ships (`train zoo`).
     run: PathBuf,
-    /// Images with labels: the training set of a dataset unless it says DIR@PICK. May be given several times.
+    /// Images with labels: the training set of a dataset, or the images that DIR@PICK selects. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", required = true, value_parser = Selection::parse)]
     sets: Vec<Selection>,
-    /// Images that are used, evenly picked.
+    /// Number of images used; they are picked evenly.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u64).range(1..))]
     images: u64,
     /// Folder for the calibrated network.
@@ -25,7 +26,7 @@ pub(crate) struct Args {
     machine: MachineArgs,
 }
 
-/// Calibrates.
+/// Calibrates the network; returns the paths of the files written.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;

@@ -1,23 +1,24 @@
-//! `train report`: losses and validation scores of several runs over each other, on one page.
+//! `train report`: plots losses and validation scores of several runs together, on one page.
 
-use furrow::output::write_files;
-use furrow::report::Table;
-use furrow::report::chart::{Chart, Curve};
-use furrow::report::{Cell, number};
-use furrow::train::figure::Page;
-use furrow::train::fit::checkpoint::History;
-use furrow::train::fit::log;
-use furrow::train::run::{self, Identity, Results};
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_output::write_files;
+use furrow_report::Table;
+use furrow_report::chart::{Chart, Curve};
+use furrow_report::{Cell, number};
+use furrow_train::figure::Page;
+use furrow_train::fit::checkpoint::History;
+use furrow_train::fit::log;
+use furrow_train::run::{self, Identity, Results};
 use std::path::{Path, PathBuf};
 
-/// Name of the page.
+/// File name of the page.
 const FILE: &str = "losses.html";
 
-/// Which runs.
+/// Arguments of `train report`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folders of runs; of one that is not done, what its log tells so far.
+    /// Folders of runs; runs that are not done are plotted from their logs.
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Folder for losses.html.
@@ -25,13 +26,13 @@ pub(crate) struct Args {
     out: PathBuf,
 }
 
-/// A run as far as it is.
+/// A training run, finished or not.
 struct Run {
     name: String,
-    /// Name of its loss, where its plan tells.
+    /// Name of its loss, if it has a plan file.
     loss: Option<&'static str>,
     history: History,
-    /// How it ended; none where it is not done.
+    /// Final results; `None` if it is not done.
     results: Option<Results>,
 }
 
@@ -43,9 +44,9 @@ impl Run {
             None => log::read(folder)?,
         };
         let history = history.ok_or_else(|| {
-            Error::input("there is no training in this folder")
+            Error::input("there is no training run in this folder")
                 .in_file(folder)
-                .help("give folders of `train fit`, or those below runs/ of `train table`")
+                .help("give run folders of `train fit`, or folders in runs/ of `train table`")
         })?;
         let plan = folder.join(run::PLAN);
         let loss = plan.exists().then(|| run::read_json::<Identity>(&plan)).transpose()?;
@@ -62,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let page = Page {
         kind: "Training",
         title: "Losses of several runs",
-        lead: "Each line is a run. Losses of trainings with different losses or class weights are not of one scale; validation scores are.",
+        lead: "Each line is a run. Losses of runs with different loss functions or class weights are not comparable; validation scores are.",
         charts: &charts,
         tables: &[table(&runs)],
         ..Page::default()
@@ -70,7 +71,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     write_files(&args.out, &[(FILE, page.html()?.into_bytes())])
 }
 
-/// Training loss, validation loss and mean I/U; those that no run has are left out.
+/// Returns the charts of training loss, validation loss, learning rate and mean I/U; charts without data are left out.
 fn charts(runs: &[Run]) -> Vec<Chart> {
     let chart = |title: &str, upwards: &str, logarithmic, points: &dyn Fn(&History) -> Vec<(f64, f64)>| Chart {
         title: title.into(),
@@ -88,7 +89,7 @@ fn charts(runs: &[Run]) -> Vec<Chart> {
     let validation =
         |of: &History| of.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
     let scores = |of: &History| of.validation.iter().map(|pass| (pass.step as f64, 100.0 * pass.miou)).collect();
-    // One name where all have the same loss.
+    // The axis is named after the loss if all runs have the same one.
     let one = runs.first().and_then(|first| first.loss).filter(|loss| runs.iter().all(|run| run.loss == Some(loss)));
     let loss = one.unwrap_or("loss");
     let all = [
@@ -100,7 +101,7 @@ fn charts(runs: &[Run]) -> Vec<Chart> {
     all.into_iter().filter(|chart| !chart.curves.is_empty()).collect()
 }
 
-/// How each run ended, or how far it is.
+/// Returns a table of the state and results of each run.
 fn table(runs: &[Run]) -> Table {
     let mut table =
         Table::new("Runs", ["run", "state", "steps", "best step", "best mean I/U, %", "last loss", "minutes"]);

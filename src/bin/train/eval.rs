@@ -3,23 +3,24 @@
 use crate::inference::InferenceArgs;
 use crate::machine::MachineArgs;
 use crate::report;
-use furrow::cli::signal::Signals;
-use furrow::train::data::{Pick, Resize, Selection};
-use furrow::train::ensemble::Ensemble;
-use furrow::train::{session, zoo};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_train::data::{Pick, Resize, Selection};
+use furrow_train::ensemble::Ensemble;
+use furrow_train::{session, zoo};
 use std::path::PathBuf;
 
-/// Which network, on which images.
+/// Arguments of `train eval`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`), or a folder of runs with several seeds, whose probabilities are
-    /// averaged.
+    /// Folder of a run, name of a network that ships (`train zoo`), or folder of runs with several seeds, whose probabilities are averaged.
     run: PathBuf,
-    /// Test set: images with labels; all of the dataset unless it says DIR@PICK.
+    /// Test set: images with labels; all images of the dataset, or those that DIR@PICK selects.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     set: Selection,
-    /// Folder for the report; `eval/NAME` in the run's, after the set and its pick, unless given. Needed for a network that ships.
+    /// Folder for the report; by default `eval/NAME` in the run's folder, named after the dataset and its pick. Required for a network that
+    /// ships.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -66,6 +67,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         if trained.size() > 1 { format!("; the mean of {} runs", trained.size()) } else { String::new() }
     );
     let paths = report::write(&out, &title, &lead, &report, &shots.kept(), &card.classes.colors())?;
-    furrow::tell!("{}", report.summary().markdown().trim_end());
+    furrow_cli::tell!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

@@ -1,13 +1,14 @@
-//! `train explain`: what may stand in experiment files.
+//! `train explain`: explains the fields of experiment files.
 
-use furrow::reference::{answer, experiment};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::reference::{answer, experiment};
 use std::path::PathBuf;
 
-/// What to explain.
+/// Arguments of `train explain`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// A path such as sets.Scene.spp or hyperparameters.rate; the tree of all paths unless given.
+    /// Path of a field, such as sets.Scene.spp or hyperparameters.rate; by default the tree of all fields is printed.
     #[arg(value_name = "PATH")]
     path: Option<String>,
 }

@@ -1,37 +1,38 @@
 //! `train export`.
 
 use clap::ValueEnum;
-use furrow::train::deploy::{onnx, torchscript};
-use furrow::train::fit::settings::parse_size;
-use furrow::train::run::{self, TrainedModel};
-use furrow::train::zoo;
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_train::deploy::{onnx, torchscript};
+use furrow_train::fit::settings::parse_size;
+use furrow_train::run::{self, TrainedModel};
+use furrow_train::zoo;
 use std::path::PathBuf;
 
-/// Which network, as what.
+/// Arguments of `train export`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`).
+    /// Folder of a run, or name of a network that ships (`train zoo`).
     run: PathBuf,
-    /// What is written.
+    /// File format.
     #[arg(long, value_name = "NAME", default_value = "onnx")]
     format: Format,
-    /// The file, or the folder of `half`; network.onnx, network.pt or half in the run's folder unless given.
+    /// Output file, or output folder for `half`; by default network.onnx, network.pt or half in the run's folder.
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Size of the pictures that a TorchScript is for; the network's own unless given. ONNX takes any.
+    /// Image size of a TorchScript export; by default the network's training size. ONNX exports take images of any size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
 }
 
-/// A way to write a network down.
+/// Export format.
 #[derive(Clone, Copy, ValueEnum)]
 enum Format {
     /// ONNX, for ONNX Runtime and others.
     Onnx,
-    /// TorchScript, for libtorch and PyTorch; a JSON file beside it tells bands, classes and size.
+    /// TorchScript, for libtorch and PyTorch; bands, classes and size are written to a JSON file beside it.
     Torchscript,
-    /// A folder like the run's with weights in half precision: half as large, for keeping and passing on.
+    /// Run folder with weights in half precision: half the size, for archiving and distribution.
     Half,
 }
 
@@ -53,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
             .help(format!("give --out a file, such as {}", out.join(usual).display())));
     }
     if args.size.is_some() && !matches!(args.format, Format::Torchscript) {
-        return Err(Error::misuse("only a TorchScript is for pictures of one size").help("leave --size out"));
+        return Err(Error::misuse("--size applies to TorchScript exports only").help("leave --size out"));
     }
     match args.format {
         Format::Onnx => {

@@ -2,44 +2,46 @@
 
 use crate::machine::MachineArgs;
 use crate::report;
-use furrow::cli::signal::Signals;
-use furrow::train::data::{Band, Selection};
-use furrow::train::fit::checkpoint::ValidationPass;
-use furrow::train::fit::{Adaptation, Callbacks, Plan, Settings};
-use furrow::train::net::Network;
-use furrow::train::run::{self, Identity, Results};
-use furrow::train::session;
-use furrow::train::torch::{Precision, device};
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_train::data::{Band, Selection};
+use furrow_train::fit::checkpoint::ValidationPass;
+use furrow_train::fit::{Adaptation, Callbacks, Plan, Settings};
+use furrow_train::net::Network;
+use furrow_train::run::{self, Identity, Results};
+use furrow_train::session;
+use furrow_train::torch::{Precision, device};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Which network, on which training and validation sets.
+/// Arguments of `train fit`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Training set: the training images of a dataset unless it says DIR@PICK; *N oversamples them N times. May be given several times.
+    /// Training set: the training images of a dataset, or those that DIR@PICK selects; *N oversamples them N times. May be given
+    /// several times.
     #[arg(long = "set", value_name = "DIR[@PICK][*N]", required = true, value_parser = Selection::parse)]
     sets: Vec<Selection>,
-    /// Validation set; the validation images of the datasets that name no pick unless given.
+    /// Validation set; by default the validation images of the datasets given without a PICK.
     #[arg(long, value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     val: Vec<Selection>,
-    /// Folder of the run; with several seeds, of one run each.
+    /// Folder of the run; with several seeds, one subfolder per run.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The network.
+    /// Network architecture.
     #[arg(long, value_name = "NAME", help = network_help(), default_value = Plan::default().network.name(), value_parser = Network::named)]
     network: Network,
     #[command(flatten)]
     settings: Settings,
-    /// Seed, or several with commas between.
+    /// Seed, or a comma-separated list of seeds for one run each.
     #[arg(long, value_name = "N[,N]", default_values_t = [Plan::default().seed], value_delimiter = ',')]
     seed: Vec<u64>,
-    /// Run whose weights it begins with, to fine-tune them on other images.
+    /// Run whose weights initialize the network, to fine-tune them on other images.
     #[arg(long, value_name = "RUN")]
     init: Option<PathBuf>,
-    /// Most time, such as 30m or 8h; the learning rate then falls with the clock, so that no two runs are the same.
+    /// Time limit, such as 30m or 8h. The learning rate then follows the clock, so that runs are not reproducible.
     #[arg(long, value_name = "DURATION", value_parser = cli::time)]
     time: Option<Duration>,
     #[command(flatten)]
@@ -51,7 +53,7 @@ pub(crate) struct Args {
 
 fn network_help() -> String {
     let names: Vec<&str> = Network::ALL.iter().map(|network| network.name()).collect();
-    format!("The network: {}", names.join(", "))
+    format!("Network architecture: {}", names.join(", "))
 }
 
 impl Args {
@@ -61,7 +63,7 @@ impl Args {
             val => val.to_vec(),
         };
         let precision = Precision::named(&self.machine.precision, device::find(&self.machine.machine().device)?);
-        // Whoever goes on with a run goes on with its threads: they decide the last bits.
+        // A resumed run keeps its number of threads, on which the last bits depend.
         let before = folder.join(run::PLAN);
         let before: Option<Identity> = before.exists().then(|| run::read_json(&before)).transpose()?;
         let threads =
@@ -90,7 +92,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let plan = args.plan(*seed, &folder)?;
         let results = fit(&plan, args.init.as_deref(), &args.machine, &folder, args.quiet, signals)?;
         if !args.quiet {
-            furrow::tell!("{}: {}", folder.display(), in_words(&results));
+            furrow_cli::tell!("{}: {}", folder.display(), in_words(&results));
         }
         paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
         paths.extend(write_page(&folder)?);
@@ -112,7 +114,7 @@ pub(crate) fn fit(
     })
 }
 
-/// Has `work` train so many steps and shows its progress.
+/// Runs `work`, which trains for at most `steps` steps, and shows its progress.
 pub(crate) fn shown(
     steps: u64,
     quiet: bool,
@@ -130,7 +132,7 @@ pub(crate) fn shown(
             bar.set_message(format!("loss {mean:.4}"));
         }
         if bar.position() == 0 && done > 1 {
-            // Time left follows from the steps of this process alone.
+            // A resumed run: estimate the remaining time from the steps of this process only.
             bar.set_position(done);
             bar.reset_eta();
         }
@@ -148,12 +150,12 @@ pub(crate) fn shown(
             iou.join(", ")
         );
         if !quiet {
-            bar.suspend(|| furrow::tell!("{line}"));
+            bar.suspend(|| furrow_cli::tell!("{line}"));
         }
     };
     let warn = |words: &str| {
         if !quiet {
-            bar.suspend(|| furrow::tell!("warning: {words}"));
+            bar.suspend(|| furrow_cli::tell!("warning: {words}"));
         }
     };
     let callbacks = Callbacks { step: &step, validation: &validation, warn: &warn, stop: signals.heed() };
@@ -162,10 +164,11 @@ pub(crate) fn shown(
     results
 }
 
+/// Describes the result of a training run: steps, reason for ending, speed and best validation pass.
 pub(crate) fn in_words(results: &Results) -> String {
     let why = match results.ended.as_str() {
-        "patience" => ", no better validation pass for long",
-        "time" => ", the time was up",
+        "patience" => ", stopped early without a better validation pass,",
+        "time" => ", stopped at the time limit,",
         _ => "",
     };
     let best = match (results.best_step, results.history.best()) {
@@ -178,14 +181,14 @@ pub(crate) fn in_words(results: &Results) -> String {
     )
 }
 
-/// Writes the report of a training that is done, from what lies in its folder.
+/// Writes the report of a finished training run from the files in its folder.
 pub(crate) fn write_page(folder: &Path) -> Result<Vec<PathBuf>> {
     let Identity { plan, .. } = run::read_json(&folder.join(run::PLAN))?;
     let results: Results = run::read_json(&folder.join(run::RESULT))?;
     report::write_training(folder, &results, plan.hyper.loss.in_words(), &plan.classes.names(), &facts(&plan, &results))
 }
 
-/// What the report says of the plan.
+/// Returns the settings and the result that the report lists, as names and values.
 fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
     let sets = |selections: &[Selection]| selections.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     let bands: Vec<&str> = plan.shape.bands.iter().map(Band::name).collect();
@@ -207,7 +210,7 @@ fn facts(plan: &Plan, results: &Results) -> Vec<(String, String)> {
     }
     if let Some(Adaptation { photos, keep, .. }) = plan.adaptation {
         let words = format!(
-            "{photos} photographs without labels, the surest {keep} of the pixels of each class taken for labels"
+            "{photos} photographs without labels; the most confident {keep} of each class's pixels are used as labels"
         );
         facts.insert(2, fact("self-training", words));
     }

@@ -1,12 +1,13 @@
-//! `train reference`: the pages of the documentation that are generated from the program.
+//! `train reference`: writes the documentation pages that are generated from the program.
 
 use clap::CommandFactory;
-use furrow::output::write_files;
-use furrow::reference::{experiment, manual};
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::reference::{experiment, manual};
+use furrow_output::write_files;
 use std::path::PathBuf;
 
-/// Where to.
+/// Arguments of `train reference`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder for the pages.
@@ -14,7 +15,7 @@ pub(crate) struct Args {
     out: PathBuf,
 }
 
-/// Writes the pages.
+/// Writes the pages; returns their paths.
 pub(crate) fn run<C: CommandFactory>(args: &Args) -> Result<Vec<PathBuf>> {
     let pages = [("train.md", manual(C::command())), ("experiment.md", experiment().markdown("train"))];
     cli::check_folder(&args.out)?;

@@ -2,29 +2,29 @@
 
 use crate::inference::InferenceArgs;
 use crate::machine::MachineArgs;
-use furrow::cli::signal::Signals;
-use furrow::train::data::Band;
-use furrow::train::deploy::pictures;
-use furrow::train::deploy::predict::{self, Options, Predictions};
-use furrow::train::ensemble::Ensemble;
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_train::data::Band;
+use furrow_train::deploy::pictures;
+use furrow_train::deploy::predict::{self, Options, Predictions};
+use furrow_train::ensemble::Ensemble;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 
-/// Which network, on which images.
+/// Arguments of `train predict`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the run, or the name of a network that ships (`train zoo`), or a folder of runs with several seeds, whose probabilities are
-    /// averaged.
+    /// Folder of a run, name of a network that ships (`train zoo`), or folder of runs with several seeds, whose probabilities are averaged.
     run: PathBuf,
-    /// PNG or JPEG files of any size, folders of them, or images of a set: DIR, DIR@PICK.
+    /// PNG or JPEG files of any size, folders of them, or images of a dataset: DIR, DIR@PICK.
     #[arg(required = true, value_name = "IMAGES")]
     images: Vec<PathBuf>,
-    /// Folder for the predictions: NAME.png, classes by number, NAME.overlay.png, and prediction.json, which tells what they are.
+    /// Folder for the predictions: NAME.png (class numbers), NAME.overlay.png (classes over the image), and prediction.json (metadata).
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Where another band than red, green and blue lies: gray pictures of the photographs' names. Without it, that of a.jpg is
-    /// a.nir.png beside it, and that of rgb_1.png nir_1.png.
+    /// Folder of a band other than red, green and blue: gray images with the names of the colour images. By default the band nir of
+    /// a.jpg is a.nir.png beside it, and that of rgb_1.png is nir_1.png.
     #[arg(long = "band", value_name = "NAME=DIR", value_parser = band)]
     bands: Vec<(Band, PathBuf)>,
     /// Batch size: images that are predicted at once.
@@ -42,12 +42,12 @@ pub(crate) struct Args {
 fn band(text: &str) -> Result<(Band, PathBuf), String> {
     let (name, folder) = text.split_once('=').ok_or("write it as nir=DIR")?;
     match Band::parse(name)? {
-        band if band.is_color() => Err(format!("`{}` is the photograph's own", band.name())),
+        band if band.is_color() => Err(format!("`{}` is read from the image itself", band.name())),
         band => Ok((band, folder.into())),
     }
 }
 
-/// Predicts.
+/// Predicts the images; returns the paths of the files written.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = Ensemble::open(&args.run)?;
     args.inference.apply(&mut trained.card)?;
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;
     let passes = predict::passes(&trained.card, pictures.len());
     let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
-    let style = ProgressStyle::with_template("{bar:30} {pos} of {len} pictures, {eta} left");
+    let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let how = Options {
         precision: &args.machine.precision,
@@ -70,13 +70,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let predicted = predicted?;
     if !args.quiet && predicted.done > 0 {
         let each = predicted.seconds / predicted.done as f64;
-        let pictures = if predicted.done == 1 { "picture" } else { "pictures" };
-        furrow::tell!("{} {pictures}, {each:.3} s of the network for each", predicted.done);
+        let pictures = if predicted.done == 1 { "image" } else { "images" };
+        furrow_cli::tell!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
     }
     outcome(predicted, pictures.len())
 }
 
-/// The files, or what kept pictures from being read.
+/// Returns the paths of the files, or an error that lists the images that could not be read; `asked` is the number of images.
 fn outcome(mut predicted: Predictions, asked: usize) -> Result<Vec<PathBuf>> {
     match predicted.faults.len() {
         0 => Ok(predicted.paths),
@@ -84,7 +84,7 @@ fn outcome(mut predicted: Predictions, asked: usize) -> Result<Vec<PathBuf>> {
         n => {
             let faults: Vec<String> = predicted.faults.iter().map(ToString::to_string).collect();
             Err(Error::input(format!(
-                "{n} of {asked} pictures could not be read, the others have predictions:\n{}",
+                "{n} of {asked} images could not be read; the others have predictions:\n{}",
                 faults.join("\n")
             )))
         }

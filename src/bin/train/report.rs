@@ -1,24 +1,25 @@
-//! Reports of evaluations and trainings: tables, figure, page.
+//! Reports of evaluations and training runs: tables, figure and HTML page.
 
-use furrow::Result;
-use furrow::output::write_files;
-use furrow::report::chart::{Chart, Curve};
-use furrow::train::data::Band;
-use furrow::train::figure::{Page, Shot, Shots, sheet};
-use furrow::train::fit::checkpoint::History;
-use furrow::train::fit::log;
-use furrow::train::measure::Report;
-use furrow::train::run;
+use furrow_base::Result;
+use furrow_output::write_files;
+use furrow_report::chart::{Chart, Curve};
+use furrow_train::data::Band;
+use furrow_train::figure::{Page, Shot, Shots, sheet};
+use furrow_train::fit::checkpoint::History;
+use furrow_train::fit::log;
+use furrow_train::measure::Report;
+use furrow_train::run;
 use std::path::{Path, PathBuf};
 
-/// Images of the lowest mean I/U that the figure and the page of an evaluation show.
+/// Number of images with the lowest mean I/U that the figure and the page of an evaluation show.
 const WORST: usize = 8;
-/// Images beside them, spread over the set.
+/// Number of further images shown, evenly spread over the set.
 const SPREAD: usize = 4;
-/// Pixels that they are wide and high at most.
+/// Maximum width and height of the images shown, pixels.
 const LARGEST: u32 = 360;
 
-/// Images to look at of a set of so many: the worst by the mean I/U of so many classes, and some spread over the set.
+/// Returns a collector for the images to show of a set of `images` images: the worst by mean I/U over `classes` classes, and some
+/// spread over the set.
 pub(crate) fn shots(images: usize, bands: &[Band], classes: usize) -> Shots {
     Shots::new(images, SPREAD, LARGEST, bands).and_worst(WORST, classes)
 }
@@ -53,7 +54,7 @@ pub(crate) fn write(
     write_files(out, &files)
 }
 
-/// The curves of a training: its loss, which has a name, and its validation passes.
+/// Returns the charts of a training run: loss (`loss` is its name), learning rate and validation I/U.
 pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<Chart> {
     let chart = |title: &str, upwards: &str, curves: Vec<Curve>, logarithmic| Chart {
         title: title.into(),
@@ -89,7 +90,7 @@ pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<C
     charts
 }
 
-/// Writes `report.html`, `loss.svg` and `log.csv` of a training.
+/// Writes `report.html`, `loss.svg` and `log.csv` of a training run; returns their paths.
 pub(crate) fn write_training(
     out: &Path,
     results: &run::Results,

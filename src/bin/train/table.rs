@@ -3,58 +3,56 @@
 use crate::fit;
 use crate::machine::MachineArgs;
 use crate::report;
-use furrow::cli::signal::Signals;
-use furrow::dataset::classes::Classes;
-use furrow::dataset::generate::Shard;
-use furrow::output::write_atomically;
-use furrow::ron_file::RonFile;
-use furrow::train::baseline::files;
-use furrow::train::data::{Band, Pick, Selection};
-use furrow::train::figure::sheet;
-use furrow::train::fit::Plan;
-use furrow::train::measure::Report;
-use furrow::train::session::{self, Machine};
-use furrow::train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real, State};
-use furrow::train::torch::{Precision, device};
-use furrow::{Error, Result, cli};
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::make::generate::Shard;
+use furrow_dataset::model::classes::Classes;
+use furrow_output::write_atomically;
+use furrow_train::baseline::files;
+use furrow_train::data::{Band, Pick, Selection};
+use furrow_train::figure::sheet;
+use furrow_train::fit::Plan;
+use furrow_train::measure::Report;
+use furrow_train::session::{self, Machine};
+use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real, State};
+use furrow_train::torch::{Precision, device};
 use indicatif::HumanDuration;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// Runs an experiment as far as it is missing, and writes its tables.
+/// Arguments of `train table`.
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(crate) struct Args {
-    /// The experiment file.
+    /// Experiment file.
     page: PathBuf,
-    /// Folder of its sets, runs and tables; `out/` and the file's name, with that of the scale, unless given.
+    /// Folder of its datasets, runs and tables; by default `out/NAME` or `out/NAME-SCALE`, after the file and the scale.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Where a real dataset of the experiment lies: a dataset, or a folder with images/ and labels/. May be given several times.
+    /// Folder of a real dataset of the experiment: a dataset, or a folder with images/ and labels/. May be given several times.
     #[arg(long, value_name = "NAME=DIR", value_parser = Real::parse)]
     real: Vec<Real>,
-    /// Leave out what needs this set. May be given several times.
+    /// Leave out the training and test sets that need this dataset. May be given several times.
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
-    /// A scale of the experiment file, which makes the same experiment larger or smaller.
+    /// Scale of the experiment, as defined in its file: a larger or smaller variant.
     #[arg(long, value_name = "NAME")]
     scale: Option<String>,
-    /// Only the rows whose number leaves k when divided by N.
+    /// Run only the rows whose number modulo N is k.
     #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
     row: Shard,
-    /// Only a part of the work.
+    /// Do only one part of the work.
     #[arg(long, value_enum)]
     only: Option<Part>,
-    /// Print the sets and rows and how far they are, and do nothing. What is wrong with weights or missing of real sets is told.
+    /// Print the datasets and rows with their progress, and do nothing else. Invalid weights and missing real datasets are reported.
     #[arg(long)]
     dry_run: bool,
-    /// Most time of a training, such as 30m; its end is then where the clock says, and the tables are not the same twice.
+    /// Time limit of each training run, such as 30m. Runs then end by the clock, so that the tables are not reproducible.
     #[arg(long, value_name = "DURATION", value_parser = cli::time)]
     time: Option<Duration>,
-    /// Nothing: this program makes the sets itself. Kept for one version.
-    #[arg(long, value_name = "PATH", hide = true)]
-    trace: Option<PathBuf>,
     #[command(flatten)]
     machine: MachineArgs,
     /// Print nothing but errors, warnings and the paths of the tables.
@@ -63,7 +61,8 @@ pub(crate) struct Args {
 }
 
 const AFTER: &str = "\
-Stopped or killed, the same command goes on and ends with the same tables. On several machines that share a folder, the sets first:
+If it is stopped or killed, the same command resumes and ends with the same tables. On several machines that share a folder, make the
+datasets first:
   train table PAGE --out DIR --real NAME=DIR --only sets
   sbatch --array=0-7 --wrap 'train table PAGE --out DIR --real NAME=DIR --row $SLURM_ARRAY_TASK_ID/8'
   train table PAGE --out DIR --only tables";
@@ -73,39 +72,33 @@ Stopped or killed, the same command goes on and ends with the same tables. On se
 enum Part {
     /// Render and import the datasets.
     Sets,
-    /// Write the tables of what is there.
+    /// Write the tables of the results so far.
     Tables,
 }
 
-/// Does what is missing.
+/// Runs the missing parts of the experiment; returns the paths of the tables.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let page = RonFile::read(&args.page)?;
-    for warning in page.renamed(table::RENAMED) {
-        furrow::tell!("warning: {warning}");
-    }
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
     cli::check_folder(&out)?;
     let bound = Bound::new(experiment, &args.real, &args.without, &out)?;
     for name in &bound.left_out {
-        furrow::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
+        furrow_cli::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
     if args.only != Some(Part::Tables) {
         table::check_pixel_sizes(&bound, &page)?;
     }
     if args.dry_run {
         for error in [bound.check(), table::check_weights(&bound)].into_iter().filter_map(Result::err) {
-            furrow::tell!("warning: {error}");
+            furrow_cli::tell!("warning: {error}");
         }
-        furrow::tell!("{}\n", bound.listing()?.markdown().trim_end());
-        furrow::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
+        furrow_cli::tell!("{}\n", bound.listing()?.markdown().trim_end());
+        furrow_cli::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
         return Ok(Vec::new());
     }
-    if args.trace.is_some() {
-        furrow::tell!("warning: --trace says nothing any more: this program renders the sets itself");
-    }
     let machine = args.machine.machine();
-    // First of all: for a GPU the program replaces itself.
+    // Before any work: `device::find` may replace the process for a GPU.
     let precision = Precision::named(&args.machine.precision, device::find(&machine.device)?);
     let precision = precision.map_err(Error::input)?.name();
     let scale = args.scale.as_ref().map(|s| format!("// At the scale \"{s}\".\n")).unwrap_or_default();
@@ -131,28 +124,28 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             evaluate: &|predictor, on, picture| evaluate(predictor, on, picture, &machine, stop),
             training: &|row: &str, state: &State| {
                 if !args.quiet {
-                    furrow::tell!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
+                    furrow_cli::tell!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
                 }
             },
             tell: &|words| {
                 if !args.quiet {
-                    furrow::tell!("{words}");
+                    furrow_cli::tell!("{words}");
                 }
             },
-            warn: &|words| furrow::tell!("warning: {words}"),
+            warn: &|words| furrow_cli::tell!("warning: {words}"),
             stop,
         },
     )?;
     if !args.quiet {
         let (tables, _) = table::tables(&bound, &out)?;
         for (_, table) in tables.0.iter().filter(|(name, _)| *name != table::RUNS && args.only != Some(Part::Sets)) {
-            furrow::tell!("\n{}", table.markdown().trim_end());
+            furrow_cli::tell!("\n{}", table.markdown().trim_end());
         }
     }
     Ok(paths)
 }
 
-/// Evaluates a network or a baseline; some of the images go to a figure, beside ground truth, prediction and errors.
+/// Evaluates a network or a baseline. Writes a figure of some images with ground truth, prediction and errors to `picture`.
 fn evaluate(
     predictor: &Predictor<'_>,
     on: &Selection,

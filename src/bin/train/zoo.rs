@@ -1,11 +1,13 @@
 //! `train zoo`.
 
-use furrow::train::data::Band;
-use furrow::train::zoo;
-use furrow::{Result, cli};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_train::data::Band;
+use furrow_train::zoo;
 use std::path::PathBuf;
 
-/// Networks that ship: name, network, bands, classes, pixel size, what for. One that is damaged is told after the others.
+/// Prints the networks that ship: name, architecture, bands, classes, pixel size and description. Damaged ones are reported as errors after
+/// the others.
 pub(crate) fn run() -> Result<Vec<PathBuf>> {
     let row = |network: &zoo::Shipped| {
         let card = &network.model.card;
@@ -26,7 +28,7 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
     let mut damaged: Vec<_> = damaged.into_iter().filter_map(Result::err).collect();
     let Some(last) = damaged.pop() else { return Ok(Vec::new()) };
     for error in &damaged {
-        furrow::tell!("error: {error}");
+        furrow_cli::tell!("error: {error}");
     }
     Err(last)
 }

@@ -1,30 +1,32 @@
-//! Photographs beside the rendered stages of a species, and the measures of both.
+//! Photographs shown next to the rendered stages of a species, and outline measures of cut-outs.
 
 use super::outline::{Measures, Silhouette};
-use furrow::texture::{ColorSpace, Texture};
-use furrow::{Error, Result, input, output};
+use furrow_base::input;
+use furrow_base::{Error, Result};
+use furrow_optics::texture::{ColorSpace, Texture};
 use std::path::{Path, PathBuf};
 
-/// Silhouettes are measured at most this many pixels wide or high.
+/// Maximum width and height of a silhouette for measuring, pixels.
 pub(super) const LONGEST: usize = 200;
 /// Longer side of a photograph on the page, pixels.
 const SHOWN: u32 = 320;
 
-/// One photograph of a species.
+/// A photograph of a species.
 pub(super) struct Photograph {
     pub(super) name: String,
-    /// The stage that its name tells; without one it stands beside all, and is compared with all.
+    /// Growth stage from its name. Without one, it is shown next to all stages and compared with all.
     pub(super) bbch: Option<u32>,
     pub(super) size: (u32, u32),
     pub(super) jpeg: Vec<u8>,
-    /// Of a cut-out: what is transparent is no plant.
+    /// Measures of a cut-out, a photograph with transparent background.
     pub(super) measures: Option<Measures>,
 }
 
-/// The photographs of a species in a folder, by name: `NAME.png`, `NAME-3.png`, `NAME-bbch16.jpg`; `name` is its species file's.
+/// Reads the photographs of a species in a folder: `NAME.png`, `NAME-3.png`, `NAME-bbch16.jpg`, where `name` is the
+/// name of its species file.
 pub(super) fn photographs(folder: &Path, name: &str) -> Result<Vec<Photograph>> {
     if folder.exists() && !folder.is_dir() {
-        let error = Error::misuse("this is no folder, so no photographs lie in it").in_file(folder);
+        let error = Error::misuse("this is no folder, so it contains no photographs").in_file(folder);
         return Err(error.help("give --beside the folder of the photographs"));
     }
     let entries = std::fs::read_dir(folder).map_err(Error::reading(folder))?;
@@ -34,7 +36,7 @@ pub(super) fn photographs(folder: &Path, name: &str) -> Result<Vec<Photograph>> 
     files.iter().map(|file| photograph(file)).collect()
 }
 
-/// Whether a cut-out is there to compare a stage with.
+/// Returns `true` if there is a cut-out to compare a stage with.
 pub(super) fn compare(photographs: &[Photograph], bbch: u32) -> bool {
     photographs.iter().any(|p| p.measures.is_some() && p.bbch.is_none_or(|of| of == bbch))
 }
@@ -49,13 +51,13 @@ fn is_of(file: &Path, name: &str) -> bool {
     picture && stem(file).strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
 }
 
-/// The stage in a file's name.
+/// Growth stage in the name of a file.
 fn stage(file: &Path) -> Result<Option<u32>> {
     let name = stem(file).to_ascii_lowercase();
     let Some(code) = name.split('-').find_map(|part| part.strip_prefix("bbch")) else { return Ok(None) };
     let wrong = |_| {
         Error::input(format!("`bbch{code}` in this name is no growth stage"))
-            .help("end the name in a stage, such as -bbch16; one without `bbch` stands beside all stages")
+            .help("end the name with a stage, such as -bbch16; a name without `bbch` applies to all stages")
             .in_file(file)
     };
     code.parse().map(Some).map_err(wrong)
@@ -74,35 +76,35 @@ fn photograph(file: &Path) -> Result<Photograph> {
         over_white(pixels[from(i / size.0, size.1, height) * width as usize + from(i % size.0, size.0, width)])
     };
     let small: Vec<[u8; 3]> = (0..size.0 * size.1).map(at).collect();
-    let jpeg = output::encode_jpeg(size.0, size.1, &small, 88)?;
+    let jpeg = furrow_output::encode_jpeg(size.0, size.1, &small, 88)?;
     let inside = pixels.iter().map(|[.., a]| *a > 127).collect();
     let measures = cut_out(Silhouette { width: width as usize, height: height as usize, inside });
     Ok(Photograph { name: stem(file), bbch, size, jpeg, measures })
 }
 
-/// Checks that a JPEG has its end: decoders fill what is missing with gray.
+/// Checks that a JPEG is complete: decoders fill missing parts with gray.
 fn check_whole(file: &Path, bytes: &[u8]) -> Result<()> {
     if !bytes.starts_with(&[0xff, 0xd8]) {
         return Ok(());
     }
-    let color = output::decode_jpeg(file, bytes).map(drop);
-    color.or_else(|_| output::decode_gray_jpeg(file, bytes).map(drop))
+    let color = furrow_output::decode_jpeg(file, bytes).map(drop);
+    color.or_else(|_| furrow_output::decode_gray_jpeg(file, bytes).map(drop))
 }
 
-/// What a transparent pixel hides is no part of a picture: it lies on white paper.
+/// Composites a pixel over white, so that transparent colours do not show.
 fn over_white([r, g, b, a]: [u8; 4]) -> [u8; 3] {
     let a = u32::from(a);
     [r, g, b].map(|c| ((u32::from(c) * a + 255 * (255 - a) + 127) / 255) as u8)
 }
 
-/// The size at which a photograph is shown.
+/// Size of a photograph on the page.
 fn shown(width: u32, height: u32) -> (u32, u32) {
     let longest = width.max(height).max(1);
     let to = |n: u32| (n * SHOWN.min(longest) / longest).max(1);
     (to(width), to(height))
 }
 
-/// The measures of a picture with transparent parts.
+/// Measures of an image with transparent parts; `None` without any.
 fn cut_out(whole: Silhouette) -> Option<Measures> {
     if whole.inside.contains(&false) { Measures::of(&whole.shrunk(LONGEST)) } else { None }
 }
@@ -132,7 +134,8 @@ mod tests {
         assert_eq!(over_white([0, 0, 0, 51]), [204; 3]);
     }
 
-    /// Expected: a stage is compared with cut-outs of it and with those of no known stage; other photographs are only looked at.
+    /// Expected: a stage is compared with cut-outs of that stage and with those without a stage; other photographs are
+    /// only shown.
     #[test]
     fn a_stage_is_compared_with_cut_outs_of_it() {
         let photo = |bbch, cut_out: bool| Photograph {

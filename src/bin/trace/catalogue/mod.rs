@@ -1,9 +1,12 @@
-//! `trace catalogue`: every species at every stage, from above and from the side, with a scale, to be looked at plant by plant.
+//! `trace catalogue`: renders every species at every growth stage, from above and from the side, with scale bars, for
+//! inspection.
 //!
-//! A species is one sheet, one column a stage: above, the camera looks straight down; below, from some 30° above the ground. It is
-//! the same plant in all of them. A sheet holds the pictures with the stages' names and bars to scale, and says in its comment what it was made of; asked
-//! again, one that would come out the same is kept. With a folder of photographs they stand beside the stages, and the
-//! outlines of cut-outs and of rendered plants of the same stages are measured alike.
+//! Each species is one sheet with one column per stage: above, the camera looks straight down; below, from about 30°
+//! above the ground. All images of a column show the same plant. The sheet's PNG comment records what it was rendered
+//! from; a sheet that would come out the same is kept.
+//!
+//! With a folder of photographs these are shown next to the stages, and the outlines of cut-outs and of rendered plants
+//! of the same stages are measured in the same way.
 
 mod beside;
 mod outline;
@@ -13,61 +16,62 @@ mod view;
 
 use crate::quality::threads;
 use beside::Photograph;
-use furrow::accel::EmbreeAccel;
-use furrow::cli::{self, signal::Signals};
-use furrow::geometry::Window;
-use furrow::input::shipped;
-use furrow::integrator::{PathTracer, World};
-use furrow::math::Vec3;
-use furrow::output::{self, Picture};
-use furrow::render::{self, Settings, Watch};
-use furrow::ron_file::RENAMED;
-use furrow::sampling::Points;
-use furrow::scene::species_text::SpeciesFile;
-use furrow::scene::{Field, PlantRecord, assemble};
-use furrow::{Error, Result};
+use furrow_base::geometry::Window;
+use furrow_base::input::shipped;
+use furrow_base::math::Vec3;
+use furrow_base::sampling::Points;
+use furrow_base::{Error, Result};
+use furrow_cli::cli::{self, signal::Signals};
+use furrow_field::species_text::SpeciesFile;
+use furrow_field::{Field, PlantRecord, assemble};
+use furrow_output::Picture;
+use furrow_render::accel::EmbreeAccel;
+use furrow_render::integrator::{PathTracer, World};
+use furrow_render::render::{self, Settings, Watch};
 use outline::{Measures, Silhouette};
 use page::{Entry, Look, Stage};
 use sheet::{Bar, Column, Layout, Sheet, Shot};
 use std::path::{Component, Path, PathBuf};
 use view::{VIEW_DEG, View};
 
-/// From farther than this a field is as fine as its pixels, metres: what a tall plant covers is seen from far.
+/// Camera distance, metres, above which the field is detailed only to pixel size, because a tall plant covers a large
+/// area.
 const FAR: f32 = 3.0;
 
-/// Plants of a stage whose outlines are measured.
+/// Number of plants per stage whose outlines are measured.
 const MEASURED: u64 = 10;
 
-/// Where species files lie in a working directory that has some.
+/// Folder of species files within the working directory, if present.
 const SPECIES: &str = "scenes/species";
 
-/// What to show.
+/// Catalogue options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder for the sheets and for catalogue.html.
     #[arg(long, value_name = "DIR", default_value = "out/catalogue")]
     out: PathBuf,
-    /// Only these, by the names of their species files: sugar_beet,galium.
+    /// Only these species, by the names of their files: sugar_beet,galium.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
-    /// Folder of the species files; scenes/species unless given, or those that ship where there is no such folder.
+    /// Folder of the species files. Default: scenes/species, or the shipped species if there is no such folder.
     #[arg(long, alias = "pages", value_name = "DIR")]
     species_dir: Option<PathBuf>,
-    /// Folder of photographs to show beside the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png, sugar_beet-bbch16.jpg. One whose name
-    /// tells its stage is compared with that stage, others with all. Of PNGs with transparent parts the outlines are measured, and so are those of
-    /// ten rendered plants of each stage that they are compared with.
+    /// Folder of photographs to show next to the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png,
+    /// sugar_beet-bbch16.jpg. A photograph with a stage in its name is compared with that stage, others with all. The
+    /// outlines of PNGs with transparent parts are measured, and those of ten rendered plants of each stage they are
+    /// compared with.
     #[arg(long, value_name = "DIR")]
     beside: Option<PathBuf>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     spp: u32,
-    /// Side of each picture in pixels.
+    /// Width and height of each image in pixels.
     #[arg(long, default_value_t = 320, value_parser = clap::value_parser!(u32).range(64..=2048))]
     size: u32,
-    /// Which plants.
+    /// Seed of the plants.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Threads; 0 for one on each core. The files do not depend on it.
+    /// Number of threads; 0 for one per core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     /// Print nothing but errors and the paths of the files.
@@ -75,11 +79,11 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Draws the sheets that are missing or would differ, then the page that shows them; returns their paths.
+/// Renders the sheets that are missing or would differ, then writes the page. Returns their paths.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.check_folders()?;
     let pages = args.pages()?;
-    // All of them before anything is drawn: one that cannot be read does not cost the drawing.
+    // Read all of them first, so that an unreadable file does not waste rendering time.
     let photographs = pages.iter().map(|page| args.photographs(page)).collect::<Result<Vec<_>>>()?;
     let pool = render::pool(args.threads)?;
     let (mut entries, mut paths) = (Vec::new(), Vec::new());
@@ -89,23 +93,23 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         entries.push(entry);
     }
     let html = args.out.join("catalogue.html");
-    output::write_atomically(&html, page::html(&entries).as_bytes())?;
+    furrow_output::write_atomically(&html, page::html(&entries).as_bytes())?;
     paths.push(html);
     Ok(paths)
 }
 
 impl Args {
-    /// Sheets can be written, and take the place of no photograph.
+    /// Checks that sheets can be written and would not overwrite photographs.
     fn check_folders(&self) -> Result<()> {
         cli::check_folder(&self.out)?;
         if self.beside.as_deref().is_some_and(|beside| place(beside) == place(&self.out)) {
-            let words = "--out names the folder of the photographs: a sheet would take the place of one of its name";
+            let words = "--out names the folder of the photographs: a sheet could overwrite a photograph";
             return Err(Error::misuse(words).in_file(&self.out).help("name another folder with --out"));
         }
         Ok(())
     }
 
-    /// The species files that are asked for, in order of their names.
+    /// Selected species files, sorted by name.
     fn pages(&self) -> Result<Vec<PathBuf>> {
         let folder = self.folder()?;
         if !self.species.is_empty() {
@@ -119,13 +123,13 @@ impl Args {
         pages.sort();
         if pages.is_empty() {
             let error =
-                Error::input("there is no species file in this folder").help("those that ship lie in scenes/species");
+                Error::input("there is no species file in this folder").help("the shipped ones are in scenes/species");
             return Err(error.in_file(&folder));
         }
         Ok(pages)
     }
 
-    /// Where they lie.
+    /// Folder of the species files.
     fn folder(&self) -> Result<PathBuf> {
         match &self.species_dir {
             Some(given) => Ok(given.clone()),
@@ -134,24 +138,21 @@ impl Args {
         }
     }
 
-    /// The photographs that stand beside a species.
+    /// Photographs of a species.
     fn photographs(&self, page: &Path) -> Result<Vec<Photograph>> {
         let Some(folder) = &self.beside else { return Ok(Vec::new()) };
         beside::photographs(folder, &name(page))
     }
 
-    /// One species: its sheet's path, and its entry on the page.
+    /// Renders one species. Returns the path of its sheet, and its entry on the page.
     fn species(&self, page: &Path, photographs: Vec<Photograph>, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = SpeciesFile::read(page)?;
-        for warning in file.sources().iter().flat_map(|source| source.renamed(RENAMED)) {
-            furrow::tell!("warning: {warning}");
-        }
         let desc = file.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
             let bare = self.field((page, self.seed), stage.bbch, None)?;
             let plant = bare.plants.first().cloned();
-            let plant = plant.ok_or_else(|| Error::input("nothing grows").in_file(page))?;
+            let plant = plant.ok_or_else(|| Error::input("no plant grows").in_file(page))?;
             stages.push((plant, View::both(&points(&bare)), bare.provenance()));
         }
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
@@ -169,28 +170,28 @@ impl Args {
             }
             let sheet = layout.compose(&columns);
             let (width, height) = (sheet.width as u32, sheet.height as u32);
-            output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
+            furrow_output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
         }
         if !self.quiet {
-            furrow::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
+            furrow_cli::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
         let name = name(page);
         let is_stage = |bbch: &u32| stages.iter().any(|(plant, ..)| plant.bbch == *bbch);
         for photo in &photographs {
             if let Some(bbch) = photo.bbch.filter(|bbch| !is_stage(bbch)) {
-                furrow::tell!("warning: {} is not shown: {name} has no stage BBCH {bbch}", photo.name);
+                furrow_cli::tell!("warning: {} is not shown: {name} has no stage BBCH {bbch}", photo.name);
             }
         }
         let measures = |plant: &PlantRecord| {
             if beside::compare(&photographs, plant.bbch) { self.measures(page, plant.bbch) } else { Ok(None) }
         };
         let measures = stages.iter().map(|(plant, ..)| measures(plant)).collect::<Result<Vec<_>>>()?;
-        let (width, height, pixels) = output::read_rgb(&path)?;
+        let (width, height, pixels) = furrow_output::read_rgb(&path)?;
         let sheet = Sheet { width: width as usize, height: height as usize, pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, views, _))| {
             let look = |(k, view): (usize, &View)| {
                 let shot = layout.part(&sheet, (i, k));
-                Ok(Look { jpeg: output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
+                Ok(Look { jpeg: furrow_output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
             };
             let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
             Ok(Stage { plant, looks, measures: measures[i] })
@@ -199,16 +200,16 @@ impl Args {
         Ok((path, Entry { desc, stages, photographs }))
     }
 
-    /// The field with one plant, on bare ground where somebody looks, else on none.
+    /// Builds a field with one plant: on bare ground if it is rendered, otherwise without ground.
     fn field(&self, (page, seed): (&Path, u64), bbch: u32, view: Option<&View>) -> Result<Field> {
         let text = |path: &Path| format!("{:?}", path.to_string_lossy());
         let none = || (VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new());
         let (angle, pose, soil) = view.map_or_else(none, |view| {
-            // One that ships: a species file may lie anywhere.
+            // A shipped texture, because the species file may be anywhere.
             let layer = r#"(albedo: "dirt.png", height: "dirt.height.png", size_m: 0.5, height_mm: (-0.6, 0.6))"#;
             let bare = "relief: (rms_mm: 0.4, tilt_deg: 0), moisture: (mean: 0.25), clods: (over_5mm_per_m2: 0), \
                         litter: (straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)";
-            // The camera's foot stands nearly as far from the plant as the camera, and the ground behind is seen too.
+            // The camera is nearly as far away horizontally, and the ground behind the plant is visible too.
             let far = if view.distance > FAR {
                 format!("reach_m: {}, detail: ByPixel,", (3.0 * view.distance).min(100.0))
             } else {
@@ -229,7 +230,7 @@ impl Args {
         assemble::field_of(&scene, &assemble::Options { seed: Some(seed), ..Default::default() })
     }
 
-    /// Mean measures of a stage's outline from above, of [`MEASURED`] plants.
+    /// Mean measures of the outline of a stage from above, over [`MEASURED`] plants.
     fn measures(&self, page: &Path, bbch: u32) -> Result<Option<Measures>> {
         let mut all = Vec::new();
         for seed in self.seed..self.seed + MEASURED {
@@ -248,7 +249,7 @@ impl Args {
         Ok(Measures::mean(&all))
     }
 
-    /// One picture.
+    /// Renders one image.
     fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Shot> {
         let field = self.field((page, self.seed), bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
@@ -261,7 +262,7 @@ impl Args {
     }
 }
 
-/// A folder whatever names it: without links and `..`, also where it is not there yet.
+/// Canonical path of a folder that may not exist yet: without links and `..`.
 fn place(folder: &Path) -> PathBuf {
     let mut place = PathBuf::new();
     for part in std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()).components() {
@@ -274,7 +275,7 @@ fn place(folder: &Path) -> PathBuf {
     place
 }
 
-/// The name of a species file.
+/// Name of a species, from its file.
 fn name(page: &Path) -> String {
     page.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -283,13 +284,13 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|w| w == part)
 }
 
-/// Where the corners of a field's plants are.
+/// Vertex positions of all plants of a field.
 fn points(field: &Field) -> Vec<Vec3> {
     let plants = field.scene.parts.iter().filter(|part| part.tag.plant > 0);
     plants.flat_map(|part| &part.mesh.positions).copied().collect()
 }
 
-/// A bar of a round length to the scale of a picture so many pixels wide.
+/// Scale bar of a round length for an image of `size` pixels.
 fn bar(view: &View, size: usize) -> Bar {
     let mm = page::round_length(page::LONGEST * view.width_mm());
     Bar { pixels: (size as f32 * mm / view.width_mm()).round() as usize, words: format!("{mm} mm") }
@@ -299,8 +300,8 @@ fn bar(view: &View, size: usize) -> Bar {
 mod tests {
     use super::*;
 
-    /// Rationale: tall plants were cut off from above, where the camera stood among their leaves. Expected: no pixel of the picture's rim is of
-    /// the plant, and the plant comes near to the rim, also one whose only blade points away.
+    /// Rationale: tall plants were cut off from above, where the camera was among their leaves. Expected: no border
+    /// pixel shows the plant, and the plant extends nearly to the border, even if its only blade points away.
     #[test]
     fn whole_plants_are_in_the_picture() {
         let args = Args {

@@ -1,34 +1,34 @@
-//! Measures of a plant's outline as it is seen from above, the same of a photograph's cut-out and of a rendered plant.
+//! Measures of a plant's outline seen from above, for cut-outs of photographs and for rendered plants.
 
-/// What a petiole is narrower than, of the diameter of the smallest enclosing circle.
+/// Maximum width of a petiole relative to the diameter of the smallest enclosing circle.
 const PETIOLE: f32 = 0.085;
-/// Blades smaller than this share of the largest are not measured.
+/// Blades smaller than this fraction of the largest one are not measured.
 const LEAST: f32 = 0.3;
-/// A maximum counts if the distance falls by this share of the largest on both sides of it.
+/// A maximum counts if the distance falls by this fraction of the largest distance on both sides of it.
 const FALL: f32 = 0.12;
-/// Directions of the profile.
+/// Number of directions of the radial profile.
 const DIRECTIONS: usize = 180;
 
-/// Names of the measures, as [`Measures::values`] has them, and what each is.
+/// Names of the measures in the order of [`Measures::values`], with explanations.
 pub(super) const MEANINGS: [(&str, &str); 5] = [
-    ("blade L/W", "length over width of a blade: the sides of the smallest rectangle about it; mean over the blades"),
+    ("blade L/W", "ratio of length to width of a blade's minimum-area bounding rectangle; mean over the blades"),
     (
         "blade solidity",
-        "area of a blade over that of its convex hull, which lobes, teeth and bends lower; mean over the blades",
+        "area of a blade divided by that of its convex hull, reduced by lobes, teeth and bends; mean over the blades",
     ),
-    ("solidity", "area of the plant over that of its convex hull"),
+    ("solidity", "area of the plant divided by that of its convex hull"),
     (
         "arms",
-        "leaves, or bundles of leaves, that stand out: maxima of the distance from the centroid to the outline, direction by direction",
+        "protruding leaves or bundles of leaves: maxima over all directions of the distance from centroid to outline",
     ),
-    ("share of circle", "area of the plant over that of the smallest enclosing circle"),
+    ("share of circle", "area of the plant divided by that of the smallest enclosing circle"),
 ];
 
-/// What [`MEANINGS`] calls a blade.
-pub(super) const BLADES: &str = "Blades are what is left when parts narrower than 8.5 % of that circle's diameter, such as petioles, are taken away (morphological opening). \
-     Blades that lie over each other count as one; those below 30 % of the largest one's area are left out.";
+/// Explanation of blades for [`MEANINGS`].
+pub(super) const BLADES: &str = "Blades are the parts left after removing everything narrower than 8.5 % of that circle's diameter, such as petioles (morphological opening). \
+     Overlapping blades count as one; blades smaller than 30 % of the largest one's area are left out.";
 
-/// What is plant, row by row from the top.
+/// Mask of plant pixels, row-major from the top.
 #[derive(Clone)]
 pub(super) struct Silhouette {
     pub(super) width: usize,
@@ -36,7 +36,7 @@ pub(super) struct Silhouette {
     pub(super) inside: Vec<bool>,
 }
 
-/// The measures; [`MEANINGS`] says what they are.
+/// Outline measures; explained in [`MEANINGS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Measures {
     pub(super) blade_ratio: f64,
@@ -49,7 +49,7 @@ pub(super) struct Measures {
 type Point = (f32, f32);
 
 impl Measures {
-    /// The mean of several.
+    /// Mean of several measures; `None` if there are none.
     pub(super) fn mean(all: &[Self]) -> Option<Self> {
         let n = all.len() as f64;
         let of = |pick: fn(&Self) -> f64| all.iter().map(pick).sum::<f64>() / n;
@@ -62,12 +62,12 @@ impl Measures {
         })
     }
 
-    /// All, in the order of [`MEANINGS`].
+    /// All measures in the order of [`MEANINGS`].
     pub(super) fn values(&self) -> [f64; 5] {
         [self.blade_ratio, self.blade_solidity, self.solidity, self.arms, self.circle_share]
     }
 
-    /// Of what is plant; `None` where nothing is, or too little to have a shape.
+    /// Measures a silhouette; `None` if it is empty or too small to have a shape.
     pub(super) fn of(plant: &Silhouette) -> Option<Self> {
         let points = plant.points();
         if points.len() < 40 {
@@ -99,24 +99,24 @@ impl Measures {
 }
 
 impl Silhouette {
-    /// Its pixels.
+    /// Indices of the plant pixels.
     fn points(&self) -> Vec<usize> {
         (0..self.inside.len()).filter(|i| self.inside[*i]).collect()
     }
 
-    /// The middle of a pixel.
+    /// Centre of a pixel.
     fn middle(&self, i: usize) -> Point {
         ((i % self.width) as f32 + 0.5, (i / self.width) as f32 + 0.5)
     }
 
-    /// The corners of some of its pixels.
+    /// Corners of the given pixels.
     fn corners(&self, pixels: &[usize]) -> Vec<Point> {
         let corner = |i: usize| ((i % self.width) as f32, (i / self.width) as f32);
         let four = |(x, y): Point| [(x, y), (x + 1.0, y), (x, y + 1.0), (x + 1.0, y + 1.0)];
         pixels.iter().flat_map(|i| four(corner(*i))).collect()
     }
 
-    /// All that a disc of this radius reaches that stays within.
+    /// Morphological opening with a disc of this radius.
     fn opened(&self, radius: f32) -> Self {
         let within = self.far_from(false, radius);
         let shrunk = Self { inside: within, ..self.clone() };
@@ -124,7 +124,8 @@ impl Silhouette {
         Self { inside: reached.iter().zip(&self.inside).map(|(far, inside)| !far && *inside).collect(), ..self.clone() }
     }
 
-    /// Which pixels are farther than `radius` from all that are, or are not, inside. What lies beyond the image is outside.
+    /// Returns for each pixel whether it is farther than `radius` from all pixels with the value `inside`. Pixels
+    /// beyond the image count as outside.
     fn far_from(&self, inside: bool, radius: f32) -> Vec<bool> {
         let reach = radius.ceil() as i64;
         let (w, h) = (self.width as i64, self.height as i64);
@@ -139,7 +140,7 @@ impl Silhouette {
         (0..w * h).map(|i| !disc.iter().any(|(dx, dy)| is(i % w + dx, i / w + dy))).collect()
     }
 
-    /// Its pieces that do not touch.
+    /// Connected components (4-neighbourhood).
     fn pieces(&self) -> Vec<Vec<usize>> {
         let mut left = self.inside.clone();
         let mut pieces = Vec::new();
@@ -164,7 +165,7 @@ impl Silhouette {
         pieces
     }
 
-    /// The silhouette with its longer side `longest` pixels long, if it is longer.
+    /// Returns the silhouette resized so that its longer side has at most `longest` pixels.
     pub(super) fn shrunk(self, longest: usize) -> Self {
         let side = self.width.max(self.height);
         if side <= longest {
@@ -180,7 +181,7 @@ impl Silhouette {
     }
 }
 
-/// The convex hull. Source: Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions".
+/// Convex hull. Source: Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions".
 fn hull(points: &[Point]) -> Vec<Point> {
     let mut points = points.to_vec();
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -207,7 +208,8 @@ fn area_of(hull: &[Point]) -> f32 {
     0.5 * edges.map(|(a, b)| a.0 * b.1 - a.1 * b.0).sum::<f32>().abs()
 }
 
-/// Long over short side of the smallest rectangle: one of its sides lies on the hull.
+/// Ratio of the longer to the shorter side of the minimum-area bounding rectangle, one side of which is an edge of the
+/// hull.
 fn rectangle(hull: &[Point]) -> f32 {
     let mut best = (f32::MAX, 1.0);
     for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
@@ -224,7 +226,8 @@ fn rectangle(hull: &[Point]) -> f32 {
     best.1
 }
 
-/// Middle and radius of the smallest circle, within a hundredth of the radius. Source: Bădoiu & Clarkson 2003, "Smaller core-sets for balls".
+/// Centre and radius of the smallest enclosing circle, within 1 % of the radius. Source: Bădoiu & Clarkson 2003,
+/// "Smaller core-sets for balls".
 fn circle(hull: &[Point]) -> (Point, f32) {
     let mut middle = hull.first().copied().unwrap_or_default();
     let away = |m: Point, p: &Point| (p.0 - m.0).hypot(p.1 - m.1);
@@ -237,7 +240,7 @@ fn circle(hull: &[Point]) -> (Point, f32) {
     (middle, away(middle, &farthest(middle)))
 }
 
-/// How many arms stand out from the middle of the plant's pixels.
+/// Number of arms that protrude from the centroid of the plant's pixels.
 fn arms(points: &[Point]) -> usize {
     let n = points.len() as f32;
     let middle = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
@@ -270,7 +273,7 @@ fn arms(points: &[Point]) -> usize {
 mod tests {
     use super::*;
 
-    /// Four ellipses of 60 by 30 pixels about a middle, on stalks 4 pixels wide.
+    /// Four ellipses of 60 by 30 pixels around a centre, on stalks 4 pixels wide.
     fn rosette(turn: f32) -> Silhouette {
         let (width, height) = (241, 241);
         let inside = (0..width * height).map(|i| {
@@ -284,12 +287,12 @@ mod tests {
         Silhouette { width, height, inside: inside.collect() }
     }
 
-    /// Expected: closed forms of ellipses and squares, at any turn.
+    /// Expected: closed forms of ellipses and squares, for any rotation.
     #[test]
     fn a_drawn_rosette_has_the_measures_that_it_was_drawn_with() {
         for k in 0..6 {
             let m = Measures::of(&rosette(0.27 * k as f32)).unwrap();
-            // The disc that opens does not fit into the ends of the ellipses.
+            // The disc of the opening does not fit into the ends of the ellipses.
             assert!((m.blade_ratio - 1.9).abs() < 0.15, "{k}: {m:?}");
             assert!(m.blade_solidity > 0.95, "{k}: {m:?}");
             assert_eq!(m.arms, 4.0, "{k}");
@@ -303,7 +306,7 @@ mod tests {
         assert_eq!(Measures::of(&Silhouette { width: 9, height: 9, inside: vec![false; 81] }), None);
     }
 
-    /// Expected: measures hardly change when the image is made smaller.
+    /// Expected: measures hardly change when the image is downscaled.
     #[test]
     fn measures_do_not_depend_on_the_size_of_the_image() {
         let [whole, half] = [241, 160].map(|n| Measures::of(&rosette(0.4).shrunk(n)).unwrap());

@@ -1,48 +1,48 @@
-//! The HTML page that shows all species at all stages, in one file.
+//! Self-contained HTML page with all species at all growth stages.
 
 use super::beside::Photograph;
 use super::outline::{BLADES, MEANINGS, Measures};
-use furrow::report::{Cell, Page, Table, count, data_url, number, pairs, section};
-use furrow::scene::PlantRecord;
-use furrow::scene::desc::{Role, SpeciesDesc};
+use furrow_field::PlantRecord;
+use furrow_field::desc::{Role, SpeciesDesc};
+use furrow_report::{Cell, Page, Table, count, data_url, number, pairs, section};
 use maud::{Markup, html};
 
-/// Style rules beyond those of every page.
+/// CSS rules in addition to the shared ones.
 const STYLE: &str = include_str!("page.css");
-/// The longest a scale may be, of its picture's width.
+/// Maximum length of a scale bar as a fraction of the image width.
 pub(super) const LONGEST: f32 = 0.38;
-/// Side of a picture in the units of what is drawn over it.
+/// Width and height of an image in SVG units.
 const SIDE: f32 = 200.0;
 
-/// One species.
+/// A species.
 pub(super) struct Entry {
-    /// Its species file.
+    /// Content of its species file.
     pub(super) desc: SpeciesDesc,
-    /// Its stages, youngest first.
+    /// Stages, youngest first.
     pub(super) stages: Vec<Stage>,
     /// Photographs of it.
     pub(super) photographs: Vec<Photograph>,
 }
 
-/// One stage.
+/// A growth stage.
 pub(super) struct Stage {
-    /// The plant that is shown.
+    /// The plant shown.
     pub(super) plant: PlantRecord,
-    /// Its pictures, from above down.
+    /// Its images: from above, then from the side.
     pub(super) looks: Vec<Look>,
-    /// Of its outline from above, where there are cut-outs to compare it with.
+    /// Measures of its outline from above, if there are cut-outs for comparison.
     pub(super) measures: Option<Measures>,
 }
 
-/// A picture, as wide as high.
+/// A square image.
 pub(super) struct Look {
-    /// The picture.
+    /// The image as JPEG.
     pub(super) jpeg: Vec<u8>,
-    /// How many millimetres it is wide where the plant stands.
+    /// Width of the image at the plant, millimetres.
     pub(super) width_mm: f32,
 }
 
-/// The page.
+/// Returns the page.
 pub(super) fn html(entries: &[Entry]) -> String {
     let body = html! {
         @for entry in entries {
@@ -56,14 +56,14 @@ pub(super) fn html(entries: &[Entry]) -> String {
         }
     };
     let lead = html! {
-        "Every species at every growth stage: above as a camera sees it that looks straight down, below from about 30° above the \
-         ground. It is one plant in all of its pictures; bars are to scale where it stands. Grown and rendered by "
+        "Every species at every growth stage: above from straight overhead, below from about 30° above the \
+         ground. Images of a stage show the same plant; scale bars apply at the plant. Rendered by "
         code { "trace catalogue" } "."
     };
     Page { kind: "Catalogue", title: "Species", lead, style: STYLE, body, script: "" }.html(env!("CARGO_PKG_VERSION"))
 }
 
-/// A stage's pictures below each other, each with its scale.
+/// Images of a stage, each with its scale bar.
 fn figure(name: &str, stage: &Stage) -> Markup {
     let code = stage.plant.bbch;
     html! {
@@ -83,7 +83,7 @@ fn figure(name: &str, stage: &Stage) -> Markup {
     }
 }
 
-/// The photographs of a stage, or those that tell none.
+/// Photographs of a stage, or those without a stage in their name.
 fn photographs(entry: &Entry, bbch: Option<u32>) -> Markup {
     html! {
         @for photo in entry.photographs.iter().filter(|p| p.bbch == bbch) {
@@ -95,7 +95,7 @@ fn photographs(entry: &Entry, bbch: Option<u32>) -> Markup {
     }
 }
 
-/// The measures of outlines: of cut-outs that tell no stage, then stage by stage, of its cut-outs and of rendered plants.
+/// Table of outline measures: of cut-outs without a stage, then for each stage, of its cut-outs and of rendered plants.
 fn outlines(entry: &Entry) -> Option<Table> {
     let mut table = Table::new("", ["outline from above"].into_iter().chain(MEANINGS.map(|(name, _)| name)));
     let mut push = |name: String, all: &[Measures]| {
@@ -118,15 +118,15 @@ fn outlines(entry: &Entry) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// What the columns of [`outlines`] are.
+/// Explanation of the columns of [`outlines`].
 fn meanings() -> Markup {
     html! {
         (pairs(&MEANINGS.map(|(name, words)| (name, html! { (words) }))))
-        p.reading { (BLADES) " Each line is a mean, of rendered plants over ten." }
+        p.reading { (BLADES) " Each line is a mean; for rendered plants, over ten." }
     }
 }
 
-/// The longest of 1, 2, 5, 10, 20, … that is not above `most`.
+/// Largest of 1, 2, 5, 10, 20, … that is not above `most`.
 pub(super) fn round_length(most: f32) -> f32 {
     let ten = 10.0_f32.powf(most.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|k| k * ten).find(|length| *length <= most).unwrap_or(ten)
@@ -153,11 +153,11 @@ fn table(stages: &[Stage]) -> Table {
 mod tests {
     use super::*;
 
-    /// Expected: a row of cut-outs says which stages it is to be compared with, also where that is all of them.
+    /// Expected: a row of cut-outs names the stages it is compared with, even if these are all stages.
     #[test]
     fn rows_of_cut_outs_tell_their_stages() {
         let species = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/echinochloa.ron");
-        let desc = furrow::scene::species_text::SpeciesFile::read(&species).unwrap().parse().unwrap();
+        let desc = furrow_field::species_text::SpeciesFile::read(&species).unwrap().parse().unwrap();
         let measures = Some(Measures::default());
         let photo = Photograph { name: "a".into(), bbch: None, size: (1, 1), jpeg: Vec::new(), measures };
         let table = outlines(&Entry { desc, stages: Vec::new(), photographs: vec![photo] }).unwrap();
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Expected: the guide explains each column.
+    /// Expected: the guide explains every column.
     #[test]
     fn the_guide_knows_the_measures() {
         let guide = include_str!("../../../../docs/guide/species.md");

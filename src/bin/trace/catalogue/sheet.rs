@@ -1,46 +1,46 @@
-//! One sheet: a species' pictures side by side, a column a stage, below the stage's name and each above a bar to its scale.
+//! The sheet of a species: one column of images per stage, below the stage's name, each image above a scale bar.
 
 use crate::letters;
 
 const PAPER: [u8; 3] = [251, 250, 247];
-/// Between pictures, pixels.
+/// Gap between images, pixels.
 const GAP: usize = 8;
-/// Columns in a line.
+/// Maximum number of columns per line.
 const MOST: usize = 6;
 const INK: [u8; 3] = [40, 38, 34];
-/// Below words, and above a bar, pixels.
+/// Margin below text and above a bar, pixels.
 const ROOM: usize = 3;
-/// Pictures from this side on have words of two pixels a dot.
+/// Minimum side of images whose text has two pixels per dot.
 const LARGE: usize = 128;
 
-/// A picture, sRGB, as wide as high, row by row from the top.
+/// A square image, sRGB, row-major from the top.
 pub(super) type Shot = Vec<[u8; 3]>;
 
-/// A picture of any shape.
+/// An image of any shape.
 pub(super) struct Sheet {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// Row by row from the top.
+    /// Pixels, row-major from the top.
     pub(super) pixels: Vec<[u8; 3]>,
 }
 
-/// A stage.
+/// A column: one stage.
 pub(super) struct Column {
-    /// What stands above its pictures.
+    /// Text above the images.
     pub(super) words: String,
-    /// Its pictures, and the bar below each.
+    /// Images, and the scale bar below each.
     pub(super) shots: Vec<(Shot, Bar)>,
 }
 
-/// A bar to the scale of a picture.
+/// A scale bar.
 pub(super) struct Bar {
-    /// How long it is, pixels.
+    /// Length, pixels.
     pub(super) pixels: usize,
-    /// How long that is.
+    /// Label with its physical length.
     pub(super) words: String,
 }
 
-/// Where things are in a sheet of columns of so many pictures, each so many pixels wide and high.
+/// Layout of a sheet whose columns have `rows` images of `size` pixels.
 #[derive(Clone, Copy)]
 pub(super) struct Layout {
     pub(super) rows: usize,
@@ -48,17 +48,17 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Pixels of a dot of its letters.
+    /// Pixels per dot of its letters.
     fn dot(self) -> usize {
         if self.size < LARGE { 1 } else { 2 }
     }
 
-    /// Height of a line of words with the room about it.
+    /// Height of a line of text including margins.
     fn line(self) -> usize {
         letters::HEIGHT * self.dot() + 2 * ROOM
     }
 
-    /// From one picture of a column to the next.
+    /// Vertical distance between images of a column.
     fn step(self) -> usize {
         self.size + self.line() + GAP
     }
@@ -68,18 +68,18 @@ impl Layout {
         self.line() + self.rows * self.step()
     }
 
-    /// Where column i begins.
+    /// Top left corner of column i.
     fn column(self, i: usize) -> (usize, usize) {
         (GAP + i % MOST * (self.size + GAP), GAP + i / MOST * self.tall())
     }
 
-    /// Where picture k of column i begins.
+    /// Top left corner of image k of column i.
     fn corner(self, i: usize, k: usize) -> (usize, usize) {
         let (x, y) = self.column(i);
         (x, y + self.line() + k * self.step())
     }
 
-    /// Puts columns of pictures side by side, at most [`MOST`] in a line.
+    /// Arranges columns side by side, at most [`MOST`] per line.
     pub(super) fn compose(self, columns: &[Column]) -> Sheet {
         let width = GAP + columns.len().min(MOST) * (self.size + GAP);
         let height = GAP + columns.len().div_ceil(MOST) * self.tall();
@@ -104,7 +104,7 @@ impl Layout {
         Sheet { width, height, pixels }
     }
 
-    /// Picture k of column i of a sheet as [`Self::compose`] makes it.
+    /// Cuts image k of column i out of a sheet made by [`Self::compose`].
     pub(super) fn part(self, sheet: &Sheet, (i, k): (usize, usize)) -> Shot {
         let (x, y) = self.corner(i, k);
         (y..y + self.size).flat_map(|row| &sheet.pixels[row * sheet.width + x..][..self.size]).copied().collect()
@@ -115,8 +115,8 @@ impl Layout {
 mod tests {
     use super::*;
 
-    /// Expected: what was put into a sheet is cut out of it again, also in the second line of columns; below each picture a bar of its length
-    /// begins at its left edge, with words behind it; words stand above each column.
+    /// Expected: images put into a sheet are recovered from it, also in the second line of columns; below each image a
+    /// bar of its length starts at its left edge, followed by text; each column has text above it.
     #[test]
     fn pictures_are_found_where_they_were_put() {
         let layout = Layout { rows: 2, size: 40 };

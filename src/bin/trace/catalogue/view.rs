@@ -1,44 +1,45 @@
-//! Where a plant is looked at from, so that it fills the picture.
+//! Camera placement so that a plant fills the image.
 
-use furrow::math::{Vec2, Vec3, vec2, vec3};
+use furrow_base::math::{Vec2, Vec3, vec2, vec3};
 
-/// Angle of view: narrow, so that near and far leaves have nearly one scale.
+/// Angle of view, degrees: narrow, so that near and far leaves have nearly the same scale.
 pub(super) const VIEW_DEG: f32 = 12.0;
-/// Pictures of a stage.
+/// Number of views per stage.
 pub(super) const KINDS: usize = 2;
-/// How far above the ground the second camera looks from.
+/// Elevation of the second camera, degrees above the ground.
 const SIDE_DEG: f32 = 30.0;
-/// Room around a plant: leaves stand on uneven ground, too.
+/// Margin factor around a plant; also covers leaves on uneven ground.
 const ROOM: f32 = 1.15;
-/// The smallest half-width of a view, metres.
+/// Minimum half-width of a view, metres.
 const LEAST: f32 = 0.004;
-/// Steps from a view from infinitely far to that from where the camera is.
+/// Number of iterations from a parallel projection to the final camera position.
 const STEPS: usize = 4;
 
-/// Where a picture is taken from: a camera that looks at a target, its picture's lower edge towards −y.
+/// Camera placement: looks at a target, with the lower edge of the image towards −y.
 pub(super) struct View {
-    /// From the camera to what it looks at, metres.
+    /// Distance from camera to target, metres.
     pub(super) distance: f32,
-    /// Between the picture's left and right edges.
+    /// Horizontal angle of view, degrees.
     pub(super) angle_deg: f32,
-    /// Of the camera above the ground.
+    /// Elevation of the camera above the ground, degrees.
     pub(super) elevation_deg: f32,
-    /// What it looks at, metres.
+    /// Target point, metres.
     pub(super) target: Vec3,
 }
 
 impl View {
-    /// From above, and from the side.
+    /// Views from above and from the side.
     pub(super) fn both(points: &[Vec3]) -> [Self; KINDS] {
         [Self::above(points), Self::of(points, SIDE_DEG)]
     }
 
-    /// From straight above.
+    /// View from straight above.
     pub(super) fn above(points: &[Vec3]) -> Self {
         Self::of(points, 90.0)
     }
 
-    /// The nearest view from this elevation that shows all of some points and room about them. From the side, it is high enough to see into a plant.
+    /// Returns the nearest view at this elevation that shows all points with a margin. The side view is high enough to
+    /// see into a plant.
     fn of(points: &[Vec3], elevation_deg: f32) -> Self {
         let mut view = Self { distance: f32::INFINITY, angle_deg: VIEW_DEG, elevation_deg, target: Vec3::ZERO };
         let [right, up, ahead] = view.axes();
@@ -61,20 +62,20 @@ impl View {
         view
     }
 
-    /// To the right and up in the picture, and away from the camera.
+    /// Camera axes: right and up in the image, and forward.
     fn axes(&self) -> [Vec3; 3] {
         let (sin, cos) = if self.elevation_deg < 90.0 { self.elevation_deg.to_radians().sin_cos() } else { (1.0, 0.0) };
         [Vec3::X, vec3(0.0, sin, cos), vec3(0.0, cos, -sin)]
     }
 
-    /// How many millimetres a picture is wide where the plant stands.
+    /// Width of the image at the plant, millimetres.
     pub(super) fn width_mm(&self) -> f32 {
         let [.., ahead] = self.axes();
         let depth = self.distance - self.target.dot(ahead);
         2e3 * depth * (0.5 * self.angle_deg).to_radians().tan()
     }
 
-    /// Its camera's pose, as a scene file writes it.
+    /// Camera pose in scene-file syntax.
     pub(super) fn pose(&self) -> String {
         let Vec3 { x, y, z } = self.target;
         if self.elevation_deg >= 90.0 {
@@ -90,8 +91,8 @@ impl View {
 mod tests {
     use super::*;
 
-    /// Expected: from 1 m a view of 53.13 degrees is as wide as the distance; a plant whose middle is looked at from 30 degrees stands half of its
-    /// middle's height farther away. Source: geometry.
+    /// Expected: at 1 m, a view of 53.13 degrees is as wide as the distance; seen from 30 degrees, the plant's position
+    /// is farther away than the target by half of the target's height. Source: geometry.
     #[test]
     fn a_view_is_as_wide_as_its_angle_says() {
         let view = |elevation_deg, height| {
@@ -102,8 +103,8 @@ mod tests {
         assert!((view(30.0, 0.5).width_mm() - 1250.0).abs() < 0.01);
     }
 
-    /// Expected: of a plant that leans far to one side the middle is looked at, and its ends are as far from the rim as the room says. Source: the
-    /// perspective of a camera.
+    /// Expected: a plant that leans far to one side is centred, and the distance of its ends from the border equals the
+    /// margin. Source: perspective projection.
     #[test]
     fn a_plant_that_leans_is_in_the_middle() {
         let points = [vec3(0.0, 0.0, 0.0), vec3(0.3, 0.0, 0.05), vec3(0.1, 0.1, 0.02)];

@@ -1,31 +1,34 @@
-//! What a dataset will cost: `trace dataset … --dry-run`, `trace sequence … --dry-run` and `trace dataset plan … --bill`.
+//! Cost estimate of a dataset: `trace dataset … --dry-run`, `trace sequence … --dry-run` and `trace dataset plan …
+//! --bill`.
 
 use crate::growing::Line;
-use furrow::cli;
-use furrow::cli::signal::Signals;
-use furrow::dataset::Order;
-use furrow::dataset::bill::{self, Bill, Step};
-use furrow::job::Threads;
-use furrow::report::{count, number};
-use furrow::{Result, dataset};
+use furrow_base::Result;
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::Order;
+use furrow_dataset::make::bill::{self, Bill, Step};
+use furrow_job::Threads;
+use furrow_report::{count, number};
 use std::path::{Path, PathBuf};
 
-/// Cores of a shard, as `emit` takes them unless told otherwise.
+/// Default number of cores per shard in `emit`.
 const CORES: u32 = 8;
-/// Memory that is asked of a scheduler beyond what is expected: it ends what takes more.
+/// Safety factor on the memory requested from a scheduler, which kills jobs that exceed it.
 const SPARE: f64 = 1.25;
-/// Bytes of a GiB.
+/// Bytes per GiB.
 const GIB: f64 = (1_u64 << 30) as f64;
 
-/// Whether anything is made.
+/// Whether to render or only estimate.
 #[derive(clap::Args)]
 pub(crate) struct DryRunArgs {
-    /// Make nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    /// Render nothing except three to sixteen probe images with fewer samples, and estimate core hours, disk, files,
+    /// memory and a number of shards.
     #[arg(long)]
     pub(crate) dry_run: bool,
 }
 
-/// Tells what an order will cost, or that it cannot go into its folder, where nothing is written; `quiet` shows nothing meanwhile.
+/// Prints the estimated cost of an order, or an error if its folder cannot be used. Writes nothing there. `quiet` hides
+/// the progress.
 pub(crate) fn run(
     folder: &Path,
     mut order: Order,
@@ -41,25 +44,25 @@ pub(crate) fn run(
     growing.end();
     let (bill, warnings) = told?;
     for warning in warnings {
-        furrow::tell!("warning: {warning}");
+        furrow_cli::tell!("warning: {warning}");
     }
     cli::print_rows(&rows(folder, &bill, threads.count()))?;
     Ok(Vec::new())
 }
 
-/// What a bill is at, in words.
+/// Describes the current step of an estimate.
 fn words(step: Step) -> String {
     match step {
-        Step::Image { number, least, most } if least == most => format!("drawing images, {number} of {most}"),
+        Step::Image { number, least, most } if least == most => format!("rendering images, {number} of {most}"),
         Step::Image { number, least, most } if number <= least => {
-            format!("drawing images, {number} of {least} to {most}")
+            format!("rendering images, {number} of {least} to {most}")
         }
-        Step::Image { number, most, .. } => format!("drawing images, {number} of {most} at most"),
+        Step::Image { number, most, .. } => format!("rendering images, {number} of at most {most}"),
         Step::Lists => "writing lists and tables".into(),
     }
 }
 
-/// The first of some images, and how many there are.
+/// Lists the first images and the total number.
 fn listed(names: &[String]) -> String {
     match names {
         [first, second, .., last] if names.len() > 3 => format!("{first}, {second}, … {last} ({} images)", names.len()),
@@ -67,12 +70,12 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// A bill in words.
+/// Formats an estimate as rows of a table.
 fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
     let Bill { images, fields, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
     let row = |name: &str, words: String| [name.to_owned(), words];
     let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
-    let mut probes: Vec<String> = bill.probes.iter().map(|index| dataset::Set::name(*index)).collect();
+    let mut probes: Vec<String> = bill.probes.iter().map(|index| furrow_dataset::Set::name(*index)).collect();
     probes.sort();
     let [fewer, more] = bill.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
@@ -80,11 +83,11 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
     let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
     let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
     vec![
-        row("from", format!("{} with {samples} samples a pixel", listed(&probes))),
+        row("from", format!("{} with {samples} samples per pixel", listed(&probes))),
         row(
             "core hours",
             format!(
-                "{} ({} core seconds: {} drawing, {} growing, {} labels and files)",
+                "{} ({} core seconds: {} rendering, {} building scenes, {} labels and files)",
                 number(core_s / 3600.0),
                 number(core_s),
                 part(sample_s),
@@ -98,7 +101,7 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
         row(
             "memory",
             format!(
-                "{} GiB with one image under way, {} GiB with {}",
+                "{} GiB for one image at a time, {} GiB with {}",
                 number(bill.memory(1) as f64 / GIB),
                 number(bill.memory(threads) as f64 / GIB),
                 count(threads as u64, "core", "cores")

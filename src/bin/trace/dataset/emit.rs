@@ -1,70 +1,72 @@
-//! Job files for a cluster: `trace dataset emit`.
+//! Job files for clusters: `trace dataset emit`.
 
 use super::render::PushArgs;
 use clap::ValueEnum;
-use furrow::dataset::Set;
-use furrow::dataset::cluster::{self, Job, Pod, Scheduler};
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_dataset::Set;
+use furrow_dataset::deliver::cluster::{self, Job, Pod, Scheduler};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Which dataset, and on what it is rendered.
+/// The dataset, and the cluster that renders it.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of the dataset, as `plan` began it; all machines must see it there.
+    /// Folder of the dataset, as created by `plan`, at a path visible to all machines.
     dir: PathBuf,
-    /// Who starts the shards.
+    /// Scheduler that starts the shards.
     #[arg(long, alias = "engine", value_enum)]
     scheduler: SchedulerName,
-    /// Into how many parts the dataset is cut; each should last minutes to hours.
+    /// Number of shards; each should take minutes to hours.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: u64,
-    /// Cores of each shard.
+    /// Number of cores per shard.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024))]
     cpus: u32,
-    /// Memory of each shard, GiB.
+    /// Memory per shard, GiB.
     #[arg(long, value_name = "GIB", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=4096))]
     memory: u32,
-    /// Longest time of a shard, after which it is queued again and goes on; for slurm.
+    /// Time limit of a shard, after which it is requeued and continues; for slurm.
     #[arg(long, value_name = "DURATION", default_value = "4h", value_parser = cli::time)]
     time: Duration,
-    /// How long before that it is told to finish its images; for slurm.
+    /// How long before the time limit a shard is signalled to finish its images; for slurm.
     #[arg(long, value_name = "DURATION", default_value = "5m", value_parser = cli::time)]
     grace: Duration,
-    /// Images that are rendered again at the end, to check them.
+    /// Number of images rendered again at the end as a check.
     #[arg(long, value_name = "N", default_value_t = 3)]
     rerender: u64,
-    /// The program, as the machines see it; this one unless given.
+    /// Path of the program on the machines. Default: this program's.
     #[arg(long, value_name = "PATH")]
     program: Option<PathBuf>,
-    /// Container image in which the program lies; for kubernetes.
+    /// Container image with the program; for kubernetes.
     #[arg(long, value_name = "NAME", default_value = concat!("furrow:", env!("CARGO_PKG_VERSION")))]
     image: String,
-    /// Claim of the volume in which the dataset's folder lies; for kubernetes.
+    /// Volume claim with the dataset's folder; for kubernetes.
     #[arg(long, value_name = "NAME", default_value = "furrow-data")]
     claim: String,
-    /// Folder on a disk of the node's own in which shards make their images, such as '$TMPDIR/furrow'; variables are the node's, in a script
-    /// for parallel those of the shell that starts it. Images come to DIR as they are finished; for slurm and parallel.
+    /// Folder on a local disk of the node in which shards render their images, such as '$TMPDIR/furrow'. Variables are
+    /// those of the node; in a script for parallel, those of the shell that starts it. Finished images are moved to
+    /// DIR; for slurm and parallel.
     #[arg(long, value_name = "DIR")]
     scratch: Option<String>,
     #[command(flatten)]
     push: PushArgs,
-    /// Folder for the job files; `jobs` in the dataset's unless given.
+    /// Folder for the job files. Default: `jobs` in the dataset's folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SchedulerName {
-    /// An array job, and one that follows it.
+    /// An array job, followed by a dependent job.
     Slurm,
-    /// An indexed job, and one that follows it.
+    /// An indexed job, followed by a second job.
     Kubernetes,
     /// A script for one machine, or for several by ssh.
     Parallel,
 }
 
-/// Writes the files; the one to begin with comes first.
+/// Writes the files. The one to start with comes first.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("jobs"));
@@ -94,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let (paths, warnings) = cluster::emit(&set, &job, &out)?;
     for warning in warnings {
-        furrow::tell!("warning: {warning}");
+        furrow_cli::tell!("warning: {warning}");
     }
     Ok(paths)
 }

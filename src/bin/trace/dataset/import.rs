@@ -1,66 +1,69 @@
-//! Other people's data: `trace dataset import`.
+//! Import of other data: `trace dataset import`.
 
 use super::progress::Progress;
 use crate::quality::threads;
 use clap::ValueEnum;
-use furrow::cli::signal::Signals;
-use furrow::dataset::import::classes::{Colors, Names};
-use furrow::dataset::import::coco::Coco;
-use furrow::dataset::import::masks::{Coding, Folders, Masks};
-use furrow::dataset::import::phenobench::PhenoBench;
-use furrow::dataset::import::{self, Order, Source};
-use furrow::dataset::split::Shares;
-use furrow::{Error, Result, cli, render};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::import::classes::{Colors, Names};
+use furrow_dataset::import::coco::Coco;
+use furrow_dataset::import::masks::{Coding, Folders, Masks};
+use furrow_dataset::import::phenobench::PhenoBench;
+use furrow_dataset::import::{self, Order, Source};
+use furrow_dataset::model::split::Shares;
+use furrow_render::render;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What is brought in, and where to.
+/// Source, and target dataset.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// What the source is.
+    /// Format of the source.
     #[arg(long, value_enum)]
     format: Format,
-    /// Folder of the dataset that is made.
+    /// Folder of the new dataset.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The source: for phenobench the folder that holds train/ and val/; for coco a JSON file of instances, or the folder that holds annotations/.
+    /// Source. For phenobench: the folder with train/ and val/. For coco: a JSON file of instances, or the folder with
+    /// annotations/.
     #[arg(long, value_name = "PATH")]
     from: Option<PathBuf>,
-    /// Folder of the images (masks, coco); train/, val/ and test/ in it become the splits.
+    /// Folder of the images (masks, coco). Subfolders train/, val/ and test/ become the splits.
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
-    /// Folder of the masks: PNG files with the images' names (masks).
+    /// Folder of the masks: PNG files with the names of the images (masks).
     #[arg(long, value_name = "DIR")]
     masks: Option<PathBuf>,
-    /// Folder of near infrared images with the images' names (masks).
+    /// Folder of near-infrared images with the names of the images (masks).
     #[arg(long, value_name = "DIR")]
     nir: Option<PathBuf>,
-    /// What the names of images end in and those of masks do not, such as _rgb.
+    /// Suffix of image names that mask names do not have, such as _rgb.
     #[arg(long, value_name = "TEXT", default_value = "")]
     image_suffix: String,
-    /// What the names of masks end in, such as _mask.
+    /// Suffix of mask names, such as _mask.
     #[arg(long, value_name = "TEXT", default_value = "")]
     mask_suffix: String,
-    /// What the names of infrared images end in.
+    /// Suffix of near-infrared image names.
     #[arg(long, value_name = "TEXT", default_value = "")]
     nir_suffix: String,
-    /// What the numbers of masks or the categories of coco mean: soil, crop, weed, leaf or ignore. Masks: 0=soil,1=crop,2=weed,255=ignore unless
-    /// said otherwise; coco: categories of these names.
+    /// Meaning of the numbers in masks or of the categories in coco: soil, crop, weed, leaf or ignore. Default for
+    /// masks: 0=soil,1=crop,2=weed,255=ignore; for coco: categories with these names.
     #[arg(long, value_name = "NAME=CLASS,…", value_parser = Names::parse)]
     classes: Option<Names>,
-    /// What the colours of masks mean.
+    /// Meaning of the colours in masks.
     #[arg(long, value_name = "R,G,B=CLASS;…", value_parser = Colors::parse, conflicts_with = "classes")]
     colors: Option<Colors>,
-    /// What to do with numbers and colours that no class was given for.
+    /// What to do with numbers and colours without a class.
     #[arg(long, value_enum, default_value_t = Others::Error)]
     others: Others,
-    /// Shares of train, val and test, for a source that has no splits.
+    /// Proportions of train, val and test, for a source without splits.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
-    /// What others may do with the images, in their owner's words.
+    /// Licence of the images, in their owner's words.
     #[arg(long, value_name = "TEXT", default_value = "not stated")]
     licence: String,
-    /// Threads; 0 for one on each core.
+    /// Number of threads; 0 for one per core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     /// Print nothing but errors, warnings and the paths of the files.
@@ -68,32 +71,32 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// What a source is.
+/// Format of a source.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// A folder of images and one of masks whose numbers or colours are classes.
+    /// A folder of images, and one of masks whose numbers or colours are classes.
     Masks,
     /// PhenoBench's folders: semantics, plants and leaves.
     Phenobench,
-    /// COCO instances: plants, and leaves where it has them.
+    /// COCO instances: plants, and leaves if present.
     Coco,
 }
 
-/// What to do with the unknown.
+/// Handling of unknown numbers and colours.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Others {
-    /// Stop and say where it is.
+    /// Stop with an error that gives the position.
     Error,
-    /// Give it no label.
+    /// Assign no label.
     Ignore,
 }
 
-/// Brings it in and writes what belongs to all.
+/// Imports the source and writes the dataset-wide files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let source = source(args)?;
     for warning in source.warnings() {
-        furrow::tell!("warning: {warning}");
+        furrow_cli::tell!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(source.images().len() as u64);
@@ -103,13 +106,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let pool = render::pool(args.threads)?;
     let set = pool.install(|| import::import(&args.out, source.as_ref(), &order, &done, stop))?;
     progress.finish();
-    furrow::dataset::finish::finish(&set, None)
+    furrow_dataset::make::finish::finish(&set, None)
 }
 
 fn source(args: &Args) -> Result<Box<dyn Source>> {
     let needed = |path: &Option<PathBuf>, option: &str| {
         path.clone().ok_or_else(|| {
-            Error::misuse(format!("this --format needs {option}")).help("`trace dataset import --help` tells what for")
+            Error::misuse(format!("this --format needs {option}")).help("see `trace dataset import --help`")
         })
     };
     let useless = [
@@ -122,7 +125,7 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
         (args.images.is_some() || args.classes.is_some(), args.format == Format::Phenobench, "--images and --classes"),
     ];
     if let Some((.., options)) = useless.into_iter().find(|(given, useless, _)| *given && *useless) {
-        return Err(Error::misuse(format!("{options} say nothing for this --format")).help("leave them out"));
+        return Err(Error::misuse(format!("{options} have no effect with this --format")).help("leave them out"));
     }
     Ok(match args.format {
         Format::Masks => {

@@ -1,4 +1,4 @@
-//! `trace dataset`: many fields, with all their labels, in the formats of other tools.
+//! `trace dataset`: renders many fields with all labels, in the formats of other tools.
 
 pub(crate) mod bill;
 mod emit;
@@ -11,14 +11,14 @@ mod status;
 mod verify;
 
 use clap::{Parser, Subcommand};
-use furrow::Result;
-use furrow::cli::signal::Signals;
+use furrow_base::Result;
+use furrow_cli::cli::signal::Signals;
 use std::path::PathBuf;
 
-/// Makes a dataset from a scene file, or goes on with one: `plan`, `render` and `finish` in one go.
+/// Creates or continues a dataset of a scene file: `plan`, `render` and `finish` in one command.
 ///
-/// Image k is field k of the scene file and nothing else decides its bytes. Stopped, killed or damaged, the same command makes what is
-/// missing and ends with the same files.
+/// Image k is field k of the scene file, and its bytes depend on nothing else. Repeating the command after a stop,
+/// crash or damage renders what is missing and gives the same files.
 #[derive(Parser)]
 #[command(args_conflicts_with_subcommands = true, arg_required_else_help = true, after_help = AFTER)]
 pub(crate) struct Cli {
@@ -31,31 +31,31 @@ pub(crate) struct Cli {
 const AFTER: &str = "\
 Examples:
   trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --width 480 --height 360 --spp 32 --format phenobench,coco
-  trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --spp 32 --dry-run   what it would take; nothing is made
-  trace dataset status data/d --watch                   how far it is, again every five seconds
-  trace dataset verify data/d --rerender 5              hashes, invariants, and five images rendered again
-  trace dataset finish data/d --format yolo             a further format of the same images
+  trace dataset --scene scenes/synthetic-d.ron --count 1300 --out data/d --spp 32 --dry-run   estimate the cost, render nothing
+  trace dataset status data/d --watch                   progress, updated every five seconds
+  trace dataset verify data/d --rerender 5              check hashes and invariants, render five images again
+  trace dataset finish data/d --format yolo             add a format for the same images
   trace dataset import --format masks --images real/images --masks real/labels --out data/real
 
-On several machines that share a folder:
+On several machines with a shared folder:
   trace dataset plan --scene scenes/synthetic-d.ron --count 100000 --out data/d --spp 32
-  trace dataset render data/d --shard 0/64              … to 63/64, each anywhere, in any order, as often as needed
+  trace dataset render data/d --shard 0/64              … to 63/64, on any machine, in any order, repeated as needed
   trace dataset finish data/d
-  trace dataset emit data/d --scheduler slurm --shards 64  job files that do the last two, for `bash data/d/jobs/submit.sh`";
+  trace dataset emit data/d --scheduler slurm --shards 64  job files for the last two, for `bash data/d/jobs/submit.sh`";
 
 #[derive(Subcommand)]
 enum Verb {
-    /// Begin a dataset: check the scene file, take all that it reads into the folder, write the recipe.
+    /// Create a dataset: check the scene file, copy all files it reads into the folder, write the recipe.
     Plan(PlanArgs),
-    /// Render the images of a shard that are missing.
+    /// Render the missing images of a shard.
     Render(render::Args),
-    /// Write what belongs to all images: lists of the formats, manifest, report.
+    /// Write the dataset-wide files: lists of the formats, manifest, report.
     Finish(finish::Args),
-    /// Bring other people's images and labels in: masks, PhenoBench, COCO.
+    /// Import images and labels from other sources: masks, PhenoBench, COCO.
     Import(Box<import::Args>),
-    /// Tell how far a dataset is: images done, rate, time left, slow and failed images, shard by shard.
+    /// Show the progress of a dataset: images done, rate, time left, slow and failed images, by shard.
     Status(status::Args),
-    /// Check every file and every label; render some images again.
+    /// Check every file and every label, and render some images again.
     Verify(verify::Args),
     /// Write job files for a cluster: Slurm, Kubernetes, or GNU parallel.
     Emit(emit::Args),
@@ -65,7 +65,8 @@ enum Verb {
 struct PlanArgs {
     #[command(flatten)]
     order: order::Args,
-    /// Begin nothing: draw three to sixteen images with fewer samples, and tell core hours, disk, files, memory and a number of shards.
+    /// Create nothing: render three to sixteen probe images with fewer samples, and estimate core hours, disk, files,
+    /// memory and a number of shards.
     #[arg(long)]
     bill: bool,
 }
@@ -82,7 +83,7 @@ struct MakeArgs {
     dry: bill::DryRunArgs,
 }
 
-/// Runs a verb on datasets; returns the paths of the files that matter.
+/// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
         Some(Verb::Plan(PlanArgs { order, bill: true })) => {
@@ -91,7 +92,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Plan(PlanArgs { order, bill: false })) => {
             let set = order::run(order, false, signals)?;
             order::tell_plants(&set, false)?;
-            Ok(vec![set.folder.join(furrow::dataset::recipe::FILE)])
+            Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
         }
         Some(Verb::Render(args)) => render::run(args, signals),
         Some(Verb::Finish(args)) => finish::run(args, signals),
@@ -108,23 +109,23 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             let set = order::run(&cli.make.order, cli.make.work.quiet, signals)?;
             order::tell_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
-            let all = furrow::dataset::generate::Shard::ALL;
+            let all = furrow_dataset::make::generate::Shard::ALL;
             render::generate_and_push(&set, &cli.make.work, all, memory, push.as_ref(), signals)?;
             if cli.make.push.frees() {
-                furrow::tell!(
-                    "all images are pushed: `trace dataset finish` is for the folder that they were pushed to"
+                furrow_cli::tell!(
+                    "all images are pushed: run `trace dataset finish` in the folder that they were pushed to"
                 );
                 return Ok(Vec::new());
             }
-            let files = furrow::job::Threads::new(cli.make.work.threads)?.install(|| {
-                let files = furrow::dataset::finish::finish(&set, None)?;
+            let files = furrow_job::Threads::new(cli.make.work.threads)?.install(|| {
+                let files = furrow_dataset::make::finish::finish(&set, None)?;
                 if !cli.make.work.quiet {
                     finish::tell_left_out(&set)?;
                 }
-                Ok::<_, furrow::Error>(files)
+                Ok::<_, furrow_base::Error>(files)
             })?;
             if let Some(push) = &push {
-                furrow::dataset::push::whole(&set, push, signals.heed())?;
+                furrow_dataset::make::push::whole(&set, push, signals.heed())?;
             }
             Ok(files)
         }

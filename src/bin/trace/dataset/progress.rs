@@ -1,31 +1,31 @@
-//! How far a dataset is: a bar on a terminal, a line now and then in a log.
+//! Progress of a dataset: a bar on a terminal, or an occasional line in a log.
 
 use crate::growing;
-use furrow::dataset::time_left::TimeLeft;
-use furrow::scene::assemble::BuildProgress;
+use furrow_dataset::make::time_left::TimeLeft;
+use furrow_field::assemble::BuildProgress;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Images done, images per hour, time left.
+/// Number of finished images, images per hour, time left.
 pub(crate) struct Progress {
     begin: Instant,
     total: AtomicU64,
     done: AtomicU64,
-    /// Drawn as soon as it is known how many there are.
+    /// Shown once the number of images is known.
     bar: ProgressBar,
-    /// Whether somebody looks at the bar.
+    /// `true` if the bar is shown.
     seen: bool,
-    /// What tells the time left, where images take different times; at their mean rate otherwise.
+    /// Estimates the time left if images take different times; otherwise the mean rate is used.
     time_left: Option<Arc<TimeLeft>>,
-    /// When the log's last line was written; `None` where no log is wanted.
+    /// Time of the last line in the log; `None` if no log is written.
     log: Option<Mutex<Instant>>,
 }
 
 impl Progress {
-    /// Begins to count; `begin` is when the work began.
+    /// Starts counting; `begin` is the start time of the work.
     pub(crate) fn new(begin: Instant, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = ProgressBar::hidden();
@@ -36,7 +36,7 @@ impl Progress {
         Self { begin, total, done, bar, seen: terminal && !quiet, time_left: None, log }
     }
 
-    /// The same of rendered fields: until the first image is done, the bar says what is under way.
+    /// For rendered fields: until the first image is done, the bar shows the build progress.
     pub(crate) fn of_fields(
         begin: Instant,
         quiet: bool,
@@ -49,12 +49,12 @@ impl Progress {
         progress
     }
 
-    /// Takes the bar away while something else is written.
+    /// Hides the bar while something else is written.
     pub(crate) fn pause(&self, write: impl FnOnce()) {
         self.bar.suspend(write);
     }
 
-    /// So many images are to be done.
+    /// Sets the expected number of images.
     pub(crate) fn expect(&self, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.bar.set_length(total);
@@ -64,7 +64,7 @@ impl Progress {
         }
     }
 
-    /// One more is done.
+    /// Counts one finished image.
     pub(crate) fn add(&self) {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         self.bar.set_message(self.rate(done));
@@ -73,7 +73,7 @@ impl Progress {
         let mut last = log.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if last.elapsed() >= growing::LOGGED {
             *last = Instant::now();
-            furrow::tell!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
+            furrow_cli::tell!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
         }
     }
 
@@ -84,10 +84,10 @@ impl Progress {
             Duration::from_secs_f64(left * seconds / done.max(1) as f64)
         };
         let left = self.time_left.as_deref().and_then(TimeLeft::left).unwrap_or_else(at_this_rate);
-        format!("{:.0} images an hour, {} left", 3600.0 * done as f64 / seconds.max(1e-9), HumanDuration(left))
+        format!("{:.0} images per hour, {} left", 3600.0 * done as f64 / seconds.max(1e-9), HumanDuration(left))
     }
 
-    /// Ends the bar; returns how many images were done, and images per hour.
+    /// Removes the bar. Returns the number of finished images, and images per hour.
     pub(crate) fn finish(&self) -> (u64, f64) {
         self.bar.finish_and_clear();
         let done = self.done.load(Ordering::Relaxed);

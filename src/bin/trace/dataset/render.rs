@@ -1,27 +1,29 @@
-//! Making the images: `trace dataset render`.
+//! Rendering of a dataset: `trace dataset render`.
 
 use super::progress::Progress;
 use crate::field::MemoryArgs;
 use crate::quality::threads;
-use furrow::cli::signal::Signals;
-use furrow::dataset::generate::{self, Callbacks, Shard, Work};
-use furrow::dataset::push::Push;
-use furrow::dataset::{Set, scratch};
-use furrow::{Error, Result, cli};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::Set;
+use furrow_dataset::deliver::scratch;
+use furrow_dataset::make::generate::{self, Callbacks, Shard, Work};
+use furrow_dataset::make::push::Push;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Which images.
+/// Images to render, and options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the dataset.
     dir: PathBuf,
-    /// Render the images whose number leaves k when divided by N.
+    /// Render the images whose number modulo N equals k.
     #[arg(long, value_name = "k/N", default_value = "0/1", value_parser = Shard::parse)]
     shard: Shard,
-    /// Make images in a folder of their own below this one, on a disk of this machine, and bring them to the dataset's folder as they are
-    /// finished; with packs whole archives. Stopped, it brings what there is of a pack.
+    /// Render images in a separate folder below this one, on a local disk, and move them to the dataset's folder as
+    /// they are finished; with packs, whole archives. When stopped, the finished part of a pack is moved.
     #[arg(long, value_name = "DIR")]
     scratch: Option<PathBuf>,
     #[command(flatten)]
@@ -32,29 +34,31 @@ pub(crate) struct Args {
     push: PushArgs,
 }
 
-/// How what is finished is sent elsewhere.
+/// Transfer of finished images to another place.
 #[derive(clap::Args)]
 pub(crate) struct PushArgs {
-    /// Run this shell command for each finished image or pack: {dir} is a folder with its files by their paths in the dataset, such as
-    /// 'rclone copy {dir} remote:set' or 'cp -a {dir}/. /mnt/set/'. What was pushed is noted, and not pushed again.
+    /// Run this shell command for each finished image or pack. {dir} is a folder with its files under their paths in
+    /// the dataset, such as 'rclone copy {dir} remote:set' or 'cp -a {dir}/. /mnt/set/'. Pushed images are recorded,
+    /// and not pushed again.
     #[arg(long, value_name = "COMMAND")]
     push: Option<String>,
-    /// Run this after it; where it fails, the push counts as failed. Such as 'rclone check --one-way {dir} remote:set'.
+    /// Run this command after it, such as 'rclone check --one-way {dir} remote:set'. If it fails, the push counts as
+    /// failed.
     #[arg(long, value_name = "COMMAND", requires = "push")]
     push_check: Option<String>,
-    /// Remove images here once they are pushed; `finish` is for the other place then.
+    /// Remove images here once they are pushed. Run `finish` at the other place then.
     #[arg(long, requires = "push")]
     push_free: bool,
-    /// How often a push is tried, with longer and longer pauses, before the run ends.
+    /// Number of attempts per push, with increasing pauses, before the run ends.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=10), requires = "push")]
     push_tries: u32,
-    /// End a push that takes longer, with what it has started; it then counts as failed.
+    /// Time limit of a push. After it, the command and its children are terminated, and the push counts as failed.
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..), requires = "push")]
     push_timeout: Option<u64>,
 }
 
 impl PushArgs {
-    /// What they ask for.
+    /// Returns the selected push options.
     pub(crate) fn push(&self) -> Result<Option<Push>> {
         let Self { push, push_check: check, push_free: free, push_tries: tries, push_timeout } = self;
         let timeout = push_timeout.map(Duration::from_secs);
@@ -64,20 +68,21 @@ impl PushArgs {
         Ok(push)
     }
 
-    /// Whether what belongs to all images is made at the other place.
+    /// Returns `true` if images are removed after a push, so that the dataset-wide files are written at the other
+    /// place.
     pub(crate) fn frees(&self) -> bool {
         self.push_free
     }
 }
 
-/// How they are made; none of it changes a byte.
+/// Options that do not change any byte of the files.
 #[derive(clap::Args)]
 pub(crate) struct WorkArgs {
-    /// Threads; 0 for one on each core.
+    /// Number of threads; 0 for one per core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     pub(crate) threads: usize,
-    /// Images under way at once, which share the threads; each takes the memory of a field. 0 for one a thread, 16 at most, and no more
-    /// than the memory is for.
+    /// Number of images rendered concurrently. They share the threads, and each needs the memory of a field. 0 for one
+    /// per thread, at most 16, limited by memory.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     at_once: usize,
     /// Print nothing but errors, warnings and the paths of the files.
@@ -86,19 +91,19 @@ pub(crate) struct WorkArgs {
 }
 
 impl WorkArgs {
-    /// The work of a shard.
+    /// Work for a shard.
     pub(crate) fn of(&self, shard: Shard, memory: Option<u64>) -> Work<'static> {
         Work { shard, threads: self.threads, at_once: self.at_once, memory, ..Work::default() }
     }
 }
 
-/// Makes the images of a shard.
+/// Renders the images of a shard.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
     let push = args.push.push()?;
     if let Some(scratch) = &args.scratch {
         check_scratch(scratch, &args.dir)?;
-        let help = "give --scratch a folder on a disk of this machine; it is made where it is missing";
+        let help = "give --scratch a folder on a disk of this machine; it is created if it does not exist";
         cli::check_folder(scratch).map_err(|e| e.help(help))?;
     }
     let work = Work { push: push.as_ref(), ..args.work.of(args.shard, args.memory.bytes) };
@@ -106,12 +111,12 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-/// Makes the images of a dataset that are missing.
+/// Renders the missing images of a dataset.
 pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<u64>, signals: &Signals) -> Result<()> {
     generate_and_push(set, args, shard, memory, None, signals)
 }
 
-/// The same, and sends them elsewhere.
+/// Like `generate`, and pushes finished images.
 pub(super) fn generate_and_push(
     set: &Set,
     args: &WorkArgs,
@@ -123,22 +128,22 @@ pub(super) fn generate_and_push(
     generate_in(set, None, &Work { push, ..args.of(shard, memory) }, args.quiet, signals)
 }
 
-/// Refuses a folder that is meant for a shell, or that lies in the dataset.
+/// Returns an error for a folder with unexpanded shell variables, or inside the dataset.
 fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
     let words = scratch.to_string_lossy();
     if words.contains('$') || words.starts_with('~') {
-        return Err(Error::misuse(format!("--scratch {words}: no shell has filled in this name"))
-            .help("leave single quotes out here; `emit` takes variables of the node"));
+        return Err(Error::misuse(format!("--scratch {words}: this name contains an unexpanded shell variable"))
+            .help("omit single quotes here; `emit` accepts variables of the node"));
     }
     let full = |path: &Path| std::path::absolute(path).map_err(Error::io(path));
     if full(scratch)?.starts_with(full(dir)?) {
-        return Err(Error::misuse(format!("--scratch {words} lies in the dataset itself"))
+        return Err(Error::misuse(format!("--scratch {words} is inside the dataset"))
             .help("give --scratch a folder on a disk of this machine"));
     }
     Ok(())
 }
 
-/// Makes images in the dataset's folder, or elsewhere and brings them there.
+/// Renders images in the dataset's folder, or in a scratch folder and moves them there.
 fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.heed_patiently();
@@ -146,7 +151,7 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
     let progress = Progress::of_fields(begin, quiet, &growing, &time_left);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
-    let warn = |words: &str| progress.pause(|| furrow::tell!("warning: {words}"));
+    let warn = |words: &str| progress.pause(|| furrow_cli::tell!("warning: {words}"));
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
     let work = Work { progress: Some(&growing), time_left: Some(&time_left), ..*work };
     let made = match scratch {
@@ -155,8 +160,8 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
     };
     let (images, rate) = progress.finish();
     if !quiet {
-        let rate = if images > 0 { format!(": {rate:.0} images an hour") } else { String::new() };
-        furrow::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
+        let rate = if images > 0 { format!(": {rate:.0} images per hour") } else { String::new() };
+        furrow_cli::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
     }
     made
 }

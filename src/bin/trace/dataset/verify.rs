@@ -1,30 +1,31 @@
-//! Whether a dataset is whole: `trace dataset verify`.
+//! Integrity check of a dataset: `trace dataset verify`.
 
 use super::progress::Progress;
 use crate::field::MemoryArgs;
 use crate::quality::threads;
-use furrow::Result;
-use furrow::cli::signal::Signals;
-use furrow::dataset::verify::{self, Again, OtherKernels};
-use furrow::dataset::{Set, render};
-use furrow::job::Threads;
+use furrow_base::Result;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::Set;
+use furrow_dataset::check::verify::{self, Again, OtherKernels};
+use furrow_dataset::make::render;
+use furrow_job::Threads;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Which dataset.
+/// The dataset, and options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the dataset.
     dir: PathBuf,
-    /// How many shards it is made in: what is missing is then told as shards too, as Slurm's --array takes them.
+    /// Number of shards; missing images are then also reported as shards, in the syntax of Slurm's --array.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     shards: Option<u64>,
-    /// Render so many images again and compare their bytes; with another version of Embree, see how far they differ.
+    /// Render N images again and compare their bytes; with another version of Embree, report how far they differ.
     #[arg(long, value_name = "N", default_value_t = 0)]
     rerender: u64,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// Threads; 0 for one on each core.
+    /// Number of threads; 0 for one per core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
     /// Print nothing but errors.
@@ -32,7 +33,7 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// Checks; says what was found.
+/// Checks the dataset and prints the result.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
     let renderer = if args.rerender > 0 { render::near_renderer(&set)? } else { None };
@@ -50,7 +51,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
                 format!("by {here} instead of {there}, and nearly the same: they differ in at most {most}")
             }
         };
-        furrow::tell!(
+        furrow_cli::tell!(
             "{}: {} of {} images checked, {} rendered again {again}; {} faults",
             set.folder.display(),
             found.checked,
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             found.faults.len()
         );
         if let Some(unchecked) = &found.unchecked {
-            furrow::tell!("not checked: {unchecked}");
+            furrow_cli::tell!("not checked: {unchecked}");
         }
     }
     found.verdict(&set, args.shards)?;

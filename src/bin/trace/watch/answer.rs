@@ -1,21 +1,22 @@
-//! What is answered to a request, bytes or words, with the headers that keep a page to itself.
+//! HTTP responses with the headers that isolate the page.
 
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
 use std::io::Cursor;
 use std::path::Path;
 use tiny_http::{Header, Response};
 
-/// The page may load from its own address alone: no script, style or picture from elsewhere, and it stands in no frame.
+/// Content security policy: the page may load scripts, styles and images only from its own address, and may not be
+/// framed.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Largest photograph that is shown, bytes.
+/// Maximum size of a photograph, bytes.
 const LARGEST: u64 = 256 << 20;
 
-/// What is sent back.
+/// An HTTP response.
 pub(super) type Answer = Response<Cursor<Vec<u8>>>;
 
-/// Bytes of a type.
+/// Response with bytes of a content type.
 pub(super) fn bytes(kind: &str, bytes: Vec<u8>) -> Answer {
     let headers = [
         ("Content-Type", kind),
@@ -29,31 +30,31 @@ pub(super) fn bytes(kind: &str, bytes: Vec<u8>) -> Answer {
     known.fold(Response::from_data(bytes), Response::with_header)
 }
 
-/// Words.
+/// Plain text response.
 pub(super) fn text(status: u16, words: impl Into<String>) -> Answer {
     bytes("text/plain; charset=utf-8", words.into().into_bytes()).with_status_code(status)
 }
 
-/// A value as JSON.
+/// JSON response.
 pub(super) fn json(value: &serde_json::Value) -> Answer {
     bytes("application/json", value.to_string().into_bytes())
 }
 
-/// What an error is answered with: the user's faults are told from the program's.
+/// Error response: status 400 for errors of the user, 500 for others.
 pub(super) fn error(error: &Error) -> Answer {
     text(if error.exit_code() == 2 { 400 } else { 500 }, format!("error: {error}"))
 }
 
-/// A photograph as it lies on the disk.
+/// A photograph as stored on disk.
 pub(super) struct Photo {
     kind: &'static str,
     bytes: Vec<u8>,
 }
 
 impl Photo {
-    /// Reads a photograph that a browser shows.
+    /// Reads a photograph in a format that browsers support.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let bytes = furrow::input::read(path, LARGEST).map_err(|refusal| refusal.into_error(path))?;
+        let bytes = furrow_base::input::read(path, LARGEST).map_err(|refusal| refusal.into_error(path))?;
         let kind = match bytes.as_slice() {
             [0x89, b'P', b'N', b'G', ..] => "image/png",
             [0xff, 0xd8, ..] => "image/jpeg",
@@ -65,7 +66,7 @@ impl Photo {
         Ok(Self { kind, bytes })
     }
 
-    /// The photograph for the page.
+    /// Response with the photograph.
     pub(super) fn answer(&self) -> Answer {
         bytes(self.kind, self.bytes.clone())
     }

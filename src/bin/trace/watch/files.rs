@@ -1,10 +1,10 @@
-//! Which files a scene file names, and when one of them is saved.
+//! Files named by a scene file, and notification when one of them is saved.
 //!
-//! Folders are watched, not files: many editors write a new file and rename it over the old one.
+//! Folders are watched instead of files, because many editors write a new file and rename it over the old one.
 
 use super::session::Session;
-use furrow::ron_file::RonFile;
-use furrow::{Error, Result};
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
 use notify::event::{AccessKind, AccessMode, ModifyKind};
 use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,41 +13,42 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
-/// A save is many events; this long after the last of them it is over.
+/// A save causes many events; it is over this long after the last one.
 const QUIET: Duration = Duration::from_millis(25);
 
-/// How often files are looked at of which no event has come.
+/// Polling interval for changes without an event.
 const GLANCE: Duration = Duration::from_secs(1);
 
-/// How coarse the times are that file systems write.
+/// Resolution of modification times in file systems.
 const COARSE: Duration = Duration::from_secs(2);
 
-/// Most files that are looked into for the names of others.
+/// Maximum number of files searched for the names of others.
 const MOST: usize = 4096;
 
-/// What is watched, shared by the threads that follow and look.
+/// Watched files, shared by the threads that receive events and poll.
 #[derive(Default)]
 struct Followed {
-    /// The files, as they were before they were read, or when they were looked at last.
+    /// The files, with their stamps before they were read, or at the last poll.
     stamps: BTreeMap<PathBuf, Stamp>,
-    /// Whether whatever is saved beside them counts too.
+    /// `true` if any file saved in the same folders counts too.
     beside: bool,
 }
 
-/// The files that are watched.
+/// The watched files.
 pub(super) struct Files {
     watcher: RecommendedWatcher,
     folders: BTreeSet<PathBuf>,
-    /// What was read for the last picture, and what the last error was about: more than scene files say, since models name files too.
+    /// Files read for the last image, and the file of the last error: more than scene files name, because models name
+    /// files too.
     read: BTreeSet<PathBuf>,
     followed: Arc<Mutex<Followed>>,
 }
 
-/// Begins to watch: nothing at first. The session is told when a watched file is saved.
+/// Starts watching, initially nothing. The session is notified when a watched file is saved.
 pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
     let failed = |e: notify::Error| {
         Error::failed(format!("cannot watch for changes of files: {e}"))
-            .help("fs.inotify.max_user_instances and max_user_watches of sysctl are the limits")
+            .help("raise fs.inotify.max_user_instances or fs.inotify.max_user_watches with sysctl")
     };
     let followed: Arc<Mutex<Followed>> = Arc::default();
     let (known, looked_at, (send, receive)) = (followed.clone(), followed.clone(), channel());
@@ -67,8 +68,8 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
     Ok(Files { watcher, folders: BTreeSet::new(), read: BTreeSet::new(), followed })
 }
 
-/// Tells the session of every burst of events, once. Where no events come, as on network file systems or from a folder that was removed and made
-/// anew, the files' times and sizes tell.
+/// Notifies the session once per burst of events. Changes without events, as on network file systems or in a folder
+/// that was deleted and recreated, are detected by modification time and size.
 fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<Followed>) {
     loop {
         let mut changed = match events.recv_timeout(GLANCE) {
@@ -77,11 +78,11 @@ fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<Followed>) {
             Err(RecvTimeoutError::Disconnected) => return,
         };
         if changed {
-            // A burst ends when nothing has come for a while.
+            // A burst ends with a pause.
             while events.recv_timeout(QUIET).is_ok() {}
         }
         let held = || followed.lock().unwrap_or_else(PoisonError::into_inner);
-        // Looked at without the lock, which who reads the files needs.
+        // Polled without holding the lock, which the thread that reads the files needs.
         let all: Vec<PathBuf> = held().stamps.keys().cloned().collect();
         let now: Vec<(PathBuf, Stamp)> = all.into_iter().map(|path| (path.clone(), stamp(&path))).collect();
         for (path, now) in now {
@@ -96,7 +97,7 @@ fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<Followed>) {
     }
 }
 
-/// When a file was written last, and how long it is; `None` where there is none.
+/// Modification time and size of a file; `None` if it does not exist.
 type Stamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> Stamp {
@@ -104,7 +105,7 @@ fn stamp(path: &Path) -> Stamp {
     Some((about.modified().ok()?, about.len()))
 }
 
-/// Whether an event may have changed what a file holds.
+/// Returns `true` if an event may have changed the content of a file.
 fn writes(kind: EventKind) -> bool {
     match kind {
         EventKind::Access(access) => access == AccessKind::Close(AccessMode::Write),
@@ -114,16 +115,16 @@ fn writes(kind: EventKind) -> bool {
 }
 
 impl Files {
-    /// Watches a scene file, the files that it names and those that were read for the last picture, from now on: a change after this is
-    /// seen. Call it before they are read.
+    /// Watches a scene file, the files it names and those read for the last image. Must be called before they are read,
+    /// so that later changes are noticed.
     pub(super) fn expect(&mut self, scene: &Path) {
         let mut all = named(scene);
         all.extend(self.read.iter().cloned());
         self.follow(&all, false);
     }
 
-    /// Watches what was read as well, and forgets what is read no more. Whether one of the files that nothing had named before may have been
-    /// written since `begin`, when the reading began.
+    /// Also watches the files that were read, and forgets those no longer read. Returns `true` if a file not named
+    /// before may have been written since `begin`, when reading started.
     pub(super) fn keep(&mut self, scene: &Path, read: &[PathBuf], begin: SystemTime) -> bool {
         self.read = read.iter().cloned().collect();
         let mut all = named(scene);
@@ -132,8 +133,8 @@ impl Files {
         new.into_iter().flatten().any(|(written, _)| written + COARSE >= begin)
     }
 
-    /// Watches, after an error, what was watched, what the error is about, and whatever is saved beside them: what is wrong or missing may be
-    /// named where only a reader of models looks.
+    /// After an error, watches the same files, the file of the error, and everything saved in the same folders: the
+    /// missing or faulty file may be named in a file that only the model loader reads.
     pub(super) fn fail(&mut self, scene: &Path, about: Option<&Path>) {
         self.read.extend(about.map(Path::to_owned));
         let mut all = named(scene);
@@ -141,13 +142,13 @@ impl Files {
         self.follow(&all, true);
     }
 
-    /// Watches these files; the stamps of those that were not watched before.
+    /// Watches these files. Returns the stamps of those not watched before.
     fn follow(&mut self, files: &BTreeSet<PathBuf>, beside: bool) -> Vec<Stamp> {
         let mut paths = BTreeSet::new();
         for file in files {
             let name = file.file_name().map(PathBuf::from).unwrap_or_default();
             let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            // A link is replaced in its own folder, and written through to where it leads.
+            // A link can be replaced in its own folder, or its target can be written.
             paths.extend(folder.canonicalize().ok().map(|folder| folder.join(name)));
             paths.extend(file.canonicalize().ok());
         }
@@ -174,11 +175,11 @@ impl Files {
         }
         let mut watched = BTreeSet::new();
         for folder in folders {
-            // Asked again where it is watched already: it may have been removed and made anew.
+            // Watch again even if already watched: the folder may have been deleted and recreated.
             match self.watcher.watch(&folder, RecursiveMode::NonRecursive) {
                 Ok(()) => drop(watched.insert(folder)),
                 Err(e) if self.folders.contains(&folder) => drop(e),
-                Err(e) => furrow::tell!("warning: changes in {} are not seen: {e}", folder.display()),
+                Err(e) => furrow_cli::tell!("warning: changes in {} cannot be detected: {e}", folder.display()),
             }
         }
         self.folders = watched;
@@ -186,20 +187,20 @@ impl Files {
     }
 }
 
-/// A RON file and every file that its text names, there or not, with those that they name.
+/// Returns a RON file and all files named in it, existing or not, recursively.
 fn named(scene: &Path) -> BTreeSet<PathBuf> {
     let mut all = BTreeSet::from([scene.to_path_buf()]);
     let mut left = vec![scene.to_path_buf()];
     while let Some(path) = left.pop() {
         let Ok(file) = RonFile::read(&path) else { continue };
         file.replace_quoted(|text| {
-            // Keys and names stand in quotes too: what has no ending is no file.
+            // Keys and names are quoted too; strings without a file extension are not files.
             let full = file.resolve(text);
             if full.extension().is_some() && all.len() < MOST && all.insert(full.clone()) {
                 if full.extension().is_some_and(|e| e == "ron") {
                     left.push(full);
                 } else {
-                    // A leaf's relief lies beside it.
+                    // A leaf's height map is next to its image.
                     all.insert(full.with_extension("height.png"));
                 }
             }

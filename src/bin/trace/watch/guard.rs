@@ -1,27 +1,28 @@
-//! Who may ask. The page's address holds a random token, so that no other user of the machine can guess it; `Host` and `Origin` must be
-//! those of the page itself, so that no other page in the user's browser can ask in its place (DNS rebinding, cross-site requests).
+//! Access control. The page's address contains a random token, which other users of the machine cannot guess. `Host`
+//! and `Origin` must be those of the page, so that other pages in the user's browser cannot send requests in its place
+//! (DNS rebinding, cross-site requests).
 
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
 use std::fmt::Write;
 use std::io::Read;
 use std::net::IpAddr;
 
-/// Random bytes of a token.
+/// Number of random bytes of a token.
 const BYTES: usize = 16;
 
-/// What a request must show.
+/// Credentials required from a request.
 pub(super) struct Guard {
     token: String,
     host: IpAddr,
 }
 
 impl Guard {
-    /// One with a new token, for a page at this address.
+    /// Creates a guard with a new token for a page at this address.
     pub(super) fn new(host: IpAddr) -> Result<Self> {
         let mut bytes = [0_u8; BYTES];
         std::fs::File::open("/dev/urandom")
             .and_then(|mut file| file.read_exact(&mut bytes))
-            .map_err(|e| Error::failed(format!("the system gives no random numbers: {e}")))?;
+            .map_err(|e| Error::failed(format!("cannot read random numbers from the system: {e}")))?;
         let token = bytes.iter().fold(String::new(), |mut text, byte| {
             let _ = write!(text, "{byte:02x}");
             text
@@ -29,27 +30,28 @@ impl Guard {
         Ok(Self { token, host })
     }
 
-    /// The token.
+    /// Returns the token.
     pub(super) fn token(&self) -> &str {
         &self.token
     }
 
-    /// What of a request's path follows the token; `None` where the token is wrong.
+    /// Returns the part of a request's path after the token; `None` if the token is wrong.
     pub(super) fn within<'p>(&self, path: &'p str) -> Option<&'p str> {
         let (token, rest) = path.strip_prefix('/')?.split_once('/')?;
-        // All bytes are looked at, so that the time tells nothing about where they differ.
+        // Compare all bytes, so that the time does not reveal the position of the first difference.
         let differs = token.bytes().zip(self.token.bytes()).fold(0, |sum, (a, b)| sum | (a ^ b));
         (token.len() == self.token.len() && differs == 0).then_some(rest)
     }
 
-    /// Whether a request with this `Host` and, if it has one, this `Origin` comes from the page.
+    /// Returns `true` if a request with this `Host` and optional `Origin` comes from the page.
     pub(super) fn admits(&self, host: Option<&str>, origin: Option<&str>) -> bool {
         let Some(host) = host else { return false };
-        // Any port: `ssh -L` may have forwarded another one.
+        // Any port is allowed: `ssh -L` may forward from another one.
         let own = match name(host) {
             "localhost" => true,
             name => name.parse::<IpAddr>().is_ok_and(|ip| {
-                // Whoever listens on every address may be asked by any of them; a name could be anybody's.
+                // A server that listens on all addresses accepts any IP address, but no host name, which could be
+                // anybody's.
                 ip.is_loopback() || ip == self.host || self.host.is_unspecified()
             }),
         };
@@ -57,7 +59,7 @@ impl Guard {
     }
 }
 
-/// A `Host` header without its port and without the brackets of an IPv6 address.
+/// Returns a `Host` header without port and without the brackets of an IPv6 address.
 fn name(host: &str) -> &str {
     match host.strip_prefix('[') {
         Some(rest) => rest.split(']').next().unwrap_or_default(),

@@ -1,16 +1,16 @@
-//! `trace watch`: a page on this machine that shows a scene file's field while the file is written.
+//! `trace watch`: a local web page that shows a scene file's field while the file is edited.
 //!
 //! | file | idea |
 //! |---|---|
-//! | `session` | what is asked for and what is shown, shared by all threads |
-//! | `worker` | the thread that grows and renders; a newer wish cancels an older one |
-//! | `sheet` | small pictures of the first twelve indices |
-//! | `files` | which files a scene file names, and a thread that is told when one of them is saved |
-//! | `sliders` | the numbers of the file as sliders, put in its text for a look or written into it |
-//! | `picture` | pixels of the four views, and what one pixel shows |
-//! | `guard` | who may ask: token, `Host` and `Origin` |
-//! | `server`, `answer` | requests and what is answered |
-//! | `tev` | the picture in another program |
+//! | `session` | requested and displayed state, shared by all threads |
+//! | `worker` | thread that builds and renders; a newer request cancels an older one |
+//! | `sheet` | thumbnails of the first twelve indices |
+//! | `files` | files named by a scene file, and a thread that is notified when one of them is saved |
+//! | `sliders` | numbers of the file as sliders, applied to its text for a preview or written into it |
+//! | `picture` | images of the four views, and inspection of single pixels |
+//! | `guard` | access control: token, `Host` and `Origin` |
+//! | `server`, `answer` | requests and responses |
+//! | `tev` | display of the image in another program |
 //! | `page.html`, `page.css`, `page.js` | the page |
 
 mod answer;
@@ -27,9 +27,9 @@ mod worker;
 use crate::field::{MemoryArgs, scene_file};
 use crate::quality::{samples, threads};
 use clap::ValueEnum;
-use furrow::cli::{self, signal::Signals};
-use furrow::job::Threads;
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_cli::cli::{self, signal::Signals};
+use furrow_job::Threads;
 use guard::Guard;
 use server::Server;
 use session::{Session, Wish};
@@ -39,55 +39,56 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use worker::Worker;
 
-/// A scene file to watch, and where its page is.
+/// The scene file to watch, and options of its page.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Scene file (RON); it is rendered again whenever it, or a file that it names, is saved.
+    /// Scene file (RON). It is rendered again whenever it, or a file that it names, is saved.
     #[arg(value_name = "FILE", value_parser = scene_file())]
     scene: PathBuf,
-    /// Which field of the distribution is shown first.
+    /// Index of the field shown first.
     #[arg(long, default_value_t = 0)]
     index: u64,
-    /// Seed, instead of the scene file's.
+    /// Seed that overrides the scene file's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Width of the picture in pixels, at most the camera's own; the field of view stays.
+    /// Image width in pixels, at most that of the camera. The field of view is unchanged.
     #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u32).range(16..=4096))]
     width: u32,
-    /// Samples a pixel after which the picture is left as it is.
+    /// Samples per pixel at which the image is complete.
     #[arg(long, default_value_t = 64, value_parser = samples())]
     spp: u32,
-    /// A photograph, PNG or JPEG, shown beside the picture at the same pixel scale.
+    /// Photograph, PNG or JPEG, shown next to the image at the same pixel scale.
     #[arg(long, value_name = "FILE")]
     photo: Option<PathBuf>,
-    /// Also send each picture to a program that runs already.
+    /// Also send each image to a running program.
     #[arg(long, value_enum, value_name = "PROGRAM")]
     display: Option<Display>,
-    /// Port of the page; a free one unless given.
+    /// Port of the page. Default: a free one.
     #[arg(long, default_value_t = 0)]
     port: u16,
-    /// Address to listen on. The default is reached from this machine alone; any other lets whoever reaches it and knows the
-    /// page's address see the pictures, unencrypted, and write values into the scene file. `ssh -L` is the safer way.
+    /// Address to listen on. The default is reachable only from this machine. With any other, everyone who can reach it
+    /// and knows the page's address can see the images, unencrypted, and write values into the scene file. `ssh -L` is
+    /// safer.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// Threads; 0 for one on each core.
+    /// Number of threads; 0 for one per core.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
 }
 
-/// A program that shows pictures.
+/// A program that displays images.
 #[derive(Clone, Copy, ValueEnum)]
 enum Display {
     /// tev, linear radiance in R, G, B and NIR, at 127.0.0.1:14158.
     Tev,
 }
 
-/// How long a render is waited for in the end.
+/// How long to wait for a rendering at the end.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Serves the page until a signal comes.
+/// Serves the page until a signal arrives.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_scene(&args.scene)?;
     let photo = args.photo.as_deref().map(answer::Photo::read).transpose()?;
@@ -108,7 +109,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         .map_err(|e| Error::failed(format!("cannot start a thread: {e}")))?;
     server.serve(stop);
     session.end();
-    // It may be growing a field, which comes to its end by itself, and need not be waited for: nothing is written.
+    // It may be building a field. There is no need to wait for that, because nothing is written.
     let begin = Instant::now();
     while !thread.is_finished() && begin.elapsed() < PATIENCE {
         std::thread::sleep(Duration::from_millis(20));

@@ -1,5 +1,5 @@
 "use strict";
-// The state comes as server-sent events; what the user asks for goes back as POST requests. Nothing else is loaded from anywhere.
+// The state arrives as server-sent events; user requests are sent as POST. Nothing is loaded from other addresses.
 
 const $ = (id) => document.getElementById(id);
 const make = (tag, attributes = {}, ...children) => {
@@ -24,7 +24,8 @@ async function post(name, body) {
   if (state) state.asked = Math.max(state.asked, asked);
 }
 
-// One request at a time; what is asked for in between goes with the next. While a slider moves, each of its pictures is waited for.
+// One request at a time; changes made meanwhile are sent with the next one. While a slider moves, wait for the image of
+// each value.
 const fresh = () => !state || state.error || state.picture?.asked === state.asked;
 const waiting = [];
 let wanted = null;
@@ -58,7 +59,7 @@ function listen() {
   events.onerror = () => $("dot").classList.add("gone");
 }
 
-// --- The picture ---
+// --- The image ---
 
 let shownSource = "";
 let loading = false;
@@ -83,7 +84,7 @@ function loadPicture() {
   next.src = source;
 }
 
-// CSS pixels to a pixel of the picture.
+// CSS pixels per image pixel.
 function zoom() {
   const picture = state?.picture;
   if (!picture) return 1;
@@ -102,7 +103,7 @@ function layOut() {
   $("frame").style.width = `${picture.width * z}px`;
   $("frame").style.height = `${picture.height * z}px`;
   $("picture").classList.toggle("sharp", z >= 2.5);
-  // A pixel of the photograph is as large as one of the scene's own camera.
+  // Show the photograph at the pixel scale of the scene's own camera.
   const photo = $("photo");
   if (photo.naturalWidth) {
     photo.style.width = `${photo.naturalWidth * picture.scale * z}px`;
@@ -136,7 +137,7 @@ async function inspect(at) {
     try {
       const answer = await fetch(`at?x=${x}&y=${y}`);
       if (answer.ok) describe(await answer.json());
-    } catch { /* The stream of events tells that the program is gone. */ }
+    } catch { /* The event stream shows that the program has ended. */ }
   }
   asking = false;
 }
@@ -178,7 +179,7 @@ function showSliders() {
     for (const [id, drawn] of [["drawn", true], ["fixed", false]]) {
       $(id).replaceChildren(...state.sliders.filter((s) => s.drawn === drawn).map(slider));
     }
-    $("drawn-hint").textContent = $("drawn").childElementCount ? "Move a slider to fix what is drawn for every field." : "The file draws nothing.";
+    $("drawn-hint").textContent = $("drawn").childElementCount ? "Move a slider to fix a value that is sampled for every field." : "The file contains no distributions.";
     if (focus) document.querySelector(`input[data-path="${CSS.escape(focus)}"]`)?.focus();
   }
   if (wanted?.values) state.values = wanted.values;
@@ -198,8 +199,8 @@ function slider(about) {
   });
   input.dataset.path = path;
   const output = make("output");
-  const release = make("button", { textContent: about.drawn ? "draw" : "reset", title: "As the file has it" });
-  const write = make("button", { textContent: "write it into the file", title: `Replace ${says} in line ${line} (W)` });
+  const release = make("button", { textContent: about.drawn ? "draw" : "reset", title: "Reset to the value of the file" });
+  const write = make("button", { textContent: "write to file", title: `Replace ${says} in line ${line} (W)` });
   const row = make("div", { className: "slider" },
     make("label", {}, make("span", { className: "path", textContent: path }), output), input,
     make("div", { className: "under" }, make("span", { className: "says", textContent: `${says}`, title: `line ${line}: ${says}` }),
@@ -260,7 +261,7 @@ function showSheet() {
   }));
 }
 
-// --- All of it ---
+// --- Everything ---
 
 const press = (button, on) => button.setAttribute("aria-pressed", String(on));
 
@@ -278,9 +279,9 @@ function showStatus() {
   if (error) words.push("error");
   else if (picture?.asked !== asked) words.push(doing || "waiting");
   if (picture) {
-    if (picture.asked !== asked) words.push(`shown: index ${picture.index} of seed ${picture.seed}, as it was before`);
-    words.push(`${picture.width} × ${picture.height} px`, `${picture.spp} of ${spp} samples a pixel`, `${picture.plants} plant${picture.plants === 1 ? "" : "s"}`,
-      `${(picture.triangles / 1e6).toFixed(2)} M triangles`, `first picture after ${picture.first_s.toFixed(2)} s`);
+    if (picture.asked !== asked) words.push(`shown: index ${picture.index} of seed ${picture.seed}, from an earlier request`);
+    words.push(`${picture.width} × ${picture.height} px`, `${picture.spp} of ${spp} samples per pixel`, `${picture.plants} plant${picture.plants === 1 ? "" : "s"}`,
+      `${(picture.triangles / 1e6).toFixed(2)} M triangles`, `first image after ${picture.first_s.toFixed(2)} s`);
     if (view === "depth") words.push(`depth ${picture.near_m.toFixed(3)} to ${picture.far_m.toFixed(3)} m`);
   }
   $("status").textContent = words.join("  ·  ");
@@ -344,7 +345,7 @@ function setPhoto(source, name) {
   $("photo").onload = layOut;
   $("photo").src = source;
   $("beside").hidden = false;
-  $("photo-about").textContent = name ? `${name} stays in this browser. Its pixels are as large as the camera's.` : "Its pixels are as large as the camera's.";
+  $("photo-about").textContent = name ? `${name} stays in this browser. It is shown at the camera's pixel scale.` : "It is shown at the camera's pixel scale.";
   layOut();
 }
 function togglePhoto() { $("beside").hidden = !$("beside").hidden; show(); layOut(); }

@@ -1,30 +1,30 @@
-//! A picture that is shown: pixels of the four views, and what one pixel shows.
+//! The displayed image: pixels of the four views, and inspection of single pixels.
 
-use furrow::film::Film;
-use furrow::job::{Field, Renderer, View};
-use furrow::output::{self, Picture as Png};
-use furrow::plant::OrganKind;
-use furrow::render::LabelMap;
-use furrow::render::label::NONE;
-use furrow::scene::tag::Class;
-use furrow::sensor::Photograph;
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_grow::plant::OrganKind;
+use furrow_job::{Field, Renderer, View};
+use furrow_optics::sensor::Photograph;
+use furrow_output::Picture as Png;
+use furrow_render::film::Film;
+use furrow_render::render::LabelMap;
+use furrow_render::render::label::NONE;
+use furrow_render::scene::tag::Class;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How a picture came about.
+/// How an image was rendered.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Made {
-    /// Number of what was asked for that it answers.
+    /// Number of the request that it answers.
     pub(super) asked: u64,
-    /// From the beginning of the work, the reading of the file, until the first picture of this field was there.
+    /// Time from the start of reading the file to the first image of this field.
     pub(super) first: Duration,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub(super) spp: u32,
 }
 
-/// A field and what was rendered of it so far.
+/// A field and its image so far.
 pub(super) struct Picture {
     field: Arc<Field>,
     labels: Arc<LabelMap>,
@@ -33,23 +33,23 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// Takes the photograph of a film.
+    /// Develops the film into an image.
     pub(super) fn new(field: &Arc<Field>, film: &Film, labels: &Arc<LabelMap>, made: Made) -> Self {
         let photograph = field.edit().photograph(field.grown(), film);
         Self { field: field.clone(), labels: labels.clone(), photograph, made }
     }
 
-    /// Number of what was asked for that it answers.
+    /// Number of the request that it answers.
     pub(super) fn asked(&self) -> u64 {
         self.made.asked
     }
 
-    /// What its field warns of.
+    /// Warnings of its field.
     pub(super) fn warnings(&self) -> &Vec<String> {
         &self.field.grown().warnings
     }
 
-    /// What the page says of it.
+    /// Description for the page.
     pub(super) fn about(&self) -> Value {
         let grown = self.field.grown();
         let (grow, build) = self.field.times();
@@ -74,17 +74,17 @@ impl Picture {
         })
     }
 
-    /// Depth of the nearest and the farthest surface, metres.
+    /// Depths of the nearest and the farthest surface, metres.
     fn reach(&self) -> (f32, f32) {
         let depths = self.labels.depth.iter().copied().filter(|depth| depth.is_finite());
         let (near, far) = depths.fold((f32::INFINITY, 0.0_f32), |(near, far), d| (near.min(d), far.max(d)));
         if near <= far { (near, far) } else { (0.0, 0.0) }
     }
 
-    /// One of its views as PNG; `None` for a name that is none.
+    /// Encodes one of its views as PNG; `None` for an unknown name.
     pub(super) fn png(&self, view: &str) -> Option<Result<Vec<u8>>> {
         let Photograph { width, height, rgb, nir, .. } = &self.photograph;
-        let encode = |pixels: &Png<'_>| output::encode_png(*width, *height, pixels, "");
+        let encode = |pixels: &Png<'_>| furrow_output::encode_png(*width, *height, pixels, "");
         Some(match view {
             "rgb" => encode(&Png::Rgb(rgb.as_chunks::<3>().0)),
             "nir" => encode(&Png::Gray(nir)),
@@ -94,7 +94,7 @@ impl Picture {
             }
             "depth" => {
                 let (near, far) = self.reach();
-                // What is near is bright; what is nowhere is black.
+                // Near is bright; no surface is black.
                 let gray = |d: &f32| {
                     let share = if d.is_finite() { (far - d) / (far - near).max(1e-9) } else { 0.0 };
                     (share * 255.0 + 0.5) as u8
@@ -106,7 +106,7 @@ impl Picture {
         })
     }
 
-    /// What a pixel's centre shows: class, plant and leaf, species, organ and depth.
+    /// Describes the centre of a pixel: class, plant and leaf, species, organ and depth.
     pub(super) fn at(&self, (x, y): (u32, u32)) -> Result<Value> {
         self.check((x, y))?;
         let i = (y * self.photograph.width + x) as usize;
@@ -122,14 +122,14 @@ impl Picture {
             "leaf": tag.leaf,
             "organ": organ.map(OrganKind::name),
             "species": plant.map(|plant| plant.species.as_str()),
-            // A model from disk has neither code nor age.
+            // A model from disk has neither EPPO code nor age.
             "bbch": plant.filter(|plant| !plant.eppo.is_empty()).map(|plant| plant.bbch),
             "age_days": plant.filter(|plant| !plant.eppo.is_empty()).map(|plant| plant.age_days),
             "depth_m": (part != NONE).then_some(depth),
         }))
     }
 
-    /// The words of `--pixel`.
+    /// Describes a pixel as `--pixel` does.
     pub(super) fn explain(&self, renderer: &Renderer, at: (u32, u32)) -> Result<String> {
         self.check(at)?;
         renderer.explain(&self.field, View::Path, at)
@@ -138,6 +138,6 @@ impl Picture {
     fn check(&self, (x, y): (u32, u32)) -> Result<()> {
         let Photograph { width, height, .. } = self.photograph;
         let inside = x < width && y < height;
-        if inside { Ok(()) } else { Err(Error::misuse(format!("pixel {x},{y} lies outside {width} × {height}"))) }
+        if inside { Ok(()) } else { Err(Error::misuse(format!("pixel {x},{y} is outside {width} × {height}"))) }
     }
 }

@@ -1,12 +1,12 @@
-//! The page's requests. Each is answered in a thread of its own, so that a slow reader holds up nobody else.
+//! HTTP server of the page. Each request is answered in its own thread, so that a slow client does not block others.
 
 use super::answer::{self, Answer, Photo};
 use super::guard::Guard;
 use super::session::Session;
 use super::sliders;
-use furrow::job::Renderer;
-use furrow::settings::{Quality, RenderOptions};
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_job::Renderer;
+use furrow_render::settings::{Quality, RenderOptions};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -16,31 +16,31 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tiny_http::{Method, Request};
 
-/// Requests that are answered at once; browsers open six connections to a page.
+/// Maximum number of concurrent requests; browsers open six connections per page.
 const MOST: usize = 64;
-/// Largest body of a request, bytes.
+/// Maximum body size of a request, bytes.
 const LARGEST: u64 = 64 << 10;
-/// How often a silent stream of events says that it is alive, and how soon a stop is seen.
+/// Keep-alive interval of an idle event stream, and polling interval for new requests and the stop flag.
 const BEAT: Duration = Duration::from_secs(10);
 const GLANCE: Duration = Duration::from_millis(50);
-/// How often it is looked whether the page is still listened for.
+/// Interval of the check that the server still accepts connections.
 const LOOK: Duration = Duration::from_secs(1);
-/// Samples of a pixel that is explained in words.
+/// Samples per pixel for the description of a pixel.
 const EXPLAINED: u32 = 64;
 
-/// What a request may change.
+/// Changes that a request may make.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Change {
     index: Option<u64>,
     seed: Option<Seed>,
     width: Option<u32>,
-    /// All values that stand in the place of the file's.
+    /// All values that override those of the file.
     values: Option<BTreeMap<String, f64>>,
     sheet: Option<bool>,
 }
 
-/// A value to be written into the scene file.
+/// A value to write into the scene file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -48,7 +48,7 @@ struct Written {
     value: f64,
 }
 
-/// A number, or the word `file` for the scene file's own.
+/// A number, or the word `file` for the scene file's own seed.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Seed {
@@ -56,7 +56,7 @@ enum Seed {
     Own(Own),
 }
 
-/// The word.
+/// The word `file`.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Own {
@@ -64,7 +64,7 @@ enum Own {
 }
 
 impl Seed {
-    /// What stands instead of the file's seed, if anything.
+    /// Returns the seed that overrides the file's, if any.
     fn instead(self) -> Option<u64> {
         match self {
             Self::Number(seed) => Some(seed),
@@ -73,18 +73,18 @@ impl Seed {
     }
 }
 
-/// What every thread needs that answers.
+/// Shared state of the threads that answer requests.
 struct Desk {
     guard: Guard,
     session: Arc<Session>,
     photo: Option<Photo>,
     renderer: Renderer,
     busy: AtomicUsize,
-    /// Held while the scene file is written: of two that write at once, the second is told that the file has changed.
+    /// Held while the scene file is written: the second of two concurrent writers gets the error that the file has changed.
     writing: Mutex<()>,
 }
 
-/// The page's server.
+/// The HTTP server.
 pub(super) struct Server {
     http: tiny_http::Server,
     address: SocketAddr,
@@ -92,7 +92,7 @@ pub(super) struct Server {
 }
 
 impl Server {
-    /// Listens; port 0 takes one that is free.
+    /// Starts listening; port 0 selects a free one.
     pub(super) fn open(
         host: IpAddr,
         port: u16,
@@ -102,7 +102,7 @@ impl Server {
     ) -> Result<Self> {
         let wanted = SocketAddr::new(host, port);
         let http = tiny_http::Server::http(wanted).map_err(|e| {
-            Error::failed(format!("cannot listen on {wanted}: {e}")).help("leave --port out: a free one is taken then")
+            Error::failed(format!("cannot listen on {wanted}: {e}")).help("omit --port to use a free one")
         })?;
         let address = http.server_addr().to_ip().unwrap_or(wanted);
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(EXPLAINED)))?;
@@ -110,21 +110,27 @@ impl Server {
         Ok(Self { http, address, desk: Arc::new(desk) })
     }
 
-    /// Prints where the page is, here and from elsewhere.
+    /// Prints the address of the page, for this machine and for others.
     pub(super) fn tell(&self) {
         let (address, port) = (self.address, self.address.port());
-        furrow::tell!("watching {}: http://{address}/{}/", self.desk.session.path().display(), self.desk.guard.token());
+        furrow_cli::tell!(
+            "watching {}: http://{address}/{}/",
+            self.desk.session.path().display(),
+            self.desk.guard.token()
+        );
         if address.ip().is_loopback() {
             let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
             let host = if host.trim().is_empty() { "HOST" } else { host.trim() };
-            furrow::tell!("from another machine: ssh -L {port}:{address} {host}, then the same address there");
+            furrow_cli::tell!("from another machine: ssh -L {port}:{address} {host}, then open the same address there");
         } else {
-            furrow::tell!("warning: whoever reaches {address} and knows this address may look and write");
+            furrow_cli::tell!(
+                "warning: everyone who can reach {address} and knows this address can view the page and write to the scene file"
+            );
         }
-        furrow::tell!("Ctrl-C ends it");
+        furrow_cli::tell!("press Ctrl-C to stop");
     }
 
-    /// Answers until `stop` is raised.
+    /// Serves requests until `stop` is set.
     pub(super) fn serve(&mut self, stop: &AtomicBool) {
         let mut looked = Instant::now();
         while !stop.load(Ordering::Relaxed) {
@@ -148,7 +154,7 @@ impl Server {
                 let _busy = Busy(&desk.busy);
                 desk.receive(request);
             };
-            // Where no thread starts, the request is dropped, which answers it with 500.
+            // If no thread can be started, the request is dropped, which sends status 500.
             if std::thread::Builder::new().name("answer".into()).spawn(work).is_err() {
                 self.desk.busy.fetch_sub(1, Ordering::SeqCst);
             }
@@ -157,21 +163,21 @@ impl Server {
 }
 
 impl Server {
-    /// Listens at the same address anew where nobody does any more: the thread that takes connections ends, with an error or in a panic, where no
-    /// more files can be opened.
+    /// Listens again at the same address if nothing does any more: the thread that accepts connections ends, with an
+    /// error or a panic, when no more files can be opened.
     fn listen_again(&mut self) {
         let Ok(listener) = TcpListener::bind(self.address) else { return };
         if let Ok(http) = tiny_http::Server::from_listener(listener, None) {
-            furrow::tell!("warning: there were too many connections at once; listening again");
+            furrow_cli::tell!("warning: there were too many connections at once; listening again");
             self.http = http;
         }
     }
 }
 
-/// Most bytes of a body that is not read, for which memory is reserved when its request is dropped.
+/// Maximum size in bytes of an unread body, because dropping its request reserves memory for it.
 const BEARABLE: usize = 1 << 24;
 
-/// One thread that answers; no longer once it is dropped, also by a panic.
+/// Counts one answering thread until it is dropped, also by a panic.
 struct Busy<'a>(&'a AtomicUsize);
 
 impl Drop for Busy<'_> {
@@ -180,8 +186,9 @@ impl Drop for Busy<'_> {
     }
 }
 
-/// A request whose body is of a length that may be; another is answered. The server reserves a body's stated length where a request is dropped
-/// unread, however long it is said to be, so such a one is left as it is, and the connection with it.
+/// Returns a request whose body size is acceptable, and answers any other. The server library reserves memory for the
+/// stated length of an unread body when its request is dropped, so an oversized request is leaked together with its
+/// connection.
 fn bearable(request: Request) -> Option<Request> {
     if request.body_length().is_none_or(|length| length <= BEARABLE) {
         return Some(request);
@@ -200,7 +207,7 @@ impl Desk {
         };
         let admitted = self.guard.admits(header("Host").as_deref(), header("Origin").as_deref());
         let answer = match self.guard.within(path).filter(|_| admitted) {
-            None => answer::text(403, "forbidden: the address is not that which the program has printed"),
+            None => answer::text(403, "forbidden: use the address that the program has printed"),
             Some("events") if *request.method() == Method::Get => return self.stream(request),
             Some(name) => match request.method().clone() {
                 Method::Get => self.get(name, query).unwrap_or_else(|e| answer::error(&e)),
@@ -273,7 +280,7 @@ impl Desk {
         Ok(answer::json(&serde_json::json!({ "asked": asked })))
     }
 
-    /// Server-sent events: the state now, and whenever it changes.
+    /// Server-sent events: the current state, and again whenever it changes.
     fn stream(&self, request: Request) {
         let mut out = request.into_writer();
         let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
@@ -293,7 +300,7 @@ impl Desk {
     }
 }
 
-/// A request's body, or what is answered where it is too large.
+/// Reads the body of a request; returns an error response if it is too large.
 fn body(request: &mut Request) -> std::result::Result<Vec<u8>, Answer> {
     let mut bytes = Vec::new();
     if request.body_length().is_some_and(|length| length as u64 > LARGEST) {
@@ -306,7 +313,7 @@ fn body(request: &mut Request) -> std::result::Result<Vec<u8>, Answer> {
     }
 }
 
-/// `x=…&y=…`.
+/// Parses `x=…&y=…`.
 fn pixel(query: &str) -> Result<(u32, u32)> {
     let number = |name: &str| {
         let value = query.split('&').find_map(|pair| pair.strip_prefix(name)?.strip_prefix('='));

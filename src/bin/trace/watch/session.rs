@@ -1,9 +1,9 @@
-//! What is asked for and what is shown, shared by the threads that render, listen and answer.
+//! Requested and displayed state, shared by the threads that render, watch files and answer requests.
 
 use super::picture::Picture;
 use super::sheet::Sheet;
 use super::sliders::Slider;
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,81 +11,81 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What the page asks for.
+/// Request of the page.
 #[derive(Clone, Default, PartialEq)]
 pub(super) struct Wish {
-    /// Field of the distribution.
+    /// Index of the field.
     pub(super) index: u64,
-    /// Instead of the scene file's seed.
+    /// Seed that overrides the scene file's.
     pub(super) seed: Option<u64>,
-    /// Width of the picture, pixels.
+    /// Image width, pixels.
     pub(super) width: u32,
-    /// Values that stand in the place of the file's, by the paths that lead there.
+    /// Values that override those of the file, by their paths.
     pub(super) values: BTreeMap<String, f64>,
-    /// Whether the sheet of indices is wanted.
+    /// `true` if the sheet of indices is requested.
     pub(super) sheet: bool,
 }
 
-/// What the page shows.
+/// State displayed by the page.
 #[derive(Default)]
 pub(super) struct Shown {
-    /// The last picture that could be rendered.
+    /// Last image that could be rendered.
     pub(super) picture: Option<Arc<Picture>>,
-    /// Why the newest could not be.
+    /// Error of the newest request, if it failed.
     pub(super) error: Option<String>,
-    /// What the newest field warns of before it grows, and the number of what was asked for.
+    /// Warnings of the newest field that are known before it is built, with the number of the request.
     pub(super) foretold: (u64, Vec<String>),
-    /// The scene file's text, as it was read last.
+    /// Text of the scene file when last read.
     pub(super) text: String,
-    /// Its numbers.
+    /// Numbers of the scene file.
     pub(super) sliders: Vec<Slider>,
-    /// The sheet of indices.
+    /// Sheet of indices.
     pub(super) sheet: Sheet,
-    /// Whether the program was given a photograph.
+    /// `true` if a photograph was given on the command line.
     pub(super) photo: bool,
-    /// What the worker does; empty where it waits.
+    /// Current activity of the worker; empty if idle.
     pub(super) doing: &'static str,
 }
 
 struct Inner {
     wish: Wish,
-    /// Rises with every wish and every change of a file.
+    /// Incremented with every request and every change of a file.
     asked: u64,
-    /// Rises with everything that the page could show.
+    /// Incremented with every change of the displayed state.
     version: u64,
     shown: Shown,
     ended: bool,
 }
 
-/// One scene file that is watched.
+/// Session of one watched scene file.
 pub(super) struct Session {
     path: PathBuf,
-    /// Samples a pixel of a finished picture.
+    /// Samples per pixel of a complete image.
     spp: u32,
     inner: Mutex<Inner>,
     changed: Condvar,
-    /// Raised where what is rendered is not wanted any more.
+    /// Set when the current rendering is outdated.
     outdated: Arc<AtomicBool>,
 }
 
 impl Session {
-    /// A session that has shown nothing yet.
+    /// Creates a session without an image.
     pub(super) fn new(path: PathBuf, wish: Wish, spp: u32) -> Self {
         let inner = Inner { wish, asked: 1, version: 1, shown: Shown::default(), ended: false };
         Self { path, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: Arc::default() }
     }
 
-    /// The scene file.
+    /// Path of the scene file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Samples a pixel of a finished picture.
+    /// Samples per pixel of a complete image.
     pub(super) fn spp(&self) -> u32 {
         self.spp
     }
 
-    /// The flag that stops what is rendered.
+    /// Flag that interrupts rendering.
     pub(super) fn outdated(&self) -> &Arc<AtomicBool> {
         &self.outdated
     }
@@ -99,7 +99,7 @@ impl Session {
         self.changed.notify_all();
     }
 
-    /// Renders again: a file has changed.
+    /// Requests a new rendering, because a file has changed.
     pub(super) fn reload(&self) {
         self.turn(|inner| {
             inner.asked += 1;
@@ -107,7 +107,7 @@ impl Session {
         });
     }
 
-    /// Changes what is asked for; returns the number of the newest that was.
+    /// Changes the request. Returns the number of the newest request.
     pub(super) fn wish(&self, change: impl FnOnce(&mut Wish)) -> u64 {
         let mut asked = 0;
         self.turn(|inner| {
@@ -123,7 +123,7 @@ impl Session {
         asked
     }
 
-    /// Ends the threads that render and listen.
+    /// Ends the threads that render and watch files.
     pub(super) fn end(&self) {
         self.turn(|inner| {
             inner.ended = true;
@@ -131,7 +131,7 @@ impl Session {
         });
     }
 
-    /// Waits for something newer than number `done` to be asked for; `None` at the end.
+    /// Waits for a request newer than number `done`; `None` at the end.
     pub(super) fn next(&self, done: u64) -> Option<(u64, Wish)> {
         let mut inner = self.lock();
         while inner.asked == done && !inner.ended {
@@ -141,7 +141,7 @@ impl Session {
         (!inner.ended).then(|| (inner.asked, inner.wish.clone()))
     }
 
-    /// Changes what is shown.
+    /// Changes the displayed state.
     pub(super) fn show(&self, change: impl FnOnce(&mut Shown)) {
         self.turn(|inner| {
             change(&mut inner.shown);
@@ -149,17 +149,18 @@ impl Session {
         });
     }
 
-    /// Something of what is shown.
+    /// Reads from the displayed state.
     pub(super) fn shown<T>(&self, look: impl FnOnce(&Shown) -> T) -> T {
         look(&self.lock().shown)
     }
 
-    /// The picture; an error before the first one is there.
+    /// Returns the image; an error before the first one is rendered.
     pub(super) fn picture(&self) -> Result<Arc<Picture>> {
-        self.shown(|shown| shown.picture.clone()).ok_or_else(|| Error::input("there is no picture yet"))
+        self.shown(|shown| shown.picture.clone()).ok_or_else(|| Error::input("there is no image yet"))
     }
 
-    /// Waits until there is something newer than `version`, or for so long; the state as the page reads it, `None` at the end.
+    /// Waits until the state is newer than `version`, for at most `most`. Returns the state for the page; `None` at the
+    /// end.
     pub(super) fn state(&self, version: u64, most: Duration) -> Option<(u64, Value)> {
         let inner = self.lock();
         let waits = |inner: &mut Inner| inner.version == version && !inner.ended;

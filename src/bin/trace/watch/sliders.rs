@@ -1,41 +1,40 @@
-//! The numbers of a scene file as sliders: how the field looks where a number is this one, and that number written into the file.
+//! Numbers of a scene file as sliders: previews of the field with other values, and writing a value into the file.
 
-use furrow::job::SceneFile;
-use furrow::output;
-use furrow::ron_file::{Distribution, Quantity, Value, quantities};
-use furrow::{Error, Result};
+use furrow_base::ron_file::{Distribution, Quantity, Value, quantities};
+use furrow_base::{Error, Result};
+use furrow_job::SceneFile;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Steps of a slider over a range that is not one of whole numbers.
+/// Number of steps of a slider over a continuous range.
 const STEPS: f64 = 200.0;
-/// Standard deviations about the middle of a bell that a slider reaches.
+/// Range of a slider for a normal distribution, in standard deviations from its centre.
 const BELL: f64 = 3.0;
 
 /// One number of the file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Slider {
-    /// The fields and items that lead to it.
+    /// Path of fields and items that leads to it.
     path: String,
-    /// What the file says.
+    /// Its text in the file.
     says: String,
-    /// Its line, from 1.
+    /// Line in the file, from 1.
     line: usize,
-    /// Whether it is drawn for every field.
+    /// `true` if it is a distribution, sampled for every field.
     drawn: bool,
-    /// The slider's ends.
+    /// Range of the slider.
     low: f64,
     high: f64,
     step: f64,
-    /// Where it stands unless moved.
+    /// Initial position.
     at: f64,
-    /// The only values that it may have; any between its ends where empty.
+    /// Allowed values, for a choice; empty for a continuous range.
     values: Vec<f64>,
 }
 
-/// The sliders of a text: those of distributions first.
+/// Returns the sliders of a text, those of distributions first.
 pub(super) fn sliders(text: &str) -> Vec<Slider> {
     let mut all: Vec<Slider> = quantities(text).into_iter().filter_map(|q| slider(text, &q)).collect();
     all.sort_by_key(|slider| !slider.drawn);
@@ -45,11 +44,11 @@ pub(super) fn sliders(text: &str) -> Vec<Slider> {
 fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
     let says = text[quantity.at.clone()].to_owned();
     let line = text[..quantity.at.start].matches('\n').count() + 1;
-    // Written without a point, these are whole numbers, or may be.
+    // Whole numbers, if written without a decimal point.
     let whole = !says.contains('.');
     let mut values = Vec::new();
     let (drawn, low, high, at) = match &quantity.value {
-        // Seed and size have their own places in the page.
+        // Seed and image size have their own controls in the page.
         Value::Fixed { .. } if quantity.path == "seed" => return None,
         Value::Fixed { number, whole } => {
             let far = if *number == 0.0 { 1.0 } else { 2.0 * number.abs() };
@@ -81,10 +80,10 @@ fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
     Some(Slider { path: quantity.path.clone(), says, line, drawn, low, high, step, at, values })
 }
 
-/// The text with these values in the place of its own; paths that lead nowhere are left out.
+/// Replaces the values at these paths in the text. Paths that do not exist are ignored.
 pub(super) fn with(text: &str, values: &BTreeMap<String, f64>) -> String {
     let mut new = text.to_owned();
-    // From the end, so that places before stay where they are.
+    // From the end, so that earlier byte offsets stay valid.
     for Quantity { path, at, .. } in quantities(text).into_iter().rev() {
         if let Some(value) = values.get(&path) {
             new.replace_range(at, &value.to_string());
@@ -93,10 +92,10 @@ pub(super) fn with(text: &str, values: &BTreeMap<String, f64>) -> String {
     new
 }
 
-/// Writes a value into the scene file in the place of the one that is there, and changes no other byte. `seen` is the text that the user
-/// saw: a file that says something else by now is left alone.
+/// Replaces one value in the scene file and changes no other byte. `seen` is the text that the user saw; if the file
+/// has changed since, it is not written.
 pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<String> {
-    // Where a link leads, so that the link stays.
+    // Resolve links, so that the link itself is kept.
     let file = &file.canonicalize().map_err(Error::reading(file))?;
     let mark = unchanged(file, seen)?;
     let new = with(seen, &BTreeMap::from([(path.to_owned(), value)]));
@@ -105,25 +104,26 @@ pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<S
     }
     check(file, &new)?;
     let permissions = fs::metadata(file).map_err(Error::reading(file))?.permissions();
-    let mut whole = output::Together::default();
+    let mut whole = furrow_output::Together::default();
     whole.add(file, &[mark.as_slice(), new.as_bytes()].concat())?;
-    // Once more, as late as can be: writing takes time, in which an editor may have saved.
+    // Check again as late as possible, because an editor may have saved meanwhile.
     unchanged(file, seen)?;
     if whole.finish()?.is_none() {
-        return Err(Error::failed("somebody has removed the temporary file; nothing was written").in_file(file));
+        return Err(Error::failed("the temporary file was removed; nothing was written").in_file(file));
     }
     fs::set_permissions(file, permissions).map_err(Error::io(file))?;
     Ok(new)
 }
 
-/// Refuses a text that can be read no more, such as one with a number beyond its bounds, in the place of one that can.
+/// Returns an error if the new text is invalid, for example because a number is out of range, while the present one is
+/// valid.
 fn check(file: &Path, new: &str) -> Result<()> {
     let Ok(scene) = SceneFile::open(file) else { return Ok(()) };
     let refused = scene.reread(Some(new)).err();
     refused.map_or(Ok(()), |e| Err(Error::input(format!("{}; nothing was written", e.message())).in_file(file)))
 }
 
-/// The byte order mark of a file that still holds what was seen; an error where it holds something else.
+/// Returns the byte order mark of the file if its text is unchanged; an error otherwise.
 fn unchanged(file: &Path, seen: &str) -> Result<Vec<u8>> {
     let bytes = fs::read(file).map_err(Error::reading(file))?;
     let mark: &[u8] = b"\xef\xbb\xbf";
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!((yaw.drawn, yaw.low, yaw.high), (false, -10.0, 10.0));
     }
 
-    /// Expected: bounds that hold nothing have no slider, and are told when the file is read as a scene.
+    /// Expected: distributions with empty bounds have no slider; they are reported when the file is read as a scene.
     #[test]
     fn bounds_that_hold_nothing_have_no_slider() {
         let normal =
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(paths, ["c"]);
     }
 
-    /// Expected: of all bytes, those of one value are other ones; comments, line ends, a byte order mark and permissions stay.
+    /// Expected: only the bytes of one value change; comments, line endings, byte order mark and permissions are kept.
     #[test]
     fn a_value_is_written_and_nothing_else() {
         use std::os::unix::fs::PermissionsExt;
@@ -174,7 +174,7 @@ mod tests {
         let expected = format!("\u{feff}{}", TEXT.replace("Uniform(1, 9)", "3.5"));
         assert_eq!(fs::read_to_string(&file).unwrap(), expected);
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
-        // By now the file says something else.
+        // The file has changed meanwhile.
         assert!(write(&file, "crops[0].n", 4.0, TEXT).is_err());
         assert!(write(&file, "nothing", 4.0, &expected[3..]).is_err());
         assert_eq!(fs::read_to_string(&file).unwrap(), expected);

@@ -1,23 +1,23 @@
-//! The picture in tev, a program that shows images in high dynamic range (<https://github.com/Tom94/tev>).
+//! Display of the image in tev, a viewer for high dynamic range images (<https://github.com/Tom94/tev>).
 
-use furrow::film::Film;
+use furrow_render::film::Film;
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
-/// Where tev listens unless told otherwise.
+/// Default address of tev.
 const ADDRESS: ([u8; 4], u16) = ([127, 0, 0, 1], 14158);
-/// How long it may take to answer.
+/// Timeout for connecting and writing.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// What the picture is called there.
+/// Name of the image in tev.
 const NAME: &str = "furrow";
 
-/// A connection, made when the first picture is there and again where it was lost.
+/// Connection to tev, opened with the first image and reopened when lost.
 pub(super) struct Tev {
     address: SocketAddr,
     client: Option<TevClient>,
     size: (u32, u32),
-    /// Whether the user has been told that there is none.
+    /// `true` once the user was warned that there is no connection.
     told: bool,
 }
 
@@ -28,7 +28,7 @@ impl Default for Tev {
 }
 
 impl Tev {
-    /// Sends the film's radiance; says so once where tev does not run.
+    /// Sends the radiance of the film. Warns once if tev is not running.
     pub(super) fn send(&mut self, film: &Film) {
         match self.try_send(film) {
             Ok(()) => self.told = false,
@@ -36,7 +36,9 @@ impl Tev {
                 self.client = None;
                 if !std::mem::replace(&mut self.told, true) {
                     let address = self.address;
-                    furrow::tell!("warning: no picture for tev at {address}: {e}; start tev, then save the scene file");
+                    furrow_cli::tell!(
+                        "warning: cannot send the image to tev at {address}: {e}; start tev, then save the scene file"
+                    );
                 }
             }
         }
@@ -76,14 +78,14 @@ impl Tev {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use furrow::film::Pixel;
-    use furrow::geometry::Window;
-    use furrow::math::Spectrum;
+    use furrow_base::geometry::Window;
+    use furrow_base::math::Spectrum;
+    use furrow_render::film::Pixel;
     use std::io::Read;
     use std::net::TcpListener;
 
-    /// Expected: a message that creates the image once, and one with four numbers a pixel for each film, by tev's protocol (version 3 of its
-    /// updates): length, kind, contents, little-endian. Source: tev's `Ipc.cpp`.
+    /// Expected: one message that creates the image, and one with four numbers per pixel for each film, in tev's
+    /// protocol (version 3 of its updates): length, kind, content, little-endian. Source: tev's `Ipc.cpp`.
     #[test]
     fn a_film_is_sent_as_tev_reads_it() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -1,5 +1,5 @@
-//! The thread that grows and renders what is asked for. Whatever is asked for later stops it; a scene file that cannot be rendered leaves the
-//! last picture and says why.
+//! Thread that builds and renders requested fields. A newer request interrupts it. If a scene file cannot be rendered,
+//! the last image is kept and the error is shown.
 
 use super::files::Files;
 use super::picture::{Made, Picture};
@@ -7,36 +7,36 @@ use super::session::{Session, Wish};
 use super::sheet;
 use super::sliders::{sliders, with};
 use super::tev::Tev;
-use furrow::error::Kind;
-use furrow::job::{Field, Renderer, Request, SceneFile, Threads};
-use furrow::render::Watch;
-use furrow::ron_file::RonFile;
-use furrow::scene::assemble::Preview;
-use furrow::settings::{Quality, RenderOptions};
-use furrow::{Error, Result};
+use furrow_base::error::Kind;
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
+use furrow_field::assemble::Preview;
+use furrow_job::{Field, Renderer, Request, SceneFile, Threads};
+use furrow_render::render::Watch;
+use furrow_render::settings::{Quality, RenderOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
 
-/// What renders, and what it has read.
+/// State of the rendering thread.
 pub(super) struct Worker {
     session: Arc<Session>,
     files: Files,
     threads: Threads,
-    /// Most bytes that a field may take.
+    /// Memory limit of a field, bytes.
     memory: Option<u64>,
     renderer: Renderer,
     tev: Option<Tev>,
-    /// What is kept of the last field.
+    /// Data reused from the last field.
     preview: Preview,
-    /// The last scene file that could be read, with its textures and species.
+    /// Last scene file that could be read, with its textures and species.
     known: Option<SceneFile>,
-    /// Pixels across of the scene's own camera, once one was seen.
+    /// Image width of the scene's own camera, once known.
     own_width: Option<u32>,
 }
 
 impl Worker {
-    /// One that has done nothing yet.
+    /// Builds an idle worker.
     pub(super) fn new(
         session: Arc<Session>,
         files: Files,
@@ -58,7 +58,7 @@ impl Worker {
         })
     }
 
-    /// Works until the session ends.
+    /// Handles requests until the session ends.
     pub(super) fn run(mut self) {
         let mut done = 0;
         let session = self.session.clone();
@@ -68,10 +68,10 @@ impl Worker {
                 Err(error) if error.kind() == Kind::Interrupted => {}
                 Err(error) => {
                     self.files.fail(session.path(), error.place().map(|place| place.file.as_path()));
-                    // A slider that is moved on must not print the same words again and again.
+                    // Moving a slider must not print the same error repeatedly.
                     let words = format!("error: {error}");
                     if session.shown(|shown| shown.error.as_ref() != Some(&words)) {
-                        furrow::tell!("{words}");
+                        furrow_cli::tell!("{words}");
                     }
                     session.show(|shown| {
                         (shown.doing, shown.error) = ("", Some(words));
@@ -82,7 +82,7 @@ impl Worker {
         }
     }
 
-    /// Reads, grows and renders.
+    /// Reads the scene file, builds the field and renders it.
     fn answer(&mut self, asked: u64, wish: &Wish) -> Result<()> {
         let (begin, written) = (Instant::now(), SystemTime::now());
         let session = self.session.clone();
@@ -93,7 +93,7 @@ impl Worker {
                 shown.sliders = sliders(&text);
                 shown.text.clone_from(&text);
             }
-            shown.doing = "growing";
+            shown.doing = "building the scene";
         });
         let text = with(&text, &wish.values);
         let scene = match &self.known {
@@ -105,7 +105,7 @@ impl Worker {
         session.show(|shown| shown.foretold = (asked, foretold));
         let field = Arc::new(self.grow(&scene, wish)?);
         if self.files.keep(session.path(), &field.grown().files, written) {
-            // Its buffers, materials or pictures may be older than they are now.
+            // Its buffers, materials or images may have been read before a change.
             session.reload();
         }
         self.known = Some(scene.clone());
@@ -113,16 +113,16 @@ impl Worker {
         let passes: Vec<u32> = passes.chain([session.spp()]).collect();
         let mut first = None;
         if wish.sheet {
-            // The picture comes before the sheet, and its refinement after it.
+            // The first pass of the image comes before the sheet, its refinement after it.
             self.refine(&field, asked, &passes[..1], &mut || *first.get_or_insert_with(|| begin.elapsed()))?;
-            // Of a species or texture that has changed, the text is the same and the hash of what was read is not.
+            // If a species or texture has changed, the text is the same, but the hash of the files read differs.
             let of = [text.as_str(), &field.grown().hash].concat();
             self.sheet(&scene, of, wish, asked)?;
         }
         self.refine(&field, asked, &passes, &mut || *first.get_or_insert_with(|| begin.elapsed()))
     }
 
-    /// Grows the field at the width that is asked for, or at the camera's own where that is less.
+    /// Builds the field at the requested width, or at the camera's own width if that is smaller.
     fn grow(&mut self, scene: &SceneFile, wish: &Wish) -> Result<Field> {
         let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
         let field = scene.clone().width(guess).field(wish.index)?;
@@ -133,7 +133,7 @@ impl Worker {
         if wanted == guess { Ok(field) } else { scene.clone().width(wanted).field(wish.index) }
     }
 
-    /// Shows the field with more and more samples; `first` says how long the first picture took.
+    /// Renders the field with increasing numbers of samples; `first` returns the time to the first image.
     fn refine(
         &mut self,
         field: &Arc<Field>,
@@ -146,7 +146,7 @@ impl Worker {
         if watch.stop.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
-        session.show(|shown| shown.doing = "building");
+        session.show(|shown| shown.doing = "building the BVH");
         field.geometry()?;
         session.show(|shown| shown.doing = "rendering");
         let (mut spp, mut kept) = (passes.iter(), None);
@@ -162,7 +162,7 @@ impl Worker {
         })
     }
 
-    /// Renders what is missing of the sheet of indices.
+    /// Renders the missing thumbnails of the sheet.
     fn sheet(&mut self, scene: &SceneFile, text: String, wish: &Wish, asked: u64) -> Result<()> {
         let session = &self.session;
         let same = |of: &(String, Option<u64>, u64)| of.0 == text && of.1 == wish.seed;
@@ -172,7 +172,7 @@ impl Worker {
             });
         }
         let width = self.own_width.unwrap_or(sheet::WIDTH).min(sheet::WIDTH);
-        // Their fields are others: the picture's is kept apart from them.
+        // The sheet shows other fields, so it has a preview cache separate from the image's.
         let scene = scene.clone().width(width).preview(&Preview::default());
         for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..sheet::COUNT {
             if session.outdated().load(Ordering::Relaxed) {
@@ -181,7 +181,7 @@ impl Worker {
             let picture = match sheet::picture(&scene, index, session.outdated()) {
                 Ok(png) => Ok(Arc::new(png)),
                 Err(error) if error.kind() == Kind::Interrupted => return Err(error),
-                // The others may have pictures.
+                // The other indices may still succeed.
                 Err(error) => Err(format!("error: {error}")),
             };
             session.show(|shown| shown.sheet.pictures.push(picture));

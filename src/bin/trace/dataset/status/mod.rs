@@ -1,52 +1,53 @@
-//! How far a dataset is: `trace dataset status`.
+//! Progress of a dataset: `trace dataset status`.
 
 mod page;
 
-use furrow::cli;
-use furrow::cli::signal::Signals;
-use furrow::dataset::Set;
-use furrow::dataset::status::{FailedImage, ShardStatus, State, Status};
-use furrow::output::write_atomically;
-use furrow::report::{count, number};
-use furrow::{Error, Result};
+use furrow_base::{Error, Result};
+use furrow_cli::cli;
+use furrow_cli::cli::signal::Signals;
+use furrow_dataset::Set;
+use furrow_dataset::make::status::{FailedImage, ShardStatus, State, Status};
+use furrow_output::write_atomically;
+use furrow_report::{count, number};
 use humantime::format_duration;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Between two looks.
+/// Interval between updates.
 const EVERY: Duration = Duration::from_secs(5);
-/// How soon a signal is heeded between them.
+/// Interval of checks for signals in between.
 const HEED: Duration = Duration::from_millis(50);
-/// Failed images that are told to people; `--json` tells all.
+/// Maximum number of failed images printed as text; `--json` lists all.
 const MOST_TOLD: usize = 20;
 
-/// Which dataset.
+/// The dataset, and options.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the dataset.
     dir: PathBuf,
-    /// Look again every five seconds, until all images are there or Ctrl-C.
+    /// Update every five seconds, until all images are done or Ctrl-C.
     #[arg(long)]
     watch: bool,
-    /// Print one JSON object, on one line.
+    /// Print one JSON object on one line.
     #[arg(long)]
     json: bool,
-    /// Write an HTML page as well, which shows all shards and all failures; with --watch it is written again at every look, and loads itself again.
+    /// Also write an HTML page with all shards and all failures. With --watch it is rewritten at every update, and
+    /// reloads itself.
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
-    /// How many shards it is made in; as many as its last run had, unless given.
+    /// Number of shards. Default: that of the last run.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: Option<u64>,
 }
 
-/// Looks once, or until all images are there.
+/// Prints the status once, or until all images are done.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.page.as_deref().map_or(Ok(()), |page| check_page(page, &args.dir))?;
     let stop = signals.heed();
     loop {
-        // It may have got longer meanwhile.
+        // The dataset may have been extended meanwhile.
         let set = Set::open(&args.dir)?;
         let status = Status::of(&set, args.shards, stop)?;
         let text = if args.json { status.json()? + "\n" } else { told(&set, &status) };
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             return Ok(Vec::new());
         }
         if let Err(stopped) = wait(stop) {
-            // Nobody writes it again.
+            // Final page without automatic reload.
             if let Some(path) = &args.page {
                 write_atomically(path, page::html(&set, &status, None).as_bytes())?;
             }
@@ -68,20 +69,20 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// Refuses a page in the place of a folder, or among the dataset's own files.
+/// Returns an error if the page is a folder, or inside the dataset's folder.
 fn check_page(page: &Path, dataset: &Path) -> Result<()> {
     cli::check_file(page)?;
     let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match (folder.canonicalize(), dataset.canonicalize()) {
         (Ok(folder), Ok(dataset)) if folder.starts_with(&dataset) => {
-            let error = Error::misuse("this lies in the dataset's folder, whose files are the dataset's").in_file(page);
+            let error = Error::misuse("this file is inside the dataset's folder").in_file(page);
             Err(error.help("give --page a file elsewhere"))
         }
         _ => Ok(()),
     }
 }
 
-/// Waits until it is time to look again.
+/// Waits for the next update.
 fn wait(stop: &AtomicBool) -> Result<()> {
     let begin = Instant::now();
     while begin.elapsed() < EVERY {
@@ -93,13 +94,13 @@ fn wait(stop: &AtomicBool) -> Result<()> {
     Ok(())
 }
 
-/// Prints; in the place of what stood there where a person watches. Whether somebody reads on.
+/// Prints the text, replacing the previous one on a terminal. Returns `false` if the reader has closed stdout.
 fn print(text: &str, in_place: bool) -> Result<bool> {
     let begin = if in_place && io::stdout().is_terminal() { "\x1b[2J\x1b[H" } else { "" };
     cli::print(&format!("{begin}{text}"))
 }
 
-/// A status in words.
+/// Formats a status as text.
 fn told(set: &Set, status: &Status) -> String {
     let mut text = format!("{}: {}\n", set.folder.display(), summary(status));
     if status.shards.len() > 1 {
@@ -113,21 +114,21 @@ fn told(set: &Set, status: &Status) -> String {
         text += "failed images:\n";
         text.extend(failed(status).iter().skip(1).take(MOST_TOLD).map(|row| format!("{}\n", row.join(": "))));
         if let Some(more) = status.failures.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
-            text.extend([format!("and {more} more; --json and --page tell all\n")]);
+            text.extend([format!("and {more} more; --json and --page list all\n")]);
         }
     }
     text
 }
 
-/// Shard by shard below the heads of columns.
+/// Table of the shards, with headers.
 fn shards(status: &Status) -> Vec<[String; 7]> {
     let heads = ["shard", "images", "done", "failed", "images/h", "left", "state"].map(String::from);
     [heads].into_iter().chain(status.shards.iter().map(row)).collect()
 }
 
-/// The images that took longest below the heads of columns.
+/// Table of the slowest images, with headers.
 fn slowest(status: &Status) -> Vec<[String; 6]> {
-    let heads = ["image", "seconds", "growing", "drawing", "labels", "plants"].map(String::from);
+    let heads = ["image", "seconds", "building", "rendering", "labels", "plants"].map(String::from);
     let rows = status.slowest.iter().map(|image| {
         let [all, grow, draw, label] = [image.seconds, image.grow_s, image.draw_s, image.label_s].map(number);
         [Set::name(image.index), all, grow, draw, label, image.plants.map_or("-".into(), |n| n.to_string())]
@@ -135,21 +136,21 @@ fn slowest(status: &Status) -> Vec<[String; 6]> {
     [heads].into_iter().chain(rows).collect()
 }
 
-/// The images that could not be made below the heads of columns.
+/// Table of the failed images, with headers.
 fn failed(status: &Status) -> Vec<[String; 2]> {
     let row = |failure: &FailedImage| [Set::name(failure.index), failure.error.clone()];
     let heads = ["image", "why"].map(String::from);
     [heads].into_iter().chain(status.failures.iter().map(row)).collect()
 }
 
-/// The most important in a line.
+/// One-line summary.
 fn summary(status: &Status) -> String {
     let mut parts = vec![format!("{} of {} images", status.done, status.images)];
     if !status.failures.is_empty() {
         parts.push(format!("{} failed", status.failures.len()));
     }
     if let Some(rate) = status.images_per_hour {
-        parts.push(format!("{} images an hour", number(rate)));
+        parts.push(format!("{} images per hour", number(rate)));
     }
     if status.is_done() {
         parts.push("all done".into());
@@ -157,12 +158,12 @@ fn summary(status: &Status) -> String {
         parts.extend(status.left_s.map(|left| format!("{} left", time(left))));
         parts.push(match (status.working, &status.shards[..]) {
             (0, [one]) => state(one),
-            (0, _) => "nobody works on it".into(),
-            (n, _) => format!("{} at work", count(n as u64, "run", "runs")),
+            (0, _) => "no run is active".into(),
+            (n, _) => format!("{} active", count(n as u64, "run", "runs")),
         });
     }
     if status.core_s > 0.0 {
-        parts.push(format!("{} core hours in runs that have ended", number(status.core_s / 3600.0)));
+        parts.push(format!("{} core hours in finished runs", number(status.core_s / 3600.0)));
     }
     parts.join(", ")
 }
@@ -181,21 +182,21 @@ fn row(shard: &ShardStatus) -> [String; 7] {
     ]
 }
 
-/// What the last run of a shard does, in words.
+/// Describes the last run of a shard.
 fn state(shard: &ShardStatus) -> String {
     let ago = shard.last_s.map(|last| format!("{} ago", time(last)));
     let (words, when) = match shard.state {
         State::Done => ("done", None),
-        State::Working => ("at work, last heard of", ago),
-        State::Silent => ("perhaps killed, last heard of", ago),
+        State::Working => ("active, last update", ago),
+        State::Silent => ("possibly killed, last update", ago),
         State::Stopped => ("stopped", ago),
         State::Failed => ("ended with failures", ago),
-        State::Missing => ("nobody works on it", None),
+        State::Missing => ("no run is active", None),
     };
     when.map_or(words.to_owned(), |when| format!("{words} {when}"))
 }
 
-/// Seconds as people say them: the two largest units.
+/// Formats a duration with its two largest units.
 fn time(seconds: f64) -> String {
     let words = format_duration(Duration::from_secs(seconds.clamp(0.0, 1e10) as u64)).to_string();
     words.split(' ').take(2).collect::<Vec<_>>().join(" ")

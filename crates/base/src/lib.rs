@@ -1,0 +1,19 @@
+//! Foundations of Furrow: numbers, sampling, geometry, scene-file syntax and errors.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`math`] | vectors, frames, four-band spectra |
+//! | [`sampling`] | seeded streams, Sobol points, warps, tabulated distributions |
+//! | [`geometry`] | rays, hits, meshes, alpha masks |
+//! | [`ron_file`] | RON files whose errors name line and column; numbers with bounds and distributions |
+//! | [`input`] | reading user-supplied files safely |
+//! | [`error`] | the error type of all crates |
+
+pub mod error;
+pub mod geometry;
+pub mod input;
+pub mod math;
+pub mod ron_file;
+pub mod sampling;
+
+pub use error::{Error, Result};

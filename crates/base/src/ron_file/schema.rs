@@ -1,0 +1,148 @@
+//! JSON schema of numbers in files: their bound in words, and whether a distribution is allowed.
+
+use super::bound::Bound;
+use super::num::Num;
+use super::vary::{Pick, Vary};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde_json::Value;
+use std::borrow::Cow;
+
+/// Schema key for the kind of a value: [`FIXED`], [`DRAWN`] or [`PICKED`].
+pub const KIND: &str = "x-kind";
+
+/// Schema key for a number's bound in words, from [`Bound::WORDS`].
+pub const RANGE: &str = "x-range";
+
+/// Schema key for the effective default, as RON, of an optional field without a default of its own.
+pub const DEFAULT: &str = "x-default";
+
+/// Kind of a number that is the same in every field.
+pub const FIXED: &str = "number";
+
+/// Kind of a number that may be a distribution, sampled for every field.
+pub const DRAWN: &str = "number or distribution";
+
+/// Kind of a value that may be a choice of several.
+pub const PICKED: &str = "value or choice";
+
+/// Returns the required fields of the struct or variant of `T`'s file that is called `name` and has the field
+/// `missing`.
+pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> {
+    fn look(schema: &Value, key: Option<&str>, name: &str, missing: &str) -> Option<Vec<String>> {
+        match schema {
+            Value::Object(fields) => {
+                let title = fields.get("title").and_then(Value::as_str);
+                let all = fields.get("required").and_then(Value::as_array);
+                if let Some(all) = all.filter(|all| key.or(title) == Some(name) && all.iter().any(|n| n == missing)) {
+                    return Some(all.iter().filter_map(Value::as_str).map(str::to_owned).collect());
+                }
+                fields.iter().find_map(|(key, inner)| look(inner, Some(key), name, missing))
+            }
+            Value::Array(items) => items.iter().find_map(|inner| look(inner, None, name, missing)),
+            _ => None,
+        }
+    }
+    let schema = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+    look(&schema, None, name, missing).unwrap_or_default()
+}
+
+/// Returns how many of the names on a path into `T`'s file exist, counting the file's own name, and the names allowed
+/// at its end. Names inside a number are not checked.
+pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
+    let root = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+    let mut at = resolved(&root, &root);
+    for (k, step) in path.iter().enumerate() {
+        if at.get(KIND).is_some() {
+            return (path.len(), Vec::new());
+        }
+        match within(&root, at, step) {
+            Some(inner) => at = inner,
+            // The file's own name, or the name in front of a struct's fields.
+            None if k == 0 || step.starts_with(char::is_uppercase) && at.get("properties").is_some() => {}
+            None => return (k, Vec::new()),
+        }
+    }
+    (path.len(), names(&root, at))
+}
+
+/// A name allowed at a place, and whether it takes a number in brackets.
+pub(super) struct Name {
+    pub(super) name: String,
+    pub(super) takes_number: bool,
+}
+
+/// Follows references, options, lists and tables to the inner schema.
+fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
+    let reference = schema.get("$ref").and_then(Value::as_str).and_then(|path| path.strip_prefix("#/$defs/"));
+    let some = schema.get("anyOf").and_then(Value::as_array);
+    let inner = reference
+        .and_then(|name| root.get("$defs")?.get(name))
+        .or_else(|| some?.iter().find(|of| of.get("type") != Some(&"null".into())))
+        .or_else(|| schema.get("items").filter(|of| of.is_object()))
+        .or_else(|| schema.get("additionalProperties").filter(|of| of.is_object()));
+    inner.map_or(schema, |inner| resolved(root, inner))
+}
+
+/// Returns the schema of a field's value or of a variant's content, whichever `at` has under this name.
+fn within<'a>(root: &'a Value, at: &'a Value, step: &str) -> Option<&'a Value> {
+    let field = at.get("properties").and_then(|fields| fields.get(step));
+    let inside = || variants(at).find_map(|variant| variant.get("properties")?.get(step));
+    let bare = || variants(at).find(|variant| variant.get("const").is_some_and(|name| name == step));
+    field.or_else(inside).or_else(bare).map(|inner| resolved(root, inner))
+}
+
+fn variants(at: &Value) -> impl Iterator<Item = &Value> {
+    at.get("oneOf").and_then(Value::as_array).into_iter().flatten()
+}
+
+fn names(root: &Value, at: &Value) -> Vec<Name> {
+    let mut all = Vec::new();
+    for variant in variants(at) {
+        if let Some(name) = variant.get("const").and_then(Value::as_str) {
+            all.push(Name { name: name.into(), takes_number: false });
+        }
+        for (name, inner) in variant.get("properties").and_then(Value::as_object).into_iter().flatten() {
+            all.push(Name { name: name.clone(), takes_number: resolved(root, inner).get(KIND).is_some() });
+        }
+    }
+    all
+}
+
+macro_rules! numbers {
+    ($($name:ident => $kind:expr,)*) => {$(
+        impl<B: Bound> JsonSchema for $name<B> {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "type": "number", "x-kind": $kind, "x-range": B::WORDS })
+            }
+        }
+    )*};
+}
+
+numbers! {
+    Num => FIXED,
+    Vary => DRAWN,
+}
+
+impl<T: JsonSchema> JsonSchema for Pick<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Pick".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = T::json_schema(generator);
+        schema.insert(KIND.to_owned(), PICKED.into());
+        schema
+    }
+}

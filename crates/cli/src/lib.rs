@@ -1,0 +1,9 @@
+//! Code that the programs `trace` and `train` share.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`cli`] | exit codes, signals, shared arguments |
+//! | [`reference`] | the reference of scene, species and experiment files |
+
+pub mod cli;
+pub mod reference;

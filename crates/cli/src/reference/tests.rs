@@ -1,0 +1,97 @@
+//! Method: every example is parsed like a file. Expected: all of them parse, every field has a description, none names a Rust type.
+
+use super::{Reference, scene, species, texture};
+use furrow_base::ron_file::RonFile;
+use furrow_field::desc::{FieldDesc, SpeciesDesc};
+use furrow_optics::texture::draw::Recipe;
+use serde::de::DeserializeOwned;
+
+fn every_example_is_read<T: DeserializeOwned>(reference: &Reference) {
+    let mut wrong = Vec::new();
+    for section in &reference.sections {
+        for entry in &section.entries {
+            let path = super::walk::joined(&section.path, &entry.name);
+            let file = reference.file_with(&path);
+            if let Err(e) = RonFile::of(&file).parse::<T>() {
+                wrong.push(format!("{path}: {file}\n{e}"));
+            } else if !entry.variant && !file.contains(&entry.example) {
+                wrong.push(format!("{path}: {} is not in {file}", entry.example));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn examples_of_scene_files_are_read() {
+    every_example_is_read::<FieldDesc>(&scene());
+}
+
+#[test]
+fn examples_of_species_files_are_read() {
+    every_example_is_read::<SpeciesDesc>(&species());
+}
+
+#[test]
+fn examples_of_texture_recipes_are_read() {
+    every_example_is_read::<Recipe>(&texture());
+}
+
+#[cfg(feature = "train")]
+#[test]
+fn examples_of_experiment_files_are_read() {
+    every_example_is_read::<furrow_train::table::ExperimentDesc>(&super::experiment());
+}
+
+/// Rationale: an example that the program rejects is worse than none. Expected: every example of a hyper-parameter applies to a plan.
+#[cfg(feature = "train")]
+#[test]
+fn examples_of_hyper_parameters_are_taken() {
+    use furrow_train::{Plan, Settings};
+    let reference = super::experiment();
+    let section = reference.sections.iter().find(|section| section.path.ends_with("hyperparameters")).unwrap();
+    assert!(section.entries.len() > 20);
+    for entry in &section.entries {
+        let settings: Settings = ron::from_str(&format!("#![enable(implicit_some)]\n({})", entry.example)).unwrap();
+        settings.apply(&mut Plan::default()).unwrap_or_else(|e| panic!("{}: {e:?}", entry.example));
+    }
+}
+
+#[test]
+fn every_entry_has_words_and_names_no_type_of_the_code() {
+    let mut wrong = Vec::new();
+    for reference in [scene(), species(), texture()] {
+        for section in &reference.sections {
+            for entry in &section.entries {
+                let bare = entry.words.is_empty();
+                if bare || entry.words.contains("::") || entry.words.contains("Desc") || section.words.contains("::") {
+                    wrong.push(format!("{} {}.{}: {}", reference.root, section.path, entry.name, entry.words));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn paths_lead_where_they_say() {
+    let scene = scene();
+    let find = |path: &str| scene.find(path).map(|(s, e)| (s.path.clone(), e.map(|e| e.name.clone())));
+    let at = |path: &str, entry: Option<&str>| Some((path.to_owned(), entry.map(str::to_owned)));
+    assert_eq!(find("soil.clods"), at("soil.clods", None));
+    assert_eq!(find("soil.clods.max_mm"), at("soil.clods", Some("max_mm")));
+    assert_eq!(find("soil.layers.0.share"), at("soil.layers", Some("share")));
+    assert_eq!(find("camera.Pinhole.pose.height_m"), at("camera.Pinhole.pose.Nadir", Some("height_m")));
+    assert_eq!(find("weeds.condition"), find("crops.condition"));
+    assert_eq!(find("camera.JaiAd130.height_m.Normal.mean"), at("camera.JaiAd130", Some("height_m")));
+    assert_eq!(find("soil.clouds"), None);
+    // A path with an unknown step is not found.
+    for path in ["camera.Fone.height_m", "soil.moisture.mean.patch", "soil.clods.max_mm.Uniform", "sown.All.of"] {
+        assert_eq!(find(path), None, "{path}");
+    }
+    assert_eq!(scene.named("max_mm"), ["soil.clods.max_mm", "soil.stones.max_mm"]);
+    let (_, entry) = scene.find("soil.clods.over_5mm_per_m2").unwrap();
+    let entry = entry.unwrap();
+    assert_eq!((entry.unit, entry.range.as_str()), ("m⁻²", "0 or above"));
+    assert_eq!(entry.default.as_deref(), Some("Uniform(8000, 14000)"));
+}

@@ -1,0 +1,5 @@
+//! Verification of a finished dataset.
+
+pub mod difference;
+pub mod listed;
+pub mod verify;

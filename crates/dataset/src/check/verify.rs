@@ -1,0 +1,274 @@
+//! Whether a dataset is whole and is what it says it is.
+
+use crate::check::difference::Difference;
+use crate::check::listed::{Listed, listed};
+use crate::make::finish::{lacks, ranges};
+use crate::make::push;
+use crate::make::render::{LastField, RenderedSample, render, scene_file};
+use crate::make::timing_log;
+use crate::model::image_files::{NAMES, belongs};
+use crate::model::invariants;
+use crate::model::split::Split;
+use crate::pack::store;
+use crate::read::native;
+use crate::read::native::Files;
+use crate::read::packs::Id;
+use crate::read::packs::Packing;
+use crate::read::set::{Set, in_parallel};
+use crate::read::task::{Task, remaining};
+use crate::{File, format};
+use furrow_base::sampling::rng::mix;
+use furrow_base::{Error, Result};
+use furrow_job::{Renderer, Threads};
+use furrow_render::render::Watch;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicBool;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Images that are not there, or not whole.
+    pub missing: Vec<u64>,
+    /// What is wrong, one sentence each.
+    pub faults: Vec<String>,
+    /// What was not checked for want of images; nothing where none is missing.
+    pub unchecked: Option<String>,
+    /// Images that were checked.
+    pub checked: u64,
+    /// Images that were rendered again and came out the same, or nearly so where that was done by other kernels.
+    pub rendered: u64,
+    /// Whether other ray tracing kernels rendered them again than made them.
+    pub kernels: Option<OtherKernels>,
+}
+
+/// Ray tracing kernels that make other bytes of the same images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OtherKernels {
+    /// Those that made the dataset.
+    pub there: String,
+    /// Those of this program.
+    pub here: String,
+    /// How far the images differ at most.
+    pub most: Difference,
+}
+
+impl OtherKernels {
+    /// Nothing where the renderer has the dataset's kernels.
+    pub fn of(set: &Set, renderer: &Renderer) -> Result<Option<Self>> {
+        let (there, here) = (set.recipe.rendering()?.kernels.clone(), renderer.kernels().to_owned());
+        Ok((there != here).then_some(Self { there, here, most: Difference::NONE }))
+    }
+}
+
+impl Findings {
+    /// Everything that was found in one error, or nothing; `shards` is how many the dataset is made in, where that is known.
+    pub fn verdict(&self, set: &Set, shards: Option<u64>) -> Result<()> {
+        const MOST: usize = 20;
+        let mut words: Vec<String> = self.faults.iter().take(MOST).cloned().collect();
+        if self.faults.len() > MOST {
+            words.push(format!("and {} more", self.faults.len() - MOST));
+        }
+        if !self.missing.is_empty() {
+            words.push(lacks(set, &self.missing, shards).to_string());
+        }
+        if words.is_empty() { Ok(()) } else { Err(Error::damaged(words.join("\nerror: "))) }
+    }
+}
+
+/// What is rendered anew.
+#[derive(Clone, Copy, Default)]
+pub struct Again<'a> {
+    /// How many images.
+    pub images: u64,
+    /// What renders them; none of imported ones.
+    pub renderer: Option<&'a Renderer>,
+    /// Most bytes of memory that a field may take, where not the usual.
+    pub memory: Option<u64>,
+}
+
+/// Checks every file and every invariant, and renders images anew.
+pub fn verify(
+    set: &Set,
+    again: &Again<'_>,
+    threads: &Threads,
+    done: &(dyn Fn(u64) + Sync),
+    stop: &AtomicBool,
+) -> Result<Findings> {
+    push::refuse_freed(set)?;
+    let count = set.recipe.count;
+    let cut = threads.install(|| store::cut_short(set));
+    let look_at = |index: u64| {
+        if stop.load(std::sync::atomic::Ordering::Relaxed) {
+            return Err(Error::stopped("stopped before all images were checked; nothing was changed"));
+        }
+        // What is wrong with its archive is told once.
+        let looked = if store::lies_in(set, &cut, index) { Looked::MISSING } else { look(set, index)? };
+        done(index);
+        Ok(looked)
+    };
+    let looked: Vec<Looked> = threads.install(|| in_parallel(0..count, look_at).collect::<Result<_>>())?;
+    let mut found = Findings { faults: threads.install(|| in_archives(set)), ..Findings::default() };
+    for (index, looked) in (0..count).zip(&looked) {
+        if looked.missing {
+            found.missing.push(index);
+        } else {
+            found.checked += 1;
+        }
+        found.faults.extend(looked.faults.iter().cloned());
+    }
+    found.faults.extend(shared_between_splits(set, &looked));
+    found.faults.extend(made_differently(set)?);
+    let Listed { mut faults, unchecked } = listed(set, &found.missing)?;
+    // An archive may have been told of already.
+    let told: BTreeSet<&String> = found.faults.iter().collect();
+    faults.retain(|fault| !told.contains(fault));
+    // Those of images may be so many that the last are not told.
+    faults.append(&mut found.faults);
+    found.faults = faults;
+    if !found.missing.is_empty() {
+        let photographs = "whether missing photographs are in two splits".to_owned();
+        found.unchecked = Some(unchecked.into_iter().chain([photographs]).collect::<Vec<_>>().join("; "));
+    }
+    let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
+    found.kernels = OtherKernels::of(set, renderer)?;
+    let scene = scene_file(set)?.memory(again.memory).threads(threads);
+    let mut kept = LastField::default();
+    for index in drawn(count, again.images) {
+        if found.missing.contains(&index) {
+            continue;
+        }
+        let made = render(set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
+        let fault = match &mut found.kernels {
+            None => other_bytes(set, &made)?,
+            Some(kernels) => too_far(set, &made, kernels)?,
+        };
+        match fault {
+            Some(fault) => found.faults.push(fault),
+            None => found.rendered += 1,
+        }
+    }
+    Ok(found)
+}
+
+/// What was seen of one image.
+struct Looked {
+    missing: bool,
+    faults: Vec<String>,
+    /// SHA-256 of its photograph.
+    photograph: Option<String>,
+}
+
+impl Looked {
+    const MISSING: Self = Self { missing: true, faults: Vec::new(), photograph: None };
+}
+
+fn look(set: &Set, index: u64) -> Result<Looked> {
+    let name = Set::name(index);
+    let Some(checksums) = set.checksums(index) else {
+        return Ok(Looked::MISSING);
+    };
+    let mut faults: Vec<String> =
+        set.faults(&checksums).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
+    let mut missing = !faults.is_empty();
+    if !missing && remaining(set, &checksums)? != Task::Done {
+        missing = true;
+        faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
+    }
+    faults.extend(strays(set, &name));
+    if !missing {
+        match set.sample(index) {
+            Ok(sample) => {
+                let broken = invariants::faults(&set.recipe, &sample);
+                faults.extend(broken.into_iter().map(|fault| format!("image {name}: {fault}")));
+            }
+            Err(e) => faults.push(e.to_string()),
+        }
+    }
+    let mut photographs = checksums.files.iter().filter(|(path, _)| native::is_photograph(path));
+    let photograph = photographs.next().map(|(_, sum)| sum.sha256.clone());
+    Ok(Looked { missing, faults, photograph })
+}
+
+/// Files that lie beside an image though its dataset goes without them, each with what is wrong with it: nobody reads them.
+fn strays(set: &Set, name: &str) -> Vec<String> {
+    let others = NAMES.iter().filter(|file| !belongs(&set.recipe, file));
+    let paths = others.map(|file| format!("{}/{file}", native::folder(name)));
+    let there = paths.filter(|path| set.length(path).is_ok());
+    there.map(|path| format!("{path} does not belong here: the recipe leaves it out; remove it")).collect()
+}
+
+/// Archives of images that were changed, or are not written yet.
+fn in_archives(set: &Set) -> Vec<String> {
+    let Some(packing) = Packing::of(&set.recipe) else { return Vec::new() };
+    let all: Vec<Id> = packing.all().collect();
+    let fault = |id: &Id| {
+        let path = id.path();
+        let fault = match set.packs.get(&set.folder, *id) {
+            Some(record) => record.tar.fault(&set.folder.join(&path))?,
+            None => "is not written yet, or its record in seals/ is damaged".into(),
+        };
+        Some(format!("{path} {fault}"))
+    };
+    all.par_iter().filter_map(fault).collect()
+}
+
+/// Photographs that are in two splits.
+fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
+    let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
+    for (index, looked) in looked.iter().enumerate() {
+        if let Some(hash) = &looked.photograph {
+            places.entry(hash).or_default().insert(set.recipe.split_of(index as u64));
+        }
+    }
+    let twice = places.values().filter(|splits| splits.len() > 1).count();
+    if twice == 0 { Vec::new() } else { vec![format!("{twice} photographs are in two splits")] }
+}
+
+/// Images that two runs made differently.
+fn made_differently(set: &Set) -> Result<Vec<String>> {
+    let mut images: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
+    for row in timing_log::rows(&set.folder)? {
+        images.entry(row.index).or_default().insert(row.image);
+    }
+    let several: Vec<u64> = images.into_iter().filter(|(_, found)| found.len() > 1).map(|(index, _)| index).collect();
+    if several.is_empty() {
+        return Ok(Vec::new());
+    }
+    Ok(vec![format!("two runs made different files of the images {}: are all machines alike?", ranges(&several))])
+}
+
+/// Which images are rendered again: spread over the dataset, the same ones every time.
+fn drawn(count: u64, again: u64) -> Vec<u64> {
+    let mut all: Vec<u64> = (0..count).collect();
+    all.sort_by_key(|k| mix(*k));
+    all.truncate(again.min(count) as usize);
+    all.sort_unstable();
+    all
+}
+
+/// The files of an image that come out otherwise.
+fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
+    let mut files = native::files(&set.recipe, &made.sample, &made.text)?;
+    for (_, format) in format::all(&set.recipe)? {
+        files.extend(format.image(&set.recipe, &made.sample)?);
+    }
+    let differs = |file: &&File| set.contents(&file.path).ok().as_ref() != Some(&file.bytes);
+    let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
+    Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
+}
+
+/// That an image comes out further away than other kernels explain.
+fn too_far(set: &Set, made: &RenderedSample, kernels: &mut OtherKernels) -> Result<Option<String>> {
+    let name = &made.sample.record.name;
+    let difference = Difference::between(&set.sample(made.sample.record.index)?, &made.sample);
+    kernels.most = kernels.most.max(difference);
+    let fault = || {
+        format!(
+            "image {name}: rendered again by {}, it differs in {difference}; other kernels explain {} at most",
+            kernels.here,
+            Difference::ALLOWED
+        )
+    };
+    Ok((!difference.within(Difference::ALLOWED)).then(fault))
+}

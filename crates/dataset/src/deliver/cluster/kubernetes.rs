@@ -1,0 +1,47 @@
+//! Kubernetes: an indexed job that renders, and one to be applied when it has ended.
+//!
+//! Source: Kubernetes documentation, "Indexed Job for Parallel Processing with Static Work Assignment" and "Handling retriable and
+//! non-retriable pod failures with Pod failure policy".
+
+use super::request::{Job, Pod};
+use super::script::{fill, name};
+use crate::File;
+use furrow_base::{Error, Result};
+
+/// Where the volume is mounted in a pod.
+const MOUNT: &str = "/data";
+
+/// Most pods at once; a cluster with fewer cores starts them one after the other.
+const PARALLELISM: u64 = 64;
+
+/// The two jobs and the script that applies them.
+pub(super) fn files(dir: &str, job: &Job, pod: &Pod) -> Result<Vec<File>> {
+    let dataset = format!("{MOUNT}/{}", dir.rsplit('/').next().unwrap_or_default());
+    let program = job.program.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let names = [
+        ("NAME", name(dir)),
+        ("DATASET_YAML", text(&dataset)?),
+        ("DATASET", dataset),
+        ("MOUNT_YAML", text(MOUNT)?),
+        ("IMAGE_YAML", text(&pod.image)?),
+        ("CLAIM_YAML", text(&pod.claim)?),
+        ("CLAIM", pod.claim.clone()),
+        ("TRACE_YAML", text(&program)?),
+        ("SHARDS", job.shards.to_string()),
+        ("PARALLELISM", job.shards.min(PARALLELISM).to_string()),
+        ("CPUS", job.cpus.to_string()),
+        ("MEMORY", job.memory_gib.to_string()),
+        ("AGAIN", job.again.to_string()),
+    ];
+    Ok(vec![
+        fill("submit.sh", include_str!("kubernetes-submit.sh"), &names),
+        fill("render.yaml", include_str!("kubernetes-render.yaml"), &names),
+        fill("finish.yaml", include_str!("kubernetes-finish.yaml"), &names),
+    ])
+}
+
+/// A text of a YAML document: JSON is YAML. A `$(` of an argument would name a variable.
+fn text(of: &str) -> Result<String> {
+    serde_json::to_string(&of.replace("$(", "$$("))
+        .map_err(|e| Error::failed(format!("{of:?} cannot be written as YAML: {e}")))
+}

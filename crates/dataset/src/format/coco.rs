@@ -1,0 +1,269 @@
+//! COCO instances and keypoints: `annotations/instances_SPLIT.json` of plants, `annotations/leaves_SPLIT.json` of leaves, and
+//! `images/SPLIT/NAME.png` (`.jpg` of a dataset with such photographs); `pycocotools.coco.COCO` reads them.
+//!
+//! Categories are 1 crop and 2 weed, or the classes that the dataset was given, and in the file of leaves the next, leaf. Every plant and every leaf that an image shows is an annotation:
+//! `segmentation` is a compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its
+//! number of pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none. Leaves have a file of their own, for `COCOeval` looks at
+//! the hundred best answers of an image unless it is told otherwise, and an image may show hundreds of leaves.
+//!
+//! Keypoints: the stem of a plant, base and tip of a leaf. A point in sight has 2, a hidden one 1, one outside the image `0 0 0`. Points are in
+//! the coordinates of the boxes, where the first pixel's centre is (0.5, 0.5).
+//!
+//! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
+//! species, and how much is visible.
+//!
+//! Of drives, rigs and days, files have the keys of data sets of videos: a list of `videos`, one for each camera of each field; of images
+//! `video_id`, `frame_id` from 0 in the order of time, and `camera`; of annotations `video_id`, and the identity of the plant or leaf, which stays the same
+//! in all images of its field, as `instance_id` (MMTracking's CocoVID), as `track_id` (TAO) and as `track_id` among the attributes.
+//!
+//! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
+
+use super::videos::Videos;
+use super::{Format, Whole, picture};
+use crate::format::labels::Labels;
+use crate::model::recipe::Recipe;
+use crate::model::record::{Keypoint, Plant, PointState, Record, Seen};
+use crate::model::sample::Sample;
+use crate::read::set::{Set, Stream};
+use crate::model::split::Split;
+use crate::File;
+use furrow_base::Result;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "coco";
+
+impl Format for Writer {
+    fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let Record { name, split, .. } = &sample.record;
+        Ok(vec![picture::photograph(sample, &format!("{FOLDER}/images/{}/{name}", split.name()))?])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let labels = Labels::of(&set.recipe)?;
+        let videos = Videos::of(set)?;
+        for split in Split::ALL {
+            if set.names(split).is_empty() {
+                continue;
+            }
+            for (file, categories, of_image) in [
+                ("instances", plant_categories(&labels), plants as OfImage),
+                ("leaves", vec![about_leaves(&labels)], leaves as OfImage),
+            ] {
+                out.file(&format!("{FOLDER}/annotations/{file}_{}.json", split.name()), |w| {
+                    head(w, set, split, videos.as_ref())?;
+                    w.put("\"categories\": [")?;
+                    w.items(categories.into_iter().map(Ok))?;
+                    w.put("],\n\"annotations\": [")?;
+                    w.items(annotations(set, &labels, split, (of_image, videos.as_ref())))?;
+                    w.put("]\n}\n")
+                })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What COCO files of all kinds begin with: where they come from, their licence, their videos where there are some, their images.
+pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split, videos: Option<&Videos>) -> Result<()> {
+    let recipe = &set.recipe;
+    let info = json!({ "description": "Crop fields rendered by Furrow", "version": recipe.furrow });
+    w.put("{\n\"info\": ")?;
+    w.json(&info)?;
+    w.put(",\n\"licenses\": ")?;
+    w.json(&json!([{ "id": 1, "name": recipe.licence, "url": "" }]))?;
+    if let Some(videos) = videos {
+        w.put(",\n\"videos\": [")?;
+        w.items(videos.entries(set, split))?;
+        w.put("]")?;
+    }
+    w.put(",\n\"images\": [")?;
+    w.items(set.records(split).map(|record| image(set, videos, &record?)))?;
+    w.put("],\n")
+}
+
+/// The id of an image, from 1.
+pub(super) fn image_id(record: &Record) -> u64 {
+    record.index + 1
+}
+
+fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
+    let mut image = json!({
+        "id": image_id(record),
+        "file_name": format!("{}.{}", record.name, set.recipe.photo().ending()),
+        "width": record.width,
+        "height": record.height,
+        "license": 1,
+    });
+    if let (Some(videos), Some(capture)) = (videos, &record.capture) {
+        image["video_id"] = videos.id(capture)?.into();
+        image["frame_id"] = capture.frame.into();
+        image["camera"] = capture.camera.clone().into();
+    }
+    Ok(image)
+}
+
+/// The category of a class: its place among those that plants may have, from 1.
+pub(super) fn category(labels: &Labels<'_>, class: u8) -> u32 {
+    labels.of_plants().iter().take_while(|of| **of != class).count() as u32 + 1
+}
+
+/// The category of leaves, behind those of plants.
+pub(super) fn leaf_category(labels: &Labels<'_>) -> u32 {
+    labels.of_plants().len() as u32 + 1
+}
+
+/// Categories of plants.
+fn plant_categories(labels: &Labels<'_>) -> Vec<Value> {
+    let about = |class: u8| {
+        let (id, name) = (category(labels, class), &labels.classes()[usize::from(class)].name);
+        json!({ "id": id, "name": name, "supercategory": "plant", "keypoints": ["stem"], "skeleton": [] })
+    };
+    labels.of_plants().into_iter().map(about).collect()
+}
+
+/// The category of leaves: the blade runs from its first keypoint to its second.
+fn about_leaves(labels: &Labels<'_>) -> Value {
+    let id = leaf_category(labels);
+    json!({ "id": id, "name": "leaf", "supercategory": "organ", "keypoints": ["base", "tip"], "skeleton": [[1, 2]] })
+}
+
+/// A plant or a leaf.
+#[derive(Serialize)]
+struct Annotation {
+    id: u64,
+    image_id: u64,
+    category_id: u32,
+    segmentation: Value,
+    area: u32,
+    bbox: Value,
+    iscrowd: u32,
+    keypoints: Vec<Value>,
+    num_keypoints: usize,
+    attributes: Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    video_id: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instance_id: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    track_id: Option<u32>,
+}
+
+impl Annotation {
+    /// The same of a plant or a leaf that has this identity in all images of its field.
+    fn in_video(self, video: u64, identity: Option<u32>) -> Self {
+        let mut attributes = self.attributes;
+        attributes["track_id"] = identity.into();
+        Self { attributes, video_id: Some(video), instance_id: identity, track_id: identity, ..self }
+    }
+}
+
+/// What of an image a file tells, each with its identity.
+type OfImage = fn(&Set, &Labels<'_>, &Record) -> Vec<(Annotation, Option<u32>)>;
+
+/// All annotations of a split, image by image.
+fn annotations<'a>(
+    set: &'a Set,
+    labels: &'a Labels<'a>,
+    split: Split,
+    (of_image, videos): (OfImage, Option<&'a Videos>),
+) -> impl Iterator<Item = Result<Annotation>> + 'a {
+    let of_record = move |record: Record| -> Result<Vec<Annotation>> {
+        let video = match (videos, &record.capture) {
+            (Some(videos), Some(capture)) => Some(videos.id(capture)?),
+            _ => None,
+        };
+        let told = |(annotation, identity): (Annotation, Option<u32>)| match video {
+            Some(video) => annotation.in_video(video, identity),
+            None => annotation,
+        };
+        Ok(of_image(set, labels, &record).into_iter().map(told).collect())
+    };
+    let of_image = move |record: Result<Record>| match record.and_then(of_record) {
+        Ok(all) => all.into_iter().map(Ok).collect(),
+        Err(e) => vec![Err(e)],
+    };
+    let numbered = |(i, annotation): (usize, Result<Annotation>)| {
+        annotation.map(|annotation| Annotation { id: i as u64 + 1, ..annotation })
+    };
+    set.records(split).flat_map(of_image).enumerate().map(numbered)
+}
+
+/// The plants.
+fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
+    let of_plant = |(plant, class): (&Plant, u8)| {
+        (annotation(record, category(labels, class), &plant.seen, &[plant.stem], about(set, plant)), plant.id)
+    };
+    labels.plants(record).map(of_plant).collect()
+}
+
+/// The leaves.
+fn leaves(_set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
+    let mut all = Vec::new();
+    for plant in record.seen() {
+        let Some(class) = labels.class(plant) else { continue };
+        for leaf in labels.leaves(plant) {
+            let about = json!({
+                "plant": plant.number,
+                "leaf": leaf.number,
+                "class": labels.classes()[usize::from(class)].name,
+                "visible_fraction": leaf.seen.visible_fraction(),
+                "inside_fraction": leaf.seen.inside_fraction(),
+            });
+            let points = [leaf.base, leaf.tip];
+            all.push((annotation(record, leaf_category(labels), &leaf.seen, &points, about), leaf.id));
+        }
+    }
+    all
+}
+
+fn annotation(
+    record: &Record,
+    category_id: u32,
+    seen: &Seen,
+    points: &[Option<Keypoint>],
+    attributes: Value,
+) -> Annotation {
+    let points: Vec<[Value; 3]> =
+        points.iter().map(|p| keypoint(*p).unwrap_or_else(|| [0, 0, 0].map(Value::from))).collect();
+    Annotation {
+        id: 0,
+        image_id: image_id(record),
+        category_id,
+        segmentation: json!(seen.mask),
+        area: seen.pixels,
+        bbox: json!(seen.bounds),
+        iscrowd: 0,
+        num_keypoints: points.iter().filter(|p| p[2] != 0).count(),
+        keypoints: points.concat(),
+        attributes,
+        video_id: None,
+        instance_id: None,
+        track_id: None,
+    }
+}
+
+/// x, y, and 2 in sight, 1 behind something; `None` outside the image.
+fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
+    let Keypoint { x, y, state } = point?;
+    let v = match state {
+        PointState::Visible => 2,
+        PointState::Hidden => 1,
+        PointState::Outside => return None,
+    };
+    // A hundredth of a pixel; more digits say nothing.
+    let rounded = |x: f32| Value::from((f64::from(x) * 100.0).round() / 100.0);
+    Some([rounded(x), rounded(y), v.into()])
+}
+
+fn about(set: &Set, plant: &Plant) -> Value {
+    json!({
+        "plant": plant.number,
+        "species": set.recipe.species_name(plant.kind),
+        "bbch": plant.grown.as_ref().map(|g| g.bbch),
+        "visible_fraction": plant.seen.visible_fraction(),
+        "inside_fraction": plant.seen.inside_fraction(),
+    })
+}

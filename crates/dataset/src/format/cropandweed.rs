@@ -1,0 +1,251 @@
+//! CropAndWeed: `images/NAME.jpg`, `bboxes/CropAndWeed/NAME.csv`, `labelIds/CropAndWeed/NAME.png`, `params/NAME.csv`, with
+//! NAME = `ave-SSSS-IIII`: session and image, which together are the image's number.
+//!
+//! A row of `bboxes` is a plant: left, top, right, bottom, label, stem x, stem y, whole pixels and no head, as the dataset's own
+//! scripts read it. Right and bottom are the first column and row beyond the plant. A stem outside the image keeps its place there;
+//! −1, −1 is one that nobody knows.
+//!
+//! Labels are those of CropAndWeed where it has the species, found by its EPPO code; maize and sugar beet by their leaves, which
+//! BBCH 12 to 19 count. Other species get labels from 100 on, 255 is a plant of no species. `labels.json` tells them all. In
+//! `labelIds` a plant's pixels have its label, soil and pixels without a label have 0.
+//!
+//! Images are JPEG, because the original's are and its scripts look for that name; unless the dataset's own are JPEG, other formats have them without loss.
+//!
+//! `params` are what annotators judged by eye; here numbers decide, as `labels.json` tells. `train.txt`, `val.txt` and `test.txt` list the names
+//! of each split, for which the original has no folders.
+//!
+//! Source: Steininger et al. 2023, "The CropAndWeed Dataset", and its repository, `cnw/utilities/datasets.py`,
+//! `cnw/map_dataset.py`.
+
+use super::conditions::Brief;
+use super::{Format, Whole, picture};
+use crate::format::labels;
+use crate::model::photo::Photo;
+use crate::model::recipe::Recipe;
+use crate::model::record::{Plant, Record};
+use crate::model::sample::Sample;
+use crate::read::set::Set;
+use crate::model::split::Split;
+use crate::File;
+use furrow_output::Picture;
+use furrow_base::{Error, Result};
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "cropandweed";
+
+/// Images of a session: four digits.
+const SESSION: u64 = 10_000;
+
+/// Quality of the JPEG images, of 100.
+const QUALITY: u8 = 95;
+
+/// CropAndWeed's labels by EPPO code.
+const LABELS: &[(&str, u8)] = &[
+    ("AGOGI", 72), ("ALLSA", 93), ("AMARE", 32), ("ARTVU", 53), ("AVEFA", 84), ("BARVU", 83), ("BEAVX", 7), ("BROMO", 81),
+    ("BROSE", 86), ("CADDR", 47), ("CAPBP", 51), ("CENCY", 71), ("CHEAL", 33), ("CHEHY", 29), ("CIRAR", 38), ("CNISA", 23),
+    ("CONAR", 52), ("DATST", 34), ("DIGSA", 62), ("ECHCG", 31), ("EQUAR", 98), ("FUMOF", 63), ("GAETE", 67), ("GALAP", 46),
+    ("GASPA", 35), ("GERPU", 70), ("GLXMA", 94), ("HELAN", 24), ("HORMU", 74), ("LACSE", 88), ("LAMPU", 76), ("MATCH", 36),
+    ("MATMT", 78), ("PAPRH", 85), ("PHSVX", 26), ("PIBSX", 13), ("PLALA", 77), ("PLAMA", 57), ("POAAN", 65), ("POATR", 68),
+    ("POLAV", 87), ("POLCO", 30), ("POLLA", 44), ("POLPE", 66), ("POROL", 40), ("RANRE", 73), ("SENVU", 55), ("SETVI", 69),
+    ("SINAR", 96), ("SOLNI", 41), ("SOLTU", 18), ("SONAR", 39), ("SPRAR", 61), ("STEME", 79), ("TAROF", 99), ("THLAR", 60),
+    ("VERHE", 64), ("VICFX", 27), ("VIOTR", 82), ("ZEAMX", 1),
+];
+
+/// Species whose label is followed by those of their leaf stages.
+const STAGED: [&str; 2] = ["ZEAMX", "BEAVX"];
+
+/// The stages behind such a species' label: the least BBCH, and its name.
+const STAGES: [(u32, &str); 5] = [
+    (12, "two-leaf stage"),
+    (14, "four-leaf stage"),
+    (16, "six-leaf stage"),
+    (18, "eight-leaf stage"),
+    (19, "max"),
+];
+
+/// Labels of species that CropAndWeed does not have.
+const OWN: std::ops::Range<u16> = 100..255;
+
+/// A plant of no species.
+const VEGETATION: u8 = 255;
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let name = name(record.index);
+        let labels = Labels::of(recipe)?;
+        let mut rows = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+        let mut of_plant = BTreeMap::new();
+        let listed: BTreeSet<u32> = labels::Labels::of(recipe)?.plants(record).map(|(plant, _)| plant.number).collect();
+        for plant in record.seen() {
+            let label = labels.of_plant(plant);
+            of_plant.insert(plant.number, label);
+            if listed.contains(&plant.number)
+                && let Some(row) = row(plant, label) {
+                rows.serialize(row).map_err(|e| failed(&e))?;
+            }
+        }
+        let mut rows = rows.into_inner().map_err(|e| failed(&e))?;
+        if rows.is_empty() {
+            rows.push(b'\n');
+        }
+        let map: Vec<u8> = sample.plants.iter().map(|plant| of_plant.get(plant).copied().unwrap_or(0)).collect();
+        Ok(vec![
+            picture::photograph_as_jpeg(sample, format!("{FOLDER}/images/{name}.jpg"), QUALITY)?,
+            File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows },
+            picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &Picture::Gray(&map))?,
+            File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).csv()? },
+        ])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        for split in Split::ALL {
+            let of_split = (0..set.recipe.count).filter(|k| set.recipe.split_of(*k) == split);
+            let names: String = of_split.map(|k| name(k) + "\n").collect();
+            if !names.is_empty() {
+                out.file(&format!("{FOLDER}/{}.txt", split.name()), |w| w.put(names))?;
+            }
+        }
+        let labels = Labels::of(&set.recipe)?;
+        out.file(&format!("{FOLDER}/labels.json"), |w| {
+            w.put("{\n\"labels\": [")?;
+            w.items(labels.told(&set.recipe).into_iter().map(Ok))?;
+            w.put("],\n\"params\": ")?;
+            w.json(&Params::ABOUT)?;
+            w.put("\n}\n")
+        })
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let lossless = recipe.photo() == Photo::Png;
+        let photographs = "photographs are JPEG, as its scripts expect; the other formats have them without loss";
+        let labels = "its labels are CropAndWeed's own, whatever --classes says";
+        let all = [(lossless, photographs), (recipe.labelling.classes.is_some(), labels)];
+        all.into_iter().filter(|(told, _)| *told).map(|(_, words)| words.to_owned()).collect()
+    }
+}
+
+fn name(index: u64) -> String {
+    format!("ave-{:04}-{:04}", index / SESSION, index % SESSION)
+}
+
+/// Left, top, right, bottom, label, stem across and down (−1 without a stem) of a plant; `None` where nothing of it is seen.
+fn row(plant: &Plant, label: u8) -> Option<[i64; 7]> {
+    let [x, y, w, h] = plant.seen.bounds?.0.map(i64::from);
+    let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor() as i64, p.y.floor() as i64));
+    Some([x, y, x + w, y + h, i64::from(label), stem_x, stem_y])
+}
+
+fn failed(e: &dyn std::fmt::Display) -> Error {
+    Error::failed(format!("cannot write a table of CropAndWeed: {e}"))
+}
+
+/// The label of each species of a recipe, by its number less one.
+struct Labels(Vec<u8>);
+
+impl Labels {
+    fn of(recipe: &Recipe) -> Result<Self> {
+        let mut own = OWN;
+        let label = |eppo: &str| LABELS.iter().find(|(code, _)| *code == eppo).map(|(_, label)| *label);
+        let of_species = |species: &furrow_field::record::SpeciesRecord| match label(&species.eppo) {
+            Some(label) => Ok(label),
+            None => own.next().map(|n| n as u8).ok_or_else(too_many),
+        };
+        recipe.species.iter().map(of_species).collect::<Result<_>>().map(Self)
+    }
+
+    fn of_plant(&self, plant: &Plant) -> u8 {
+        let Some(label) = usize::from(plant.kind).checked_sub(1).and_then(|i| self.0.get(i)) else { return VEGETATION };
+        let Some(grown) = plant.grown.as_ref().filter(|g| STAGED.contains(&g.eppo.as_str())) else { return *label };
+        label + STAGES.iter().filter(|(least, _)| grown.bbch >= *least).count() as u8
+    }
+
+    /// What each label means.
+    fn told(&self, recipe: &Recipe) -> Vec<serde_json::Value> {
+        let mut all = vec![json!({ "label": 0, "name": "soil" })];
+        for (species, label) in recipe.species.iter().zip(&self.0) {
+            let whose = if OWN.contains(&u16::from(*label)) { "this dataset" } else { "CropAndWeed" };
+            let (name, eppo, class) = (&species.name, &species.eppo, species.class.name());
+            let mut tell = |label: u8, name: &str| {
+                all.push(json!({ "label": label, "name": name, "eppo": eppo, "class": class, "of": whose }));
+            };
+            tell(*label, name);
+            if STAGED.contains(&eppo.as_str()) {
+                for (k, (_, stage)) in (1..).zip(STAGES) {
+                    tell(label + k, &format!("{name}, {stage}"));
+                }
+            }
+        }
+        all.push(json!({ "label": VEGETATION, "name": "vegetation of no species" }));
+        all
+    }
+}
+
+fn too_many() -> Error {
+    Error::input(format!("the scene file has more than {} species that CropAndWeed has no labels for, more than 8 bits number", OWN.len())).help(format!("make two scene files of it, or \
+         leave out --format {FOLDER}"))
+}
+
+/// An image's circumstances in the steps of CropAndWeed; empty where they are not known.
+struct Params([(&'static str, Option<u8>); 4]);
+
+impl Params {
+    const ABOUT: [&'static str; 4] = [
+        "moisture: mean of the soil, below 1/3 is 0 (dry), below 2/3 is 1, else 2 (wet)",
+        "soil: clods longer than 5 mm on a square metre, below 10000 is 0 (fine), below 12000 is 1, else 2 (coarse)",
+        "lighting: 0 (sunny) where more than half of the ground's visible light comes straight from the sun, else 1 (diffuse)",
+        "separability: share of the plants' pixels that nothing hides, from 0.95 on is 0 (easy), from 0.8 on is 1, else 2 (hard)",
+    ];
+
+    fn of(record: &Record) -> Self {
+        let brief = Brief::of(record);
+        let step = |value: f64, bounds: [f64; 2]| bounds.iter().filter(|bound| value >= **bound).count() as u8;
+        Self([
+            ("moisture", brief.moisture().map(|m| step(m, [1.0 / 3.0, 2.0 / 3.0]))),
+            ("soil", brief.clods_per_m2().map(|n| step(n, [10_000.0, 12_000.0]))),
+            ("lighting", brief.sun_share().map(|share| u8::from(share <= 0.5))),
+            ("separability", visible(record).map(|share| 2 - step(share, [0.8, 0.95]))),
+        ])
+    }
+
+    /// A head and a row.
+    fn csv(&self) -> Result<Vec<u8>> {
+        let mut rows = csv::Writer::from_writer(Vec::new());
+        rows.serialize(self.0.map(|(name, _)| name)).map_err(|e| failed(&e))?;
+        rows.serialize(self.0.map(|(_, value)| value)).map_err(|e| failed(&e))?;
+        rows.into_inner().map_err(|e| failed(&e))
+    }
+}
+
+/// Share of the plants' pixels within the frame that nothing hides; `None` where it is not known, 1 without plants.
+fn visible(record: &Record) -> Option<f64> {
+    let (mut seen, mut all) = (0_u64, 0_u64);
+    for plant in &record.plants {
+        seen += u64::from(plant.seen.pixels);
+        all += u64::from(plant.seen.unoccluded?);
+    }
+    Some(if all == 0 { 1.0 } else { seen as f64 / all as f64 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_label_of_cropandweed_is_named_once_and_in_order() {
+        assert!(LABELS.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        let labels: std::collections::BTreeSet<u8> = LABELS.iter().map(|(_, label)| *label).collect();
+        assert_eq!(labels.len(), LABELS.len());
+        assert!(labels.iter().all(|label| (1..100).contains(label)));
+    }
+
+    #[test]
+    fn names_count_on_beyond_a_session() {
+        assert_eq!(name(3), "ave-0000-0003");
+        assert_eq!(name(10_000), "ave-0001-0000");
+        assert_eq!(name(99_999_999), "ave-9999-9999");
+    }
+}

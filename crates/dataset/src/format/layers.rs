@@ -1,0 +1,51 @@
+//! Multi-layer OpenEXR with Cryptomatte: `layers/SPLIT/NAME.exr`, everything that the renderer knows of each pixel in one file.
+//!
+//! | channels | hold |
+//! |---|---|
+//! | `R G B NIR`, `variance.*` | linear radiance, W·m⁻²·sr⁻¹·nm⁻¹, and the variance of that mean; never denoised |
+//! | `albedo.*`, `normal.X/Y/Z`, `depth.Z` | means over the samples; depth in metres along the ray |
+//! | `id.class`, `id.plant`, `id.leaf`, `id.part` | 32-bit whole numbers at the pixel's centre |
+//! | `coverage.soil`, `.crop`, `.weed` | shares of the pixel's samples; they sum to 1 |
+//! | `CryptoClass*`, `CryptoPlant*`, `CryptoLeaf*` | Cryptomattes: objects with soft edges, at least six a pixel |
+//!
+//! Objects are called `soil`, `crop`, `weed`; `ground`, `plant_7`; `ground`, `plant_7/stem`, `plant_7/leaf_3`, with the numbers of
+//! `plants.png` and `leaves.png`.
+//!
+//! Source: OpenEXR file layout; Cryptomatte specification 1.2.0. Read with OpenEXR 3.5.3 and cryptomatte-api 1.0.0.
+
+use super::Format;
+use crate::model::recipe::{Made, Recipe};
+use crate::model::sample::Sample;
+use crate::File;
+use furrow_base::{Error, Result};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "layers";
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let rendered = sample.rendered(FOLDER)?;
+        let film = rendered.film.as_ref().ok_or_else(|| Error::misuse("layers hold radiance, and these images are labels alone"))?;
+        let text = provenance(recipe, record.index);
+        let bytes = furrow_output::encode_layers(film, &rendered.labels, &rendered.tags, &text)?;
+        Ok(vec![File { path: format!("{FOLDER}/{}/{}.exr", record.split.name(), record.name), bytes }])
+    }
+
+    fn needs_film(&self) -> bool {
+        true
+    }
+}
+
+/// Where the image came from, for the header.
+fn provenance(recipe: &Recipe, index: u64) -> String {
+    let program = format!("program: furrow {}", recipe.furrow);
+    match &recipe.made {
+        Made::Rendered(made) => format!(
+            "{program}\nscene: sha256 {}\nseed: {}\nindex: {index}\nspp: {}\nkernels: {}",
+            made.scene_sha256, made.seed, made.spp, made.kernels
+        ),
+        Made::Imported { .. } => program,
+    }
+}

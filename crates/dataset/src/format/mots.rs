@@ -1,0 +1,39 @@
+//! Tracks of plants: `FIELD-CAMERA.txt` in the text format of MOTS, one mask a line: frame, track, class, height, width, mask.
+//!
+//! A track is a plant's identity, which stays the same over all frames and cameras of a field. Classes are 1 crop, 2 weed. Masks are
+//! compressed run lengths as pycocotools writes them. A plant that a frame does not show has no line there.
+//!
+//! Source: Voigtlaender et al. 2019, "MOTS: Multi-object tracking and segmentation"; mots_tools, "txt format".
+
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
+use furrow_base::Result;
+use crate::format::labels::Labels;
+use crate::read::set::Set;
+use std::fmt::Write;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "mots";
+
+impl OfFields for Writer {
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        let labels = Labels::of(&set.recipe)?;
+        for (camera, of) in drives::by_camera(images) {
+            let mut text = String::new();
+            for image in of {
+                for (plant, class) in labels.plants(&image.record) {
+                    let (Some(id), Some(mask)) = (plant.id, &plant.seen.mask) else { continue };
+                    let [height, width] = mask.size;
+                    let frame = image.capture.frame;
+                    let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
+                }
+            }
+            // Of a camera that sees no plant there is no file: readers take an empty one for a broken one.
+            if !text.is_empty() {
+                out.file(&format!("{FOLDER}/{name}-{camera}.txt"), |w| w.put(text))?;
+            }
+        }
+        Ok(())
+    }
+}

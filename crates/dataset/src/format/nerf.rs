@@ -1,0 +1,65 @@
+//! `FIELD/transforms.json`, as instant-ngp introduced it and nerfstudio reads it: cameras and poses of a field's images.
+//!
+//! `transform_matrix` takes the camera's frame of OpenGL (x right, y up, z back) to the world (metres, z up). Intrinsics stand with each
+//! image, for a rig may have several cameras, and at the top for readers that know one: those of the first image. File paths lead to the
+//! dataset's own `images/`, so nothing is copied. `time` is in seconds; `camera` and `frame` are further keys, which readers pass over.
+//!
+//! A rolling shutter and k3 cannot be told; poses are those of the middle row.
+//!
+//! Source: nerfstudio documentation, "Data conventions".
+
+use super::Whole;
+use super::drives::{self, OfFields, Taken};
+use crate::model::recipe::json;
+use furrow_base::Result;
+use crate::read::set::Set;
+use serde_json::{Map, Value, json};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "nerf";
+
+impl OfFields for Writer {
+    fn has_one_pose(&self) -> bool {
+        true
+    }
+
+    fn by_day(&self) -> bool {
+        true
+    }
+
+    fn names_photographs(&self) -> bool {
+        true
+    }
+
+    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+        let mut all = images.first().map(intrinsics).unwrap_or_default();
+        all.insert("frames".into(), images.iter().map(|image| frame(set, image)).collect());
+        let text = json(&all)?;
+        out.file(&format!("{FOLDER}/{name}/transforms.json"), |w| w.put(text))
+    }
+}
+
+fn intrinsics(image: &Taken) -> Map<String, Value> {
+    let c = &image.camera;
+    let all = json!({
+        "camera_model": "OPENCV",
+        "w": c.width_px, "h": c.height_px,
+        "fl_x": c.fx_px, "fl_y": c.fy_px, "cx": c.cx_px, "cy": c.cy_px,
+        "k1": c.k1, "k2": c.k2, "p1": c.p1, "p2": c.p2,
+    });
+    if let Value::Object(all) = all { all } else { Map::new() }
+}
+
+fn frame(set: &Set, image: &Taken) -> Value {
+    let (axes, place) = drives::camera_to_world(&image.camera);
+    // Rows of the matrix; OpenGL's y and z point the other way.
+    let row = |i: usize| [axes.x_axis[i], -axes.y_axis[i], -axes.z_axis[i], place[i]];
+    let mut all = intrinsics(image);
+    all.insert("file_path".into(), format!("../../images/{}", drives::photograph(set, image)).into());
+    all.insert("transform_matrix".into(), json!([row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]));
+    all.insert("time".into(), image.capture.time_s.into());
+    all.insert("camera".into(), image.capture.camera.clone().into());
+    all.insert("frame".into(), image.capture.frame.into());
+    Value::Object(all)
+}

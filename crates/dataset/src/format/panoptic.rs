@@ -1,0 +1,150 @@
+//! COCO panoptic: `annotations/panoptic_SPLIT.json`, `annotations/panoptic_SPLIT/NAME.png`, `images/SPLIT/NAME.png`; datumaro and
+//! panopticapi read it.
+//!
+//! A pixel's segment is R + 256 G + 65536 B, 0 for none. A plant's segment is its number in `plants.png`; what belongs to no plant is
+//! 65536 + category: soil, and crop or weed that an imported mask gives no plant or that is too small to be listed, which is a crowd. In an
+//! image that shows plants above 65535 it is the greatest of their numbers + 1 + category. Soil is stuff, plants are things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
+//!
+//! Boxes of segments without a plant stand in no record, so each image's `segments_info` is written with the image, to
+//! `segments/SPLIT/NAME.json`, and gathered in the end.
+//!
+//! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
+
+use super::videos::Videos;
+use super::{Format, Whole, coco, picture};
+use crate::format::labels::Labels;
+use crate::model::recipe::{Recipe, json};
+use crate::model::record::Record;
+use crate::model::rle::Box2;
+use crate::model::sample::{IGNORE, Sample};
+use crate::read::set::Set;
+use crate::model::split::Split;
+use crate::File;
+use furrow_output::{Picture, packed};
+use furrow_render::scene::tag::MOST_PLANTS;
+use furrow_base::{Error, Result};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "panoptic";
+
+/// Segments without a plant begin here, behind numbers of plants of 16 bits.
+const STUFF: u32 = 1 << 16;
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let Record { name, split, .. } = &sample.record;
+        let split = split.name();
+        let (ids, segments) = segments(&Labels::of(recipe)?, sample)?;
+        let colors: Vec<[u8; 3]> = ids.iter().map(|id| packed(*id)).collect();
+        Ok(vec![
+            picture::photograph(sample, &format!("{FOLDER}/images/{split}/{name}"))?,
+            picture::file(
+                sample,
+                format!("{FOLDER}/annotations/panoptic_{split}/{name}.png"),
+                &Picture::Linear(&colors),
+            )?,
+            File { path: segments_path(split, name), bytes: json(&segments)? },
+        ])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let videos = Videos::of(set)?;
+        for split in Split::ALL {
+            if set.names(split).is_empty() {
+                continue;
+            }
+            out.file(&format!("{FOLDER}/annotations/panoptic_{}.json", split.name()), |w| {
+                coco::head(w, set, split, videos.as_ref())?;
+                w.put("\"categories\": ")?;
+                w.json(&categories(&Labels::of(&set.recipe)?))?;
+                w.put(",\n\"annotations\": [")?;
+                w.items(set.records(split).map(|record| annotation(set, &record?)))?;
+                w.put("]\n}\n")
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn segments_path(split: &str, name: &str) -> String {
+    format!("{FOLDER}/segments/{split}/{name}.json")
+}
+
+/// The category of a class: those of plants as in COCO instances, others behind the leaves' there.
+fn category(labels: &Labels<'_>, class: u8) -> u32 {
+    let things = labels.of_plants();
+    if things.contains(&class) {
+        return coco::category(labels, class);
+    }
+    let others = (0..class).filter(|other| !things.contains(other)).count();
+    coco::leaf_category(labels) + 1 + others as u32
+}
+
+fn categories(labels: &Labels<'_>) -> Value {
+    let things = labels.of_plants();
+    let others = (0..labels.classes().len() as u8).filter(|class| !things.contains(class));
+    let colors = labels.colors();
+    let category = |class: u8| {
+        let thing = things.contains(&class);
+        // Soil is black in our masks; here black is void.
+        let color = Some(colors[usize::from(class)]).filter(|color| *color != [0; 3]).unwrap_or([120, 85, 60]);
+        json!({
+            "id": category(labels, class),
+            "name": labels.classes()[usize::from(class)].name,
+            "supercategory": if thing { "plant" } else { "ground" },
+            "isthing": u32::from(thing),
+            "color": color,
+        })
+    };
+    things.iter().copied().chain(others).map(category).collect()
+}
+
+/// The segment of each pixel, and what is known of each segment. A pixel is of its plant's class where it has one, and of its own where that is no
+/// plant's, such as an organ's.
+fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
+    let width = sample.record.width;
+    let things = labels.of_plants();
+    let most = sample.plants.iter().copied().max().unwrap_or(0);
+    let stuff = STUFF.max(most + 1);
+    let last = (0..labels.classes().len() as u8).map(|class| stuff + category(labels, class)).max();
+    if last.is_some_and(|last| last > MOST_PLANTS) {
+        let words = format!("image {} has a plant of number {most}; segments of COCO panoptic have 24 bits", sample.record.name);
+        return Err(Error::input(words).help(format!("sow fewer plants, or leave out --format {FOLDER}")));
+    }
+    let of_plant: BTreeMap<u32, u8> = labels.plants(&sample.record).map(|(plant, class)| (plant.number, class)).collect();
+    let mut ids = Vec::with_capacity(sample.pixels());
+    let mut found: BTreeMap<u32, (u8, u32, Box2)> = BTreeMap::new();
+    for (i, (class, plant)) in labels.pixels(sample).iter().zip(&sample.plants).enumerate() {
+        if *class == IGNORE {
+            ids.push(0);
+            continue;
+        }
+        let (class, id) = match of_plant.get(plant).filter(|_| things.contains(class)) {
+            Some(of_plant) => (*of_plant, *plant),
+            None => (*class, stuff + category(labels, *class)),
+        };
+        let (x, y) = (i as u32 % width, i as u32 / width);
+        let (_, area, bounds) = found.entry(id).or_insert((class, 0, Box2::of(x, y)));
+        *area += 1;
+        bounds.add(x, y);
+        ids.push(id);
+    }
+    let info = |(id, (class, area, bounds)): (u32, (u8, u32, Box2))| {
+        let crowd = id >= stuff && things.contains(&class);
+        let category = category(labels, class);
+        json!({ "id": id, "category_id": category, "iscrowd": u32::from(crowd), "area": area, "bbox": bounds })
+    };
+    Ok((ids, found.into_iter().map(info).collect()))
+}
+
+fn annotation(set: &Set, record: &Record) -> Result<Value> {
+    let path = set.folder.join(segments_path(record.split.name(), &record.name));
+    let bytes = furrow_base::input::contents(&path).map_err(Error::reading(&path))?;
+    let segments: Value = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::damaged(format!("these are no segments: {e}")).in_file(path))?;
+    let file = format!("{}.png", record.name);
+    Ok(json!({ "image_id": coco::image_id(record), "file_name": file, "segments_info": segments }))
+}

@@ -1,0 +1,63 @@
+//! Point clouds: `ply/SPLIT/NAME.ply`, a point for each pixel that shows a surface, with colour and labels.
+//!
+//! | property | type | is |
+//! |---|---|---|
+//! | `x y z` | float | the surface at the pixel's centre, world, metres |
+//! | `nx ny nz` | float | unit normal on the side that the camera sees; normal maps are not in it |
+//! | `red green blue nir` | uchar | the photograph |
+//! | `class` | uchar | 0 soil, 1 crop, 2 weed |
+//! | `part` | uchar | what it is, with the numbers of the format `parts` |
+//! | `plant` | uint | number of `plants.png` |
+//! | `leaf` | ushort | number of `leaves.png` |
+//!
+//! Binary, little endian. Points are in the order of the pixels; a second image of the same field adds to the same world.
+//!
+//! Source: Turk 1994, "The PLY Polygon File Format".
+
+use super::{Format, parts};
+use crate::model::keep::Kept;
+use crate::model::recipe::Recipe;
+use crate::model::sample::Sample;
+use crate::File;
+use furrow_base::Result;
+use furrow_output::cloud::{Cloud, Point};
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "ply";
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let record = &sample.record;
+        let parts = parts::numbers(FOLDER, sample)?;
+        let rendered = sample.rendered(FOLDER)?;
+        let (width, _) = sample.size();
+        let camera = &rendered.camera;
+        let axis = camera.pose().axes.z_axis;
+        let mut cloud = Cloud::default();
+        for (i, depth) in rendered.labels.depth.iter().enumerate().filter(|(_, depth)| depth.is_finite()) {
+            let (origin, direction) = camera.centre_ray(i as u32 % width, i as u32 / width);
+            // Depth is along the optical axis.
+            let at = origin + direction * (depth / direction.dot(axis));
+            cloud.add(&Point {
+                at: at.to_array(),
+                normal: rendered.labels.normals[i].to_array(),
+                rgb: sample.rgb[i],
+                nir: sample.nir[i],
+                kind: [sample.semantics[i], parts[i]],
+                plant: sample.plants[i],
+                leaf: sample.leaves[i],
+            });
+        }
+        let path = format!("{FOLDER}/{}/{}.ply", record.split.name(), record.name);
+        Ok(vec![File { path, bytes: cloud.file(&recipe.furrow) }])
+    }
+
+    fn needs_maps(&self) -> &'static [Kept] {
+        &[Kept::Nir]
+    }
+
+    fn needs_film(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,75 @@
+//! Sequences in COCO files: a video for each camera of each field, whose frames count on over the field's days, as the text files of MOTS do.
+//!
+//! An entry has `id`, `name` (that of the file of MOTS), `width` and `height`. Ids count from 1 through the cameras of a field, in the order of its scene
+//! file, then through the fields: they depend neither on the split nor on how many fields there are.
+//!
+//! Source: Yang, Fan & Xu 2019, "Video instance segmentation" (YouTube-VIS); Dave et al. 2020, "TAO: A large-scale benchmark for tracking any
+//! object"; MMTracking, `CocoVID`.
+
+use crate::model::record::CaptureRecord;
+use crate::model::split::Split;
+use crate::read::set::Set;
+use furrow_base::{Error, Result};
+use serde_json::{Value, json};
+
+/// The videos of a dataset of drives, rigs or days.
+pub(super) struct Videos {
+    /// Names of the cameras that see each field.
+    cameras: Vec<String>,
+    /// Width and height of their images, pixels.
+    size: [u32; 2],
+}
+
+impl Videos {
+    /// Those of a dataset; `None` where each image is of a field of its own.
+    pub(super) fn of(set: &Set) -> Result<Option<Self>> {
+        if !set.recipe.has_sequences() {
+            return Ok(None);
+        }
+        let mut all = Self { cameras: Vec::new(), size: [0; 2] };
+        for index in 0..set.recipe.captures().min(set.recipe.count) {
+            let record = set.record(index)?;
+            let Some(CaptureRecord { camera, .. }) = record.capture else { break };
+            // All cameras of a frame come before those of the next.
+            if all.cameras.contains(&camera) {
+                break;
+            }
+            all.size = [record.width, record.height];
+            all.cameras.push(camera);
+        }
+        Ok(Some(all))
+    }
+
+    /// The id of the video that an image belongs to.
+    pub(super) fn id(&self, capture: &CaptureRecord) -> Result<u64> {
+        let place = self.cameras.iter().position(|name| *name == capture.camera).ok_or_else(|| {
+            let known = self.cameras.join(", ");
+            Error::damaged(format!(
+                "field {} was taken by a camera `{}`, and the first field by {known}",
+                capture.field, capture.camera
+            ))
+        })?;
+        Ok(self.number(capture.field, place as u64))
+    }
+
+    fn number(&self, field: u64, camera: u64) -> u64 {
+        field.saturating_mul(self.cameras.len() as u64).saturating_add(camera + 1)
+    }
+
+    /// The entries of a split, field by field.
+    pub(super) fn entries(&self, set: &Set, split: Split) -> impl Iterator<Item = Result<Value>> {
+        let (recipe, captures) = (&set.recipe, set.recipe.captures());
+        let [width, height] = self.size;
+        let fields = 0..recipe.count.div_ceil(captures);
+        let fields = fields.filter(move |field| recipe.split_of(field * captures) == split);
+        fields.flat_map(move |field| {
+            // Of the last field some images may be left out.
+            let images = recipe.count - field * captures;
+            let entry = move |(camera, name): (u64, &String)| {
+                let name = format!("{}-{name}", Set::name(field));
+                Ok(json!({ "id": self.number(field, camera), "name": name, "width": width, "height": height }))
+            };
+            (0..images).zip(&self.cameras).map(entry)
+        })
+    }
+}

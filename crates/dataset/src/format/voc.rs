@@ -1,0 +1,133 @@
+//! Pascal VOC: `VOCdevkit/VOC2012` with boxes as XML and masks of classes and objects, for torchvision and supervision.
+//!
+//! Boxes count pixels from 1 and hold their last ones. Numbers of `SegmentationClass` are 0 for soil and then the classes, of `SegmentationObject` the
+//! objects of the XML file in its order; 255 is void: no label, or an object behind the 254th. Photographs are JPEG,
+//! for readers look for `.jpg`: of quality 95 unless the dataset's are JPEG themselves. Lists of names are `train.txt`, `val.txt`, `trainval.txt` and `test.txt`.
+//!
+//! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and 5; colours are those of its
+//! `VOClabelcolormap`.
+
+use super::{Format, Whole, picture};
+use crate::format::labels::Labels;
+use crate::model::photo::Photo;
+use crate::model::recipe::Recipe;
+use crate::model::rle::Box2;
+use crate::model::sample::{IGNORE, Sample};
+use crate::read::set::Set;
+use crate::model::split::Split;
+use crate::File;
+use furrow_output::Picture;
+use furrow_base::Result;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+pub(super) struct Writer;
+
+const FOLDER: &str = "voc/VOCdevkit/VOC2012";
+/// Quality of the photographs.
+const QUALITY: u8 = 95;
+/// Most objects that a mask numbers.
+const MOST: usize = 254;
+/// Share of a plant beyond the frame from which on it counts as truncated.
+const TRUNCATED: f64 = 0.95;
+/// Share that is seen below which a plant is difficult: scores pass over it.
+const DIFFICULT: f64 = 0.2;
+
+impl Format for Writer {
+    fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
+        let labels = Labels::of(recipe)?;
+        let (width, height) = sample.size();
+        let name = &sample.record.name;
+        let mut text = format!(
+            "<annotation>\n\t<folder>VOC2012</folder>\n\t<filename>{name}.jpg</filename>\n\t<source><database>Furrow</database></source>\n\t\
+             <size><width>{width}</width><height>{height}</height><depth>3</depth></size>\n\t<segmented>1</segmented>\n"
+        );
+        let mut numbers = BTreeMap::new();
+        for (plant, class) in labels.plants(&sample.record) {
+            let Some(Box2([x, y, w, h])) = plant.seen.bounds else { continue };
+            numbers.insert(plant.number, (numbers.len() + 1).min(MOST + 1) as u8);
+            let class = labels.classes().get(usize::from(class)).map(|class| class.name.as_str()).unwrap_or_default();
+            let truncated = u8::from(plant.seen.inside_fraction() < TRUNCATED);
+            let difficult = u8::from(plant.seen.shown_fraction() < DIFFICULT);
+            // Writing to a text cannot fail.
+            let _ = writeln!(
+                text,
+                "\t<object><name>{}</name><pose>Unspecified</pose><truncated>{truncated}</truncated><difficult>{difficult}</difficult>\
+                 <bndbox><xmin>{}</xmin><ymin>{}</ymin><xmax>{}</xmax><ymax>{}</ymax></bndbox></object>",
+                escaped(class),
+                x + 1,
+                y + 1,
+                x + w,
+                y + h
+            );
+        }
+        text += "</annotation>\n";
+        let classes = labels.pixels(sample);
+        let object = |(plant, class): (&u32, &u8)| match numbers.get(plant) {
+            Some(number) => *number,
+            None if *class == IGNORE => IGNORE,
+            None => 0,
+        };
+        let objects: Vec<u8> = sample.plants.iter().zip(classes.iter()).map(object).collect();
+        let colors = colors();
+        let path = |folder: &str, ending: &str| format!("{FOLDER}/{folder}/{name}.{ending}");
+        Ok(vec![
+            picture::photograph_as_jpeg(sample, path("JPEGImages", "jpg"), QUALITY)?,
+            File { path: path("Annotations", "xml"), bytes: text.into_bytes() },
+            picture::file(sample, path("SegmentationClass", "png"), &Picture::Indexed(&classes, &colors))?,
+            picture::file(sample, path("SegmentationObject", "png"), &Picture::Indexed(&objects, &colors))?,
+        ])
+    }
+
+    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+        let lists: [(&str, &[Split]); 4] = [
+            ("train", &[Split::Train]),
+            ("val", &[Split::Val]),
+            ("trainval", &[Split::Train, Split::Val]),
+            ("test", &[Split::Test]),
+        ];
+        for (list, splits) in lists {
+            let listed = (0..set.recipe.count).filter(|k| splits.contains(&set.recipe.split_of(*k)));
+            let names: String = listed.map(|k| Set::name(k) + "\n").collect();
+            for task in ["Main", "Segmentation"] {
+                if !names.is_empty() {
+                    out.file(&format!("{FOLDER}/ImageSets/{task}/{list}.txt"), |w| w.put(&names))?;
+                }
+            }
+        }
+        let labels = Labels::of(&set.recipe)?;
+        let names: String = labels.classes().iter().map(|class| class.name.clone() + "\n").collect();
+        out.file(&format!("{FOLDER}/labels.txt"), |w| w.put(names))
+    }
+
+    fn warnings(&self, recipe: &Recipe) -> Vec<String> {
+        let lossless = recipe.photo() == Photo::Png;
+        let words = || "photographs are JPEG, as its readers expect; those in images/ have lost nothing".to_owned();
+        lossless.then(words).into_iter().collect()
+    }
+}
+
+/// A word within XML.
+fn escaped(word: &str) -> String {
+    word.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// The kit's colours: the bits of a number from the lowest on, three by three, are those of R, G, B from the highest on.
+fn colors() -> Vec<[u8; 3]> {
+    let channel = |number: u8, of: u8| (0..3).map(|k| (number >> (3 * k + of).min(7) & u8::from(3 * k + of < 8)) << (7 - k)).sum();
+    (0..=u8::MAX).map(|number| [0, 1, 2].map(|of| channel(number, of))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: the first colours of the development kit's list, and that of void.
+    #[test]
+    fn colours_are_those_of_the_kit() {
+        let colors = colors();
+        assert_eq!(colors[..5], [[0, 0, 0], [128, 0, 0], [0, 128, 0], [128, 128, 0], [0, 0, 128]]);
+        assert_eq!((colors[8], colors[255]), ([64, 0, 0], [224, 224, 192]));
+        assert_eq!(escaped("a<b & c>"), "a&lt;b &amp; c&gt;");
+    }
+}

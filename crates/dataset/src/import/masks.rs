@@ -1,0 +1,215 @@
+//! A folder of images and one of masks: numbers (gray, indexed) or colours that stand for classes.
+
+use super::classes::{Colors, Names};
+use super::files::{length, listed, same_size};
+use super::{Labelled, Listed, Source};
+use crate::model::sample::IGNORE;
+use furrow_base::{Error, Result};
+use furrow_output::Map;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// What masks hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Coding {
+    /// Numbers, by what they mean.
+    Numbers(Names),
+    /// Colours, by what they mean.
+    Colors(Colors),
+}
+
+/// Where images and masks lie, and how they are read.
+#[derive(Clone, Debug)]
+pub struct Folders {
+    /// PNG or JPEG images, in the folder or in `train`, `val` and `test` below it.
+    pub images: PathBuf,
+    /// PNG masks, likewise.
+    pub masks: PathBuf,
+    /// Near infrared, PNG or JPEG, likewise.
+    pub nir: Option<PathBuf>,
+    /// What the names of images end in that the names of masks do not.
+    pub image_suffix: String,
+    /// What the names of masks end in.
+    pub mask_suffix: String,
+    /// What the names of infrared images end in.
+    pub nir_suffix: String,
+    /// What the masks hold.
+    pub coding: Coding,
+    /// Whether what has no meaning has no label; otherwise it is an error.
+    pub ignore_others: bool,
+}
+
+/// What masks mean unless one says otherwise: the numbers of `semantics.png`.
+const NUMBERS: &str = "0=soil,1=crop,2=weed,255=ignore";
+
+impl Default for Coding {
+    fn default() -> Self {
+        Self::Numbers(Names::parse(NUMBERS).unwrap_or_default())
+    }
+}
+
+impl Folders {
+    /// Images and masks of the same names, whose numbers are those of `semantics.png`; anything else is an error.
+    pub fn new(images: PathBuf, masks: PathBuf) -> Self {
+        Self {
+            images,
+            masks,
+            nir: None,
+            image_suffix: String::new(),
+            mask_suffix: String::new(),
+            nir_suffix: String::new(),
+            coding: Coding::default(),
+            ignore_others: false,
+        }
+    }
+}
+
+/// The files of an image.
+struct Files {
+    image: PathBuf,
+    mask: PathBuf,
+    nir: Option<PathBuf>,
+}
+
+/// Images with masks.
+pub struct Masks {
+    folders: Folders,
+    images: Vec<Listed>,
+    files: Vec<Files>,
+    words: String,
+}
+
+impl Masks {
+    /// Finds what belongs together; every image must have its mask.
+    pub fn open(folders: Folders) -> Result<Self> {
+        let images = listed(&folders.images, &folders.image_suffix)?;
+        let mut masks = listed(&folders.masks, &folders.mask_suffix)?;
+        let mut nirs = match &folders.nir {
+            Some(folder) => listed(folder, &folders.nir_suffix)?,
+            None => BTreeMap::new(),
+        };
+        if images.is_empty() {
+            return Err(Error::input(format!(
+                "there is no PNG or JPEG image in this folder{}",
+                ending(&folders.image_suffix)
+            ))
+            .in_file(folders.images));
+        }
+        let mut words = format!("{:?} {}\n", folders.coding, folders.ignore_others);
+        let (mut list, mut files) = (Vec::new(), Vec::new());
+        for (one, image) in images {
+            let mask =
+                masks.remove(&one).ok_or_else(|| lacks(&image, "mask", &folders.masks, &folders.mask_suffix, &one))?;
+            let nir = match &folders.nir {
+                Some(folder) => {
+                    let found = nirs.remove(&one);
+                    Some(found.ok_or_else(|| lacks(&image, "infrared image", folder, &folders.nir_suffix, &one))?)
+                }
+                None => None,
+            };
+            let lengths = [Some(&image), Some(&mask), nir.as_ref()].into_iter().flatten().map(|p| length(p));
+            let _ = writeln!(words, "{one:?} {:?}", lengths.collect::<Result<Vec<u64>>>()?);
+            list.push(one);
+            files.push(Files { image, mask, nir });
+        }
+        Ok(Self { folders, images: list, files, words })
+    }
+}
+
+fn ending(suffix: &str) -> String {
+    if suffix.is_empty() { String::new() } else { format!(" whose name ends in `{suffix}`") }
+}
+
+fn lacks(image: &Path, what: &str, folder: &Path, suffix: &str, one: &Listed) -> Error {
+    let split = one.split.map(|s| format!("{}/", s.name())).unwrap_or_default();
+    Error::input(format!("its {what} is missing: {}/{split}{}{suffix}.png", folder.display(), one.name))
+        .in_file(image)
+        .help(
+            "names match but for --image-suffix, --mask-suffix and --nir-suffix; add the \
+         file, or take the image away",
+        )
+}
+
+impl Source for Masks {
+    fn name(&self) -> &'static str {
+        "masks"
+    }
+
+    fn images(&self) -> &[Listed] {
+        &self.images
+    }
+
+    fn words(&self) -> &str {
+        &self.words
+    }
+
+    fn has_nir(&self) -> bool {
+        self.folders.nir.is_some()
+    }
+
+    fn read(&self, place: usize) -> Result<Labelled> {
+        let Files { image, mask, nir } = &self.files[place];
+        let (w, h, rgb) = furrow_output::read_photo(image)?;
+        let (x, y, map) = furrow_output::read_map(mask)?;
+        same_size(mask, (x, y), (w, h))?;
+        let semantics = self.semantics(mask, w, map)?;
+        let nir = match nir {
+            Some(path) => {
+                let (x, y, gray) = furrow_output::read_gray_photo(path)?;
+                same_size(path, (x, y), (w, h))?;
+                gray
+            }
+            None => Vec::new(),
+        };
+        let (plants, leaves) = (vec![0; semantics.len()], vec![0; semantics.len()]);
+        Ok(Labelled { size: (w, h), rgb, nir, semantics, plants, leaves, ..Labelled::default() })
+    }
+}
+
+impl Masks {
+    /// Classes of a mask's pixels.
+    fn semantics(&self, path: &Path, width: u32, map: Map) -> Result<Vec<u8>> {
+        match (&self.folders.coding, map) {
+            (Coding::Numbers(names), Map::Numbers(numbers) | Map::Indexed(numbers, _)) => {
+                let mut table = BTreeMap::new();
+                let meaning =
+                    |n: &u16| *table.entry(*n).or_insert_with(|| names.0.get(&n.to_string()).map(|m| m.number()));
+                self.all(path, width, &numbers, meaning, |n| format!("the number {n}"), "--classes")
+            }
+            (Coding::Numbers(_), Map::Colors(_)) => Err(Error::input(
+                "this mask holds colours, not numbers; name them with --colors '0,255,0=crop;…' instead of --classes",
+            )
+            .in_file(path)),
+            (Coding::Colors(colors), map) => {
+                let pixels = map.colors();
+                let meaning = |c: &[u8; 3]| colors.0.get(c).map(|m| m.number());
+                self.all(path, width, &pixels, meaning, |[r, g, b]| format!("the colour {r},{g},{b}"), "--colors")
+            }
+        }
+    }
+
+    fn all<T: Copy>(
+        &self,
+        path: &Path,
+        width: u32,
+        pixels: &[T],
+        mut meaning: impl FnMut(&T) -> Option<u8>,
+        words: impl Fn(T) -> String,
+        option: &str,
+    ) -> Result<Vec<u8>> {
+        let one = |(place, pixel): (usize, &T)| match meaning(pixel) {
+            Some(number) => Ok(number),
+            None if self.folders.ignore_others => Ok(IGNORE),
+            None => Err(Error::input(format!(
+                "pixel {},{} has {}, which no class was given for",
+                place as u32 % width,
+                place as u32 / width,
+                words(*pixel)
+            ))
+            .help(format!("name it in {option}, or give --others ignore"))
+            .in_file(path)),
+        };
+        pixels.iter().enumerate().map(one).collect()
+    }
+}

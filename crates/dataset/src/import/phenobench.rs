@@ -1,0 +1,131 @@
+//! PhenoBench: `SPLIT/{images,semantics,plant_instances,leaf_instances}/NAME.png`; its `test` has no labels and is left out.
+//!
+//! 3 and 4 are partial crop and weed and become 1 and 2; 255 is no label. Numbers of plants may be the same for a crop plant and a weed,
+//! those of leaves count through the image. Visibilities tell what a cut of a larger picture left of an instance, and are not
+//! kept. Source: Weyler et al. 2024, and its loader, version 0.1.0.
+
+use super::files::{length, pictures, same_size};
+use super::instances::instances;
+use super::{Labelled, Listed, Source};
+use crate::model::sample::IGNORE;
+use crate::model::split::Split;
+use furrow_base::{Error, Result};
+use furrow_output::Map;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// A PhenoBench folder.
+pub struct PhenoBench {
+    root: PathBuf,
+    images: Vec<Listed>,
+    paths: Vec<PathBuf>,
+    words: String,
+    warnings: Vec<String>,
+}
+
+/// Folders of labels.
+const LABELS: [&str; 3] = ["semantics", "plant_instances", "leaf_instances"];
+
+impl PhenoBench {
+    /// Finds the images that have labels.
+    pub fn open(root: &Path) -> Result<Self> {
+        let mut all = Self {
+            root: root.into(),
+            images: Vec::new(),
+            paths: Vec::new(),
+            words: String::new(),
+            warnings: Vec::new(),
+        };
+        for split in Split::ALL {
+            let folder = root.join(split.name());
+            if !folder.join("images").is_dir() {
+                continue;
+            }
+            let found = pictures(&folder.join("images"), "")?;
+            if !folder.join(LABELS[0]).is_dir() {
+                all.warnings.push(format!("{}: {} images without labels were left out", folder.display(), found.len()));
+                continue;
+            }
+            for (name, path) in found {
+                let mut lengths = vec![length(&path)?];
+                for kind in LABELS.iter().filter(|k| folder.join(k).is_dir()) {
+                    lengths.push(length(&folder.join(kind).join(format!("{name}.png")))?);
+                }
+                let one = Listed { split: Some(split), name };
+                let _ = writeln!(all.words, "{one:?} {lengths:?}");
+                all.images.push(one);
+                all.paths.push(path);
+            }
+        }
+        if all.images.is_empty() {
+            return Err(Error::input("there are no images with labels in it")
+                .in_file(root)
+                .help("give --from the folder that holds train/images, train/semantics, …"));
+        }
+        Ok(all)
+    }
+}
+
+impl Source for PhenoBench {
+    fn name(&self) -> &'static str {
+        "phenobench"
+    }
+
+    fn images(&self) -> &[Listed] {
+        &self.images
+    }
+
+    fn words(&self) -> &str {
+        &self.words
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn read(&self, place: usize) -> Result<Labelled> {
+        let Listed { split, name } = &self.images[place];
+        let folder = self.root.join(split.unwrap_or(Split::Train).name());
+        let (w, h, rgb) = furrow_output::read_photo(&self.paths[place])?;
+        let numbers = |kind: &str| -> Result<Vec<u32>> {
+            if !folder.join(kind).is_dir() {
+                return Ok(vec![0; rgb.len()]);
+            }
+            let path = folder.join(kind).join(format!("{name}.png"));
+            let (x, y, map) = furrow_output::read_map(&path)?;
+            same_size(&path, (x, y), (w, h))?;
+            match map {
+                Map::Numbers(numbers) | Map::Indexed(numbers, _) => Ok(numbers.into_iter().map(u32::from).collect()),
+                Map::Colors(_) => Err(Error::input("this is a picture in colour, not a map of numbers").in_file(path)),
+            }
+        };
+        let path = folder.join(LABELS[0]).join(format!("{name}.png"));
+        let semantics: Vec<u8> =
+            numbers(LABELS[0])?.into_iter().enumerate().map(|(i, n)| class(&path, w, i, n)).collect::<Result<_>>()?;
+        let found = instances(&path, &semantics, &numbers(LABELS[1])?, &numbers(LABELS[2])?)?;
+        Ok(Labelled {
+            size: (w, h),
+            rgb,
+            semantics,
+            plants: found.plants,
+            leaves: found.leaves,
+            warnings: found.warnings,
+            ..Labelled::default()
+        })
+    }
+}
+
+/// The class of a number.
+fn class(path: &Path, width: u32, place: usize, number: u32) -> Result<u8> {
+    match number {
+        0..=2 => Ok(number as u8),
+        3 | 4 => Ok(number as u8 - 2),
+        255 => Ok(IGNORE),
+        other => Err(Error::input(format!(
+            "pixel {},{} has the number {other}; PhenoBench has 0 to 4 and 255",
+            place as u32 % width,
+            place as u32 / width
+        ))
+        .in_file(path)),
+    }
+}

@@ -1,0 +1,545 @@
+//! What a dataset will cost before it is made: core time, disk, files, memory.
+//!
+//! Three of its images (the first, the middle one, the last) are drawn at their size with two smaller numbers of samples: what grows with the
+//! samples is drawing, what does not is growing, labelling and writing. So is the length of files, since noise compresses badly. What belongs to
+//! all images together is written for a few copies of the three, in a temporary folder that goes away, and prolonged.
+//!
+//! Images are drawn one after another in memory; nothing is written where the dataset would lie.
+
+use crate::make::begin::merged_recipe;
+use crate::make::finish::finish;
+use crate::make::generate::{MOST_AT_ONCE, formatted};
+use crate::make::meter;
+use crate::make::plan::{Draft, Order, draft};
+use crate::make::render::{LastField, RenderedSample, of_day, render};
+use crate::model::invariants;
+use crate::model::recipe::{FILE, Made, Recipe, compact};
+use crate::model::record::{CaptureRecord, Record};
+use crate::model::split::{Shares, Split};
+use crate::read::checksum_record::{BLOCK, ChecksumRecord, write_files};
+use crate::read::native;
+use crate::read::native::is_native;
+use crate::read::packs::Packing;
+use crate::read::set::Set;
+use crate::{File, report};
+use furrow_base::{Error, Result};
+use furrow_job::{Renderer, SceneFile, Threads};
+use furrow_render::render::Watch;
+use furrow_render::settings::{Quality, RenderOptions};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Of the samples of an image, a probe has this share, or all where that is fewer than [`FEWEST`].
+const SHARE: u32 = 3;
+/// Fewer samples tell little about how long they take.
+const FEWEST: u32 = 8;
+/// Images that are drawn whatever they take, and at most.
+const PROBES: [usize; 2] = [3, 16];
+/// Core seconds after which no further image is drawn.
+const LONG_ENOUGH_S: f64 = 20.0;
+/// How many times more samples the second drawing of a probe has than the first.
+const STEP: u32 = 4;
+/// About the length of an image's row in the timing log.
+const LOG_ROW: u64 = 270;
+/// Bytes of an image's file in an archive, beside its own.
+const MEMBER: u64 = 512 + 256 + 40;
+/// Lengths of the hash and its key that a file of checksums holds beside them.
+const SEAL_HASH: u64 = 81;
+/// Images that the work on what belongs to all is done for; of further ones records alone are read.
+const MOST_LOOKED_AT: u64 = 240;
+/// Fields whose memory is estimated.
+const MOST_ASKED: u64 = 64;
+/// Images whose pictures the report holds.
+const REPORTED: u64 = 24;
+
+/// What a dataset will cost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bill {
+    /// Images.
+    pub images: u64,
+    /// Fields that they show.
+    pub fields: u64,
+    /// How often a field grows: once for all of its images of a day.
+    pub growings: u64,
+    /// What shards share out.
+    pub units: u64,
+    /// The images that were drawn to know it.
+    pub probes: Vec<u64>,
+    /// Samples that they were drawn with, fewer first.
+    pub spp: [u32; 2],
+    /// Core seconds in all.
+    pub core_s: f64,
+    /// Of them, growing fields.
+    pub grow_s: f64,
+    /// Drawing samples.
+    pub sample_s: f64,
+    /// Length of all files; files that are names of one file count once.
+    pub bytes: u64,
+    /// Number of files, each name counted; made in one run.
+    pub files: u64,
+    /// Memory of a process before its first image, bytes.
+    pub base_memory: u64,
+    /// Memory of each image under way, bytes: that of the largest field as far as it can be told before it grows.
+    pub image_memory: u64,
+}
+
+impl Bill {
+    /// Most memory of a process that shares so many cores among its images, bytes.
+    pub fn memory(&self, cores: usize) -> u64 {
+        // Images of one field follow each other.
+        let at_once = cores.clamp(1, MOST_AT_ONCE).min(usize::try_from(self.growings.max(1)).unwrap_or(usize::MAX));
+        self.base_memory + at_once as u64 * self.image_memory
+    }
+
+    /// Shards of so many cores each, of which each takes about an hour; none is empty.
+    pub fn shards(&self, cores: u32) -> u64 {
+        let hours = self.core_s / 3600.0 / f64::from(cores.max(1));
+        (hours.ceil() as u64).clamp(1, self.units.max(1))
+    }
+}
+
+/// What a bill is at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// An image is drawn.
+    Image {
+        /// Which of those that are drawn, from 1.
+        number: usize,
+        /// How many will be at least.
+        least: usize,
+        /// How many will be at most.
+        most: usize,
+    },
+    /// What belongs to all images is written for a few.
+    Lists,
+}
+
+/// Tells what an order will cost that is for a folder, and what the user should know; an error where another dataset lies there. `begun` is told each
+/// step as it begins. Given up where the flag is raised.
+pub fn bill(
+    folder: &Path,
+    order: &Order,
+    threads: &Threads,
+    begun: &dyn Fn(Step),
+    stop: &Arc<AtomicBool>,
+) -> Result<(Bill, Vec<String>)> {
+    let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
+    let recipe = merged_recipe(folder, recipe, order.omit.is_some())?;
+    // What the process has taken until now, the dataset's own process takes too.
+    let start = cpu()?;
+    let base_memory = meter::memory().unwrap_or(0);
+    let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
+    let mut probes = Vec::new();
+    let some = probed(recipe.count);
+    let (least, most) = (PROBES[0].min(some.len()), some.len());
+    for (drawn, index) in some.into_iter().enumerate() {
+        if drawn >= PROBES[0] && cpu()? - start > LONG_ENOUGH_S {
+            break;
+        }
+        begun(Step::Image { number: drawn + 1, least, most });
+        match threads.install(|| images.probe(index, stop)) {
+            Ok(probe) => probes.push(probe),
+            Err(e) if e.is_of_one_field() => warnings.push(format!("image {}: {e}", Set::name(index))),
+            Err(e) => return Err(e),
+        }
+    }
+    if probes.is_empty() {
+        return Err(Error::input(format!("no image of those that were tried could be made: {}", warnings.join("; "))));
+    }
+    begun(Step::Lists);
+    let peak = meter::peak_memory().unwrap_or(0);
+    let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
+    let all = threads.install(|| Together::of(&recipe, &files, &probes))?;
+    let growings = recipe.count.div_ceil(recipe.captures_a_day());
+    let (count, spp) = (recipe.count as f64, f64::from(images.spp));
+    let (grow_s, sample_s) = (growings as f64 * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
+    let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
+    let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
+    // An archive and its record.
+    let (mut bytes, mut number) = (all.bytes + count * LOG_ROW as f64, all.files + 1 + 2 * packs);
+    for (split, images) in Split::ALL.into_iter().zip(images_of_splits(&recipe)) {
+        if images > 0 {
+            bytes += images as f64 * mean(&|p| p.bytes(split));
+            number += images * probes.first().map_or(0, |p| p.lying(&p.files[&split]));
+        }
+    }
+    let bill = Bill {
+        images: recipe.count,
+        fields: recipe.count.div_ceil(recipe.captures()),
+        growings,
+        units: recipe.units(),
+        probes: probes.iter().map(|probe| probe.record.index).collect(),
+        spp: images.drawn,
+        core_s: grow_s + sample_s + rest_s,
+        grow_s,
+        sample_s,
+        bytes: bytes as u64,
+        files: number,
+        base_memory,
+        image_memory: (peak.saturating_sub(base_memory) as f64 * images.largest_over(&probes)) as u64,
+    };
+    Ok((bill, warnings))
+}
+
+/// The images that may be drawn to know what all cost: the first, the middle and the last one, then those that lie the farthest from all before.
+fn probed(count: u64) -> Vec<u64> {
+    let last = count.saturating_sub(1);
+    let halves = (2..).flat_map(|level: u32| (1..1_u64 << level).step_by(2).map(move |odd| (odd, level)));
+    let between = halves.take(4 * PROBES[1]).map(|(odd, level)| ((u128::from(last) * u128::from(odd)) >> level) as u64);
+    let mut all = Vec::new();
+    for index in [0, count / 2, last].into_iter().chain(between) {
+        if all.len() < PROBES[1] && !all.contains(&index) {
+            all.push(index);
+        }
+    }
+    all
+}
+
+/// Core seconds of this process until now.
+fn cpu() -> Result<f64> {
+    meter::cpu().map(|taken| taken.as_secs_f64()).ok_or_else(|| {
+        Error::missing("what work takes is measured by /proc/self/stat, which this system does not have")
+            .help("ask for the bill on Linux, or leave it out")
+    })
+}
+
+/// Images of each split, in the order of [`Split::ALL`].
+fn images_of_splits(recipe: &Recipe) -> [u64; 3] {
+    let captures = recipe.captures();
+    let mut images = [0; 3];
+    for field in 0..recipe.count.div_ceil(captures) {
+        let first = field * captures;
+        images[recipe.split_of(first) as usize] += captures.min(recipe.count - first);
+    }
+    images
+}
+
+/// What images of an order are drawn from and by.
+struct Images {
+    set: Set,
+    scene: SceneFile,
+    /// Samples of the dataset's images.
+    spp: u32,
+    /// Samples that probes are drawn with, fewer first; the same number twice where there are no fewer.
+    drawn: [u32; 2],
+    renderers: [Renderer; 2],
+    /// The splits that the dataset's images are in.
+    splits: Vec<Split>,
+}
+
+/// One image that was drawn to know what all cost.
+struct Probe {
+    record: Record,
+    /// Whether its own files go into an archive.
+    packed: bool,
+    /// The cameras of its field, by their names.
+    cameras: Vec<String>,
+    /// Core seconds to grow its field.
+    grow_s: f64,
+    /// Core seconds of a sample in each of its pixels.
+    sample_s: f64,
+    /// Core seconds of the rest.
+    fixed_s: f64,
+    /// Its files in each split.
+    files: BTreeMap<Split, Vec<File>>,
+    /// How much longer its files are with all samples.
+    longer: f64,
+}
+
+impl Probe {
+    /// Length of its files in a split with all samples, and of their checksums.
+    fn bytes(&self, split: Split) -> f64 {
+        let files = self.files.get(&split).map_or(&[][..], Vec::as_slice);
+        let seal = files.iter().map(|file| file.path.len() as u64 + 100).sum::<u64>() + 2 * SEAL_HASH;
+        let in_archive = if self.packed { files.iter().filter(|file| is_native(&file.path)).count() as u64 } else { 0 };
+        // In an archive each has a header and ends with a block, half of which is empty; its record says where it lies.
+        length(files) as f64 * self.longer + (seal + in_archive * MEMBER) as f64
+    }
+
+    /// How many of its files, its checksums among them, lie in folders.
+    fn lying(&self, files: &[File]) -> u64 {
+        let in_archive = |file: &&File| self.packed && is_native(&file.path);
+        (files.len() - files.iter().filter(in_archive).count()) as u64 + u64::from(!self.packed)
+    }
+}
+
+impl Images {
+    fn of(recipe: &Recipe, scene_sha256: String, scene: SceneFile) -> Result<Self> {
+        let mut recipe = recipe.clone();
+        if let Made::Rendered(rendering) = &mut recipe.made {
+            rendering.scene_sha256 = scene_sha256;
+        }
+        let options = recipe.rendering()?.options();
+        let spp = options.quality.spp;
+        let many = (spp / SHARE).max(FEWEST).min(spp);
+        let drawn = [(many / STEP).max(1), many];
+        let quality = |spp| Quality { spp, ..options.quality };
+        let opened = |spp| Renderer::open(&RenderOptions { quality: quality(spp), ..options.clone() });
+        let splits = Split::ALL.into_iter().zip(images_of_splits(&recipe));
+        let splits = splits.filter(|(_, images)| *images > 0).map(|(split, _)| split).collect();
+        let renderers = [opened(drawn[0])?, opened(drawn[1])?];
+        let set = Set::new(Path::new(""), recipe);
+        Ok(Self { set, scene, spp, drawn, renderers, splits })
+    }
+
+    /// How much more memory the largest field is estimated to take than the largest that was drawn; at least 1.
+    fn largest_over(&self, probes: &[Probe]) -> f64 {
+        let recipe = &self.set.recipe;
+        let fields = recipe.count.div_ceil(recipe.captures());
+        let asked = fields.clamp(1, MOST_ASKED);
+        // A field that cannot be is told when its image is made.
+        let bytes = |field: u64| self.scene.estimate(field).map_or(0.0, |estimate| estimate.total().bytes);
+        let largest = (0..asked).map(|k| bytes(k * fields / asked)).fold(0.0, f64::max);
+        let drawn = probes.iter().map(|probe| bytes(recipe.field_of(probe.record.index).0)).fold(0.0, f64::max);
+        if drawn > 0.0 { (largest / drawn).max(1.0) } else { 1.0 }
+    }
+
+    /// Draws an image, and measures it.
+    fn probe(&self, index: u64, stop: &Arc<AtomicBool>) -> Result<Probe> {
+        let scene = self.scene.clone().until(stop);
+        let mut kept = LastField::default();
+        let begin = cpu()?;
+        let field = kept.at(&self.set, &scene, index)?.field;
+        let captures = field.grown().captures.iter().take_while(|capture| capture.frame == 0);
+        let cameras = captures.map(|capture| capture.name.clone()).collect();
+        let grown = cpu()?;
+        let mut draw = |renderer: &Renderer| {
+            let begin = cpu()?;
+            let made = render(&self.set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
+            // For its time alone: with few samples, class by samples and class at the centre may lie further apart than they ever do in the set.
+            let _ = invariants::faults(&self.set.recipe, &made.sample);
+            let files = self.files(&made)?;
+            ChecksumRecord::of(index, &self.set.recipe, &files)?;
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::interrupted());
+            }
+            Ok((made, files, cpu()? - begin))
+        };
+        let [few, many] = &self.renderers;
+        let [fewer, more] = self.drawn.map(f64::from);
+        let spp = f64::from(self.spp);
+        // Of the first drawing only its numbers are kept: a run of the dataset holds one image at a time as well.
+        let less =
+            if fewer < more { Some(draw(few).map(|(_, files, seconds)| (length(&files), seconds))?) } else { None };
+        let (mut made, files, seconds) = draw(many)?;
+        let (sample_s, longer) = less.map_or((0.0, 1.0), |(short, short_s)| {
+            let doublings = |from: f64, to: f64| (to / from).log2();
+            let (short, long) = (short as f64, length(&files) as f64);
+            // Noise halves its variance with each doubling of samples, and takes as many bits less of each pixel.
+            let steepness = (long - short) / doublings(fewer, more);
+            ((seconds - short_s).max(0.0) / (more - fewer), 1.0 + steepness * doublings(more, spp) / long)
+        });
+        let own = made.sample.record.split;
+        let mut of_splits = BTreeMap::new();
+        for split in &self.splits {
+            made.sample.record.split = *split;
+            let files = if *split == own { files.clone() } else { self.files(&made)? };
+            of_splits.insert(*split, files);
+        }
+        made.sample.record.split = own;
+        Ok(Probe {
+            record: made.sample.record,
+            packed: self.set.recipe.pack.is_some(),
+            cameras,
+            grow_s: grown - begin,
+            sample_s,
+            fixed_s: (seconds - sample_s * more).max(0.0),
+            files: of_splits,
+            longer: longer.clamp(0.5, 2.0),
+        })
+    }
+
+    /// All files of an image.
+    fn files(&self, made: &RenderedSample) -> Result<Vec<File>> {
+        let mut files = native::files(&self.set.recipe, &made.sample, &made.text)?;
+        files.extend(formatted(&self.set, &made.sample)?);
+        Ok(files)
+    }
+}
+
+/// Length of files, of which those of equal bytes take space once, as [`write_files`] writes them.
+fn length(files: &[File]) -> u64 {
+    let mut known = BTreeSet::new();
+    let fresh = files.iter().filter(|file| file.bytes.len() <= BLOCK || known.insert(file.bytes.as_slice()));
+    fresh.map(|file| file.bytes.len() as u64).sum()
+}
+
+/// What belongs to all images of a dataset together.
+struct Together {
+    files: u64,
+    bytes: f64,
+    core_s: f64,
+}
+
+impl Together {
+    /// Of a dataset of such images that copies these files of its scene.
+    fn of(recipe: &Recipe, scene: &[File], probes: &[Probe]) -> Result<Self> {
+        let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
+        let small = Small::of(recipe, probes, 1);
+        small.write(folder.path(), scene)?;
+        let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count() as u64;
+        let per_field = small.recipe.captures();
+        // A field of each split; one more that is not whole, where the last one is not; one more of each probe.
+        let few_images = splits * per_field;
+        let many_images = few_images + probes.len() as u64 * per_field;
+        let few = small.finished(folder.path(), few_images)?;
+        let of_cut = recipe.count % recipe.captures();
+        let cut = of_cut.min(per_field);
+        let partial = if cut == 0 { 0 } else { small.finished(folder.path(), few_images + cut)?.files - few.files };
+        let begin = cpu()?;
+        let many = small.finished(folder.path(), many_images)?;
+        let core_s = (cpu()? - begin) / many_images as f64 * recipe.count.min(MOST_LOOKED_AT) as f64;
+        let whole_fields = recipe.count / recipe.captures();
+        let each = (many.files - few.files) / probes.len().max(1) as u64;
+        // Days after the first, of all fields.
+        let days = (recipe.days().len() as u64).saturating_sub(1);
+        let later_days = whole_fields * days + of_cut.div_ceil(recipe.captures_a_day()).saturating_sub(1);
+        let of_later_days = if later_days > 0 {
+            later_days * Small::of(recipe, probes, 2).files_of_a_field(scene, splits)?.saturating_sub(each)
+        } else {
+            0
+        };
+        let files = few.files + whole_fields * each + partial + of_later_days - splits * each;
+        let prolonged = |few: u64, many: u64, images: u64| {
+            let each = (many as f64 - few as f64) / (many_images - few_images).max(1) as f64;
+            (few as f64 + each * (images as f64 - few_images as f64)).max(0.0)
+        };
+        let lists = prolonged(few.lists, many.lists, recipe.count);
+        let page = prolonged(few.page, many.page, recipe.count.min(REPORTED));
+        let own: u64 = scene.iter().map(|file| file.bytes.len() as u64).sum();
+        let recipe_bytes = recipe.text()?.len() as u64;
+        Ok(Self { files: files + scene.len() as u64 + 1, bytes: lists + page + (own + recipe_bytes) as f64, core_s })
+    }
+}
+
+/// Files that belong to all images of a small dataset.
+struct Finished {
+    /// How many.
+    files: u64,
+    /// Length of the report.
+    page: u64,
+    /// Length of the others.
+    lists: u64,
+}
+
+/// A small dataset of copies of the probes, with as many splits and cameras as the large one has.
+struct Small<'a> {
+    recipe: Recipe,
+    probes: &'a [Probe],
+}
+
+impl<'a> Small<'a> {
+    /// One frame of each camera, on so many days where there are days.
+    fn of(recipe: &Recipe, probes: &'a [Probe], days: usize) -> Self {
+        let mut small = recipe.clone();
+        small.split = Shares(images_of_splits(recipe).map(|images| u32::from(images > 0)));
+        let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
+        if let Made::Rendered(rendering) = &mut small.made {
+            rendering.days.truncate(days);
+            rendering.captures = recipe.captures_a_day().min(cameras as u64) * rendering.days.len().max(1) as u64;
+        }
+        Self { recipe: small, probes }
+    }
+
+    /// Writes it with as many images as are needed.
+    fn write(&self, folder: &Path, scene: &[File]) -> Result<()> {
+        write_files(folder, scene)?;
+        write_files(folder, &[File { path: FILE.into(), bytes: self.recipe.text()? }])?;
+        let fields = Split::ALL.len() + self.probes.len();
+        for (index, probe) in (0..fields as u64 * self.recipe.captures()).zip(self.probes.iter().cycle()) {
+            let files = self.copy(probe, index)?;
+            write_files(folder, &files)?;
+            ChecksumRecord::of(index, &self.recipe, &files)?.write(folder)?;
+        }
+        Ok(())
+    }
+
+    /// The files of a probe as those of another image.
+    fn copy(&self, probe: &Probe, index: u64) -> Result<Vec<File>> {
+        let (field, capture) = self.recipe.field_of(index);
+        let mut record = probe.record.clone();
+        record.index = index;
+        record.name = Set::name(index);
+        record.split = self.recipe.split_of(index);
+        if let Some(of_probe) = &mut record.capture {
+            let (of_day, day) = of_day(&self.recipe, capture);
+            let camera = probe.cameras.get(of_day as usize).cloned().unwrap_or_default();
+            *of_probe = CaptureRecord { field, day, frame: 0, camera, ..of_probe.clone() };
+        }
+        let own = format!("{}/record.json", native::folder(&record.name));
+        let renamed = |file: &File| {
+            let path = file.path.replace(&probe.record.name, &record.name);
+            let bytes = if path == own { compact(&record)? } else { file.bytes.clone() };
+            Ok(File { path, bytes })
+        };
+        probe.files.get(&record.split).into_iter().flatten().map(renamed).collect()
+    }
+
+    /// How many files that belong to all images a further field adds.
+    fn files_of_a_field(&self, scene: &[File], splits: u64) -> Result<u64> {
+        let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
+        self.write(folder.path(), scene)?;
+        let (per_field, fields) = (self.recipe.captures(), self.probes.len() as u64);
+        let few = self.finished(folder.path(), splits * per_field)?;
+        let many = self.finished(folder.path(), (splits + fields) * per_field)?;
+        Ok((many.files - few.files) / fields.max(1))
+    }
+
+    /// Writes what belongs to all of its first images.
+    fn finished(&self, folder: &Path, images: u64) -> Result<Finished> {
+        let recipe = Recipe { count: images, ..self.recipe.clone() };
+        let paths = finish(&Set::new(folder, recipe), None)?;
+        let mut finished = Finished { files: paths.len() as u64, page: 0, lists: 0 };
+        for path in paths {
+            let bytes = std::fs::metadata(&path).map_err(Error::io(&path))?.len();
+            let sum = if path.ends_with(report::FILE) { &mut finished.page } else { &mut finished.lists };
+            *sum += bytes;
+        }
+        Ok(finished)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: fields of a scene file differ, so few of them tell little of all. Expected: the first, the middle and the last image first, no image
+    /// twice, none that is not there, and those that follow spread evenly.
+    #[test]
+    fn images_that_are_drawn_lie_far_apart() {
+        assert_eq!(probed(1), [0]);
+        assert_eq!(probed(3), [0, 1, 2]);
+        assert_eq!(probed(1001)[..7], [0, 500, 1000, 250, 750, 125, 375]);
+        for count in [2, 5, 17, 1000, u64::MAX] {
+            let all = probed(count);
+            assert_eq!(all.iter().collect::<BTreeSet<_>>().len(), all.len());
+            assert!(all.iter().all(|index| *index < count));
+            assert!(all.len() as u64 >= count.min(PROBES[0] as u64) && all.len() <= PROBES[1], "{count}: {all:?}");
+        }
+    }
+
+    /// Rationale: all images of a drive are of one field, which one process grows. Expected: where there is one field, a day of work is for one shard and
+    /// takes the memory of one image, however many cores share it; of a thousand fields it is for 24 shards with eight images under way.
+    #[test]
+    fn images_of_one_field_are_not_shared_out() {
+        let bill = |growings| Bill {
+            images: 1000,
+            fields: growings,
+            growings,
+            units: growings,
+            probes: Vec::new(),
+            spp: [1, 1],
+            core_s: 8.0 * 86_400.0,
+            grow_s: 0.0,
+            sample_s: 0.0,
+            bytes: 0,
+            files: 0,
+            base_memory: 7,
+            image_memory: 100,
+        };
+        assert_eq!((bill(1).shards(8), bill(1).memory(8)), (1, 107));
+        assert_eq!((bill(1000).shards(8), bill(1000).memory(8)), (24, 807));
+    }
+}

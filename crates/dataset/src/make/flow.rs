@@ -1,0 +1,48 @@
+//! Where what an image shows lies in other images of its field: optical flow to the next frame, disparity to the other cameras.
+//!
+//! Nothing is estimated: the point of the surface at a pixel's centre, as the label's ray met it, is projected by the other camera,
+//! whose lens, rolling shutter and place are known. Whether it is seen there is asked by a ray from that camera to the point. Plants and
+//! ground do not move between the images of a field.
+
+use crate::model::sample::Flow;
+use furrow_base::geometry::{Intersect, Ray};
+use furrow_base::math::Vec3;
+use furrow_field::drive::Capture;
+use furrow_optics::sensor::Camera;
+use rayon::prelude::*;
+
+/// A point hides itself from a ray that ends this share of its length before it.
+const CLOSE: f32 = 1e-4;
+
+/// The flows of image `at` of a field's captures: to the next frame of its camera, and to the other cameras of its frame. `depth` is that of
+/// its pixels, row by row.
+pub fn flows(captures: &[Capture], at: usize, depth: &[f32], geometry: &dyn Intersect) -> Vec<Flow> {
+    let here = &captures[at];
+    let next = captures.iter().find(|other| other.name == here.name && other.frame == here.frame + 1);
+    let beside = captures.iter().filter(|other| other.frame == here.frame && other.name != here.name);
+    let named = next.map(|other| ("next", other)).into_iter().chain(beside.map(|other| (other.name.as_str(), other)));
+    named.map(|(to, other)| flow(to, &here.camera, &other.camera, depth, geometry)).collect()
+}
+
+fn flow(to: &str, from: &Camera, other: &Camera, depth: &[f32], geometry: &dyn Intersect) -> Flow {
+    let width = from.width() as usize;
+    let forward = from.pose().axes.z_axis;
+    let one = |(i, depth): (usize, &f32)| {
+        let (x, y) = ((i % width) as u32, (i / width) as u32);
+        let (origin, direction) = from.centre_ray(x, y);
+        let point = origin + direction * (depth / direction.dot(forward));
+        let there = if depth.is_finite() { other.project(point) } else { None };
+        let Some(there) = there else { return ([f32::NAN; 2], false) };
+        let moved = [there.x - x as f32 - 0.5, there.y - y as f32 - 0.5];
+        (moved, other.contains(there) && !hidden(point, other.eye(there.y), geometry))
+    };
+    let (pixels, visible) = depth.par_iter().enumerate().map(one).unzip();
+    Flow { to: to.into(), pixels, visible }
+}
+
+/// Whether something lies between an eye and a point.
+fn hidden(point: Vec3, eye: Vec3, geometry: &dyn Intersect) -> bool {
+    let way = point - eye;
+    let length = way.length();
+    geometry.occluded(&Ray::until(eye, way / length, length * (1.0 - CLOSE)))
+}

@@ -1,0 +1,172 @@
+//! Takes everything that a scene reads into the dataset's folder, so that the dataset can be continued and checked on any machine.
+//!
+//! Files that the scene reaches by relative paths keep their places to each other below `scene/`. A file that only an absolute path
+//! leads to goes to `scene/external/`, and where a path no longer leads to its file, the copied RON file gets a relative one. So do names
+//! that stand for files that ship with the program.
+
+use crate::File;
+use furrow_base::input::tidy;
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
+use furrow_grow::soil::LAYERS;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+/// A scene's files as files of a dataset.
+pub(crate) struct Gathered {
+    /// The files, below `scene/`.
+    pub(crate) files: Vec<File>,
+    /// The scene file among them.
+    pub(crate) scene: String,
+    /// Whether the copy of a RON file names a file otherwise than the original does.
+    pub(crate) rewritten: bool,
+}
+
+/// Gathers the files that a scene reads, `scene` itself among them; paths as they were opened. `shipped` has the files for which names
+/// stand in the scene file.
+pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, scene: &Path) -> Result<Gathered> {
+    let places = places(paths, scene)?;
+    let scene = absolute(scene)?;
+    // A species file names others by their files' names alone: `name` and the keys of tables stand in quotes too.
+    let is_file = |name: &str| Path::new(name).extension().is_some_and(|e| e == "ron");
+    let files: BTreeMap<String, PathBuf> =
+        shipped.iter().filter(|(name, _)| is_file(name)).map(|(name, file)| (name.clone(), file.clone())).collect();
+    let mut rewritten = false;
+    let mut gathered = Vec::new();
+    for (from, to) in &places {
+        let mut bytes = furrow_base::input::contents(from).map_err(Error::reading(from))?;
+        if from.extension().is_some_and(|e| e == "ron")
+            && let Ok(text) = std::str::from_utf8(&bytes)
+        {
+            let page = RonFile { path: from.clone(), text: text.to_owned() };
+            let is_scene = *from == scene;
+            // Layers that are not named are files that ship, which the copy must name.
+            let whole = is_scene.then(|| page.written_out("soil", "layers", LAYERS)).flatten();
+            let text = whole.as_ref().unwrap_or(&page.text);
+            if let Some(text) =
+                renamed(text, from, to, &places, if is_scene { shipped } else { &files }).or(whole.clone())
+            {
+                bytes = text.into_bytes();
+                rewritten = true;
+            }
+        }
+        gathered.push(File { path: slashed(to), bytes });
+    }
+    Ok(Gathered { files: gathered, scene: slashed(&places[&scene]), rewritten })
+}
+
+/// Where each file goes, by its absolute path; places are relative to the dataset's folder.
+fn places(paths: &[PathBuf], scene: &Path) -> Result<BTreeMap<PathBuf, PathBuf>> {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    // Reached by relative paths alone: such a path begins as the scene's own does.
+    let near = |path: &Path| if scene.is_absolute() { path.starts_with(folder) } else { path.is_relative() };
+    let mut root = absolute(scene)?;
+    root.pop();
+    for path in paths.iter().filter(|path| near(path)) {
+        let path = absolute(path)?;
+        while !path.starts_with(&root) {
+            root.pop();
+        }
+    }
+    let all: Vec<PathBuf> = paths.iter().map(|path| absolute(path)).collect::<Result<_>>()?;
+    let (inside, outside): (Vec<_>, Vec<_>) = all.into_iter().partition(|path| path.starts_with(&root));
+    let below = |path: &Path, root: &Path| path.strip_prefix(root).unwrap_or(path).to_path_buf();
+    let mut places: BTreeMap<PathBuf, PathBuf> =
+        inside.into_iter().map(|path| (path.clone(), Path::new("scene").join(below(&path, &root)))).collect();
+    if let Some(first) = outside.first() {
+        let mut far = first.parent().unwrap_or(first).to_path_buf();
+        while !outside.iter().all(|path| path.starts_with(&far)) {
+            far.pop();
+        }
+        let mut external = PathBuf::from("scene/external");
+        while places.values().any(|place| place.starts_with(&external)) {
+            external.as_mut_os_string().push("-");
+        }
+        places.extend(outside.into_iter().map(|path| (path.clone(), external.join(below(&path, &far)))));
+    }
+    Ok(places)
+}
+
+/// The text of a RON file that moves from `from` to `to` with the others; `None` where each of its paths leads to its file as before.
+fn renamed(
+    text: &str,
+    from: &Path,
+    to: &Path,
+    places: &BTreeMap<PathBuf, PathBuf>,
+    shipped: &BTreeMap<String, PathBuf>,
+) -> Option<String> {
+    let (old, new) = (from.parent()?, to.parent()?);
+    RonFile { path: from.into(), text: text.to_owned() }.replace_quoted(|written| {
+        let full =
+            shipped.get(written).and_then(|file| absolute(file).ok()).unwrap_or_else(|| tidy(&old.join(written)));
+        let place = places.get(&full)?;
+        (tidy(&new.join(written)) != *place).then(|| slashed(&relative(new, place)))
+    })
+}
+
+/// The way from a folder to a file; both are relative to the same folder, without `.` and `..`.
+fn relative(folder: &Path, file: &Path) -> PathBuf {
+    let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(file.components().skip(shared)).collect()
+}
+
+/// An absolute path without `.` and `..`.
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map(|full| tidy(&full)).map_err(Error::reading(path))
+}
+
+/// A relative path with `/` between its names.
+fn slashed(path: &Path) -> String {
+    let names: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+    names.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn to(paths: &[&str], scene: &str) -> Vec<String> {
+        let paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
+        places(&paths, Path::new(scene)).unwrap().values().map(|p| slashed(p)).collect()
+    }
+
+    #[test]
+    fn relative_paths_keep_their_places_and_absolute_ones_are_taken_in() {
+        assert_eq!(
+            to(&["/p/scenes/a.ron", "/p/scenes/../textures/x.png"], "/p/scenes/a.ron"),
+            ["scene/scenes/a.ron", "scene/textures/x.png"]
+        );
+        assert_eq!(
+            to(&["/p/scenes/a.ron", "/q/species/b.ron", "/q/species/../textures/x.png"], "/p/scenes/a.ron"),
+            ["scene/a.ron", "scene/external/species/b.ron", "scene/external/textures/x.png"]
+        );
+        assert_eq!(
+            to(&["/p/a.ron", "/p/external/x.png", "/q/x.png"], "/p/a.ron"),
+            ["scene/a.ron", "scene/external/x.png", "scene/external-/x.png"]
+        );
+        // An absolute path to what lies beside the scene.
+        assert_eq!(to(&["a.ron", "b.ron"], "a.ron"), ["scene/a.ron", "scene/b.ron"]);
+    }
+
+    #[test]
+    fn paths_that_no_longer_lead_to_their_files_are_written_anew() {
+        let places: BTreeMap<PathBuf, PathBuf> = [
+            ("/p/scenes/a.ron", "scene/scenes/a.ron"),
+            ("/p/textures/x.png", "scene/textures/x.png"),
+            ("/q/b.ron", "scene/external/b.ron"),
+        ]
+        .into_iter()
+        .map(|(from, to)| (from.into(), to.into()))
+        .collect();
+        let shipped = BTreeMap::from([("bee".to_owned(), PathBuf::from("/q/b.ron"))]);
+        let new =
+            |text| renamed(text, Path::new("/p/scenes/a.ron"), Path::new("scene/scenes/a.ron"), &places, &shipped);
+        assert_eq!(new(r#"(a: "bee", b: "bees")"#).unwrap(), r#"(a: "../external/b.ron", b: "bees")"#);
+        assert_eq!(new(r#"(a: "../textures/x.png", b: "b.ron")"#), None);
+        assert_eq!(
+            new(r#"(a: "/p/textures/x.png", /* "/q/b.ron" */ b: "/p/../q/b.ron")"#).unwrap(),
+            r#"(a: "../textures/x.png", /* "/q/b.ron" */ b: "../external/b.ron")"#
+        );
+    }
+}

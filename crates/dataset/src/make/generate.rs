@@ -1,0 +1,483 @@
+//! Makes the images that are missing, several at once, until all are there or someone asks to stop.
+//!
+//! Growing a field, labelling and writing it keep one core busy, drawing keeps all of them: so several images are under way at once,
+//! each with a share of the threads as a pool of its own. (In one pool for all, a thread that waits for a part of its image takes up
+//! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
+
+use crate::make::meter;
+use crate::make::push::{Push, Unit};
+use crate::make::render::{LastField, Times, render, renderer, scene_file};
+use crate::make::time_left::TimeLeft;
+use crate::make::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
+use crate::pack::store;
+use crate::read::checksum_record::{ChecksumRecord, write_files_beside};
+use crate::read::native;
+use crate::read::packs::Id;
+use crate::read::packs::Packing;
+use crate::read::set::Set;
+use crate::read::task::{Task, in_format, task};
+use crate::{File, format};
+use furrow_base::error::Kind;
+use furrow_base::{Error, Result};
+use furrow_field::assemble::BuildProgress;
+use furrow_field::estimate::usual_memory;
+use furrow_job::{Renderer, SceneFile, Threads};
+use furrow_render::render::Watch;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Which of the images a run is for: those of the [units](crate::Recipe::unit_of) whose number % of == number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub number: u64,
+    /// How many shards there are.
+    pub of: u64,
+}
+
+impl Shard {
+    /// All images.
+    pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Whether it holds a unit.
+    pub fn holds(self, unit: u64) -> bool {
+        unit % self.of == self.number
+    }
+
+    /// Reads `k/N`, k from 0 to N − 1.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let pair = text.split_once('/').and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
+        pair.filter(|(k, n)| k < n)
+            .map(|(number, of)| Self { number, of })
+            .ok_or_else(|| "write it as k/N with k from 0 to N - 1, such as 0/8".into())
+    }
+}
+
+/// How a run works; none of it changes a byte.
+#[derive(Clone, Copy, Debug)]
+pub struct Work<'a> {
+    /// Which images.
+    pub shard: Shard,
+    /// Workers; 0 for one on each core.
+    pub threads: usize,
+    /// Images under way at once; 0 for one on each worker, but no more than 16, nor than the memory is for.
+    pub at_once: usize,
+    /// Bytes of memory that a field may take; the usual share of the machine's unless given.
+    pub memory: Option<u64>,
+    /// How what is finished is sent elsewhere.
+    pub push: Option<&'a Push>,
+    /// Told how far the fields are that grow.
+    pub progress: Option<&'a Arc<BuildProgress>>,
+    /// Told how long images take.
+    pub time_left: Option<&'a TimeLeft>,
+}
+
+impl Default for Work<'_> {
+    /// All images, on all cores.
+    fn default() -> Self {
+        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None, time_left: None }
+    }
+}
+
+/// How a run is watched and stopped.
+pub struct Callbacks<'a> {
+    /// Told how many images are to be made, before the first.
+    pub begin: &'a (dyn Fn(usize) + Sync),
+    /// Told what the user should know before hours are spent.
+    pub warn: &'a (dyn Fn(&str) + Sync),
+    /// Told of every image that is done, from any thread.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Set it to stop when the images under way are done.
+    pub soon: &'a AtomicBool,
+    /// Set it to stop at once.
+    pub now: &'a Arc<AtomicBool>,
+}
+
+/// Where the images of a run go when they are finished.
+pub(crate) struct Delivery<'a> {
+    /// Whether an image is where it is to be already, wherever the run works.
+    pub(crate) has: &'a (dyn Fn(u64) -> bool + Sync),
+    /// Told of each unit that is finished, also of those that earlier runs finished.
+    pub(crate) deliver: &'a (dyn Fn(Unit) -> Result<()> + Sync),
+    /// The dataset's folder, wherever the run works: its timing log tells of the run, and who stops it is told its name.
+    pub(crate) home: &'a Path,
+}
+
+/// Images under way at once unless said otherwise: more would take more memory than they save time.
+pub(crate) const MOST_AT_ONCE: usize = 16;
+
+/// How many fields like one of them the memory is for. Where that cannot be told, one: its image will say why.
+pub(crate) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
+    let memory = memory.unwrap_or_else(usual_memory) as f64;
+    let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
+    ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
+}
+
+/// Threads of one worker, of all that are shared out among so many workers; at least one.
+pub(crate) fn share(threads: usize, workers: usize, worker: usize) -> usize {
+    (threads / workers + usize::from(worker < threads % workers)).max(1)
+}
+
+/// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
+/// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
+/// run at once. What is made is kept in any case.
+pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
+    work.push.map_or(Ok(()), |push| push.clear(set))?;
+    let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    deliver(Unit::Recipe)?;
+    generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, home: &set.folder })
+}
+
+/// The same where what is finished goes elsewhere.
+pub(crate) fn generate_for(
+    set: &Set,
+    work: &Work<'_>,
+    callbacks: &Callbacks<'_>,
+    delivery: &Delivery<'_>,
+) -> Result<()> {
+    let renderer = renderer(set)?;
+    let all = Threads::new(work.threads)?;
+    let threads = all.count();
+    let shard = work.shard;
+    let held = |k: &u64| shard.holds(set.recipe.unit_of(*k));
+    let wanted: Vec<u64> = (0..set.recipe.count).filter(held).collect();
+    let open = all.install(|| OpenPacks::of(set, shard))?;
+    let is_freed = |k: u64| set.recipe.pack.is_none() && Unit::Image(k).is_freed(set);
+    let is_there = |k: u64| (delivery.has)(k) || open.is_settled(set, k) || is_freed(k);
+    let look = |k: u64| Ok((k, if is_there(k) { Task::Done } else { task(set, k)? }));
+    let tasks: Vec<(u64, Task)> = all.install(|| wanted.into_par_iter().map(look).collect::<Result<Vec<_>>>())?;
+    let wanted = tasks.len();
+    let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
+    (callbacks.begin)(tasks.len());
+    open.expect(set, &tasks)?;
+    // What is there and was not delivered: units that lack nothing.
+    let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
+    let mut units: Vec<Unit> = held_units(set, shard);
+    units.retain(|unit| !lacking.contains(&unit.name()));
+    let sent = delivery.deliver;
+    units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
+    // Images of one field and day follow each other on one worker, which grows it once.
+    let fields: Vec<&[(u64, Task)]> =
+        tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
+    if let Some(time_left) = work.time_left {
+        let grows = |field: &&&[(u64, Task)]| field.iter().any(|(_, task)| *task == Task::All);
+        time_left.expect(tasks.len(), fields.iter().filter(grows).count());
+    }
+    let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
+    let source = match (rendered, &renderer) {
+        (Some(index), Some(renderer)) => {
+            let scene = scene_file(set)?.memory(work.memory).until(callbacks.now);
+            let scene = match work.progress {
+                Some(progress) => scene.progress(progress),
+                None => scene,
+            };
+            Some((scene, index, renderer))
+        }
+        _ => None,
+    };
+    let most = source
+        .as_ref()
+        .map_or(MOST_AT_ONCE, |(scene, index, _)| fitting(scene, set.recipe.field_of(*index).0, work.memory));
+    let at_once = if work.at_once == 0 { threads.min(most) } else { work.at_once }.min(fields.len()).max(1);
+    let workers: Vec<Threads> =
+        (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect::<Result<_>>()?;
+    let run = Run {
+        set,
+        source: source.map(|(scene, _, renderer)| (scene, renderer)),
+        callbacks,
+        threads,
+        at_once,
+        timing_log: TimingLog::new(delivery.home, &format!("{}-of-{}", shard.number, shard.of)),
+        time_left: work.time_left,
+    };
+    let cpu_before = meter::cpu();
+    if !tasks.is_empty() {
+        run.timing_log.add(&Row::Began(Began { began_s: now(), images: tasks.len(), at_once, threads }))?;
+    }
+    let next = AtomicUsize::new(0);
+    let made = AtomicUsize::new(0);
+    let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
+    let failed = AtomicBool::new(false);
+    let fail = |index: u64, error: Error| {
+        // What is wrong with one field is no reason to lose a night; what is wrong with the disk is.
+        failed.fetch_or(!error.is_of_one_field(), Ordering::Relaxed);
+        // Where the disk is full it cannot be noted, and the error itself is told.
+        let _ = run.timing_log.add(&Row::Failure(ImageFailure { index, error: error.to_string(), failed_s: now() }));
+        failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
+    };
+    let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
+    let refused = std::thread::scope(|scope| {
+        for worker in &workers {
+            let work = || {
+                let ended = || stopped() || failed.load(Ordering::Relaxed);
+                while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
+                    let mut kept = LastField::default();
+                    for (index, task) in field.iter().take_while(|_| !ended()) {
+                        match worker
+                            .install(|| run.image(*index, *task, worker, &mut kept))
+                            .and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) })
+                        {
+                            Ok(()) => {
+                                made.fetch_add(1, Ordering::Relaxed);
+                                (callbacks.done)(*index);
+                            }
+                            Err(e) if e.kind() == Kind::Interrupted => break,
+                            Err(e) => fail(*index, e),
+                        }
+                    }
+                }
+            };
+            if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
+                // Those that did start end with their images.
+                failed.store(true, Ordering::Relaxed);
+                return Some(Error::no_thread(e));
+            }
+        }
+        None
+    });
+    let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // It may have been stopped after the last image was done.
+    let lacking = tasks.len() - made.into_inner();
+    let end = match lacking {
+        _ if !failures.is_empty() => End::Failed,
+        0 => End::Done,
+        _ => End::Stopped,
+    };
+    let noted = if tasks.is_empty() { Ok(()) } else { run.ended(end, cpu_before) };
+    if !failures.is_empty() {
+        return Err(together(failures));
+    }
+    noted?;
+    if let Some(refused) = refused {
+        return Err(refused);
+    }
+    if lacking == 0 { Ok(()) } else { Err(interrupted(delivery.home, wanted - lacking, wanted)) }
+}
+
+/// Told to stop when so many of the images that were asked for were there.
+pub(crate) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
+    Error::stopped(format!("stopped: {there} of {wanted} images are there"))
+        .help("the same command goes on with it")
+        .in_file(folder)
+}
+
+/// Images whose faults are told one by one.
+const MOST_TOLD: usize = 20;
+
+/// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
+pub(crate) fn together(failures: BTreeMap<u64, Error>) -> Error {
+    let mut words = Vec::new();
+    let more = failures.len().saturating_sub(MOST_TOLD);
+    let mut input = true;
+    for (index, error) in failures {
+        let image = format!("image {}", Set::name(index));
+        if !error.is_of_one_field() {
+            return if error.place().is_none() { error.within(image) } else { error };
+        }
+        if error.kind() == Kind::Damaged {
+            input = false;
+            words.push(error.to_string());
+        } else {
+            words.push(format!("{image}: {error}"));
+        }
+    }
+    words.truncate(MOST_TOLD);
+    if more > 0 {
+        words.push(format!("{more} images more were not made; correct these and run the same command again"));
+    }
+    let words = words.join("\nerror: ");
+    if input { Error::input(words) } else { Error::damaged(words) }
+}
+
+/// What a shard pushes, images or packs.
+fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
+    match Packing::of(&set.recipe) {
+        Some(packing) => packing.all().filter(|id| shard.holds(packing.place(*id))).map(Unit::Pack).collect(),
+        None => (0..set.recipe.count).filter(|k| shard.holds(set.recipe.unit_of(*k))).map(Unit::Image).collect(),
+    }
+}
+
+/// The packs of a shard that are not whole yet.
+pub(crate) struct OpenPacks(BTreeMap<Id, AtomicUsize>);
+
+impl OpenPacks {
+    /// Those of a shard, none where images lie in folders.
+    pub(crate) fn of(set: &Set, shard: Shard) -> Result<Self> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(Self(BTreeMap::new())) };
+        let held: Vec<Id> = packing.all().filter(|id| shard.holds(packing.place(*id))).collect();
+        let open = held.into_par_iter().map(|id| Ok((id, store::settle(set, id)?))).collect::<Result<Vec<_>>>()?;
+        Ok(Self(open.into_iter().filter(|(_, whole)| !whole).map(|(id, _)| (id, AtomicUsize::new(0))).collect()))
+    }
+
+    /// Whether an image lies in a pack that is whole.
+    pub(crate) fn is_settled(&self, set: &Set, index: u64) -> bool {
+        Packing::of(&set.recipe).is_some_and(|packing| !self.0.contains_key(&packing.id(index)))
+    }
+
+    /// Is told what remains to be done; closes the packs of which nothing does.
+    fn expect(&self, set: &Set, tasks: &[(u64, Task)]) -> Result<()> {
+        let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
+        for (index, _) in tasks {
+            if let Some(left) = self.0.get(&packing.id(*index)) {
+                left.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let ready = self.0.iter().filter(|(_, left)| left.load(Ordering::Relaxed) == 0);
+        ready.map(|(id, _)| *id).try_for_each(|id| store::close(set, id))
+    }
+
+    /// Is told of an image that is there; closes its pack after the last. Whether the unit that it belongs to is finished.
+    fn made(&self, set: &Set, index: u64) -> Result<bool> {
+        let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(true) };
+        let is_last = self.0.get(&id).is_some_and(|left| left.fetch_sub(1, Ordering::AcqRel) == 1);
+        if is_last {
+            store::close(set, id)?;
+        }
+        Ok(is_last)
+    }
+}
+
+/// A run of a shard.
+struct Run<'a> {
+    set: &'a Set,
+    /// What images are rendered from, and by what.
+    source: Option<(SceneFile, &'a Renderer)>,
+    callbacks: &'a Callbacks<'a>,
+    threads: usize,
+    at_once: usize,
+    timing_log: TimingLog,
+    time_left: Option<&'a TimeLeft>,
+}
+
+impl Run<'_> {
+    /// Makes one image and writes its checksums.
+    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
+        let begin = Instant::now();
+        let Set { folder, recipe, .. } = self.set;
+        // Another run may have made it meanwhile.
+        if self::task(self.set, index)? == Task::Done {
+            self.tell_time(begin, Duration::ZERO);
+            return Ok(());
+        }
+        let (files, times) = if task == Task::Formats {
+            (derived(self.set, index)?, Times::default())
+        } else {
+            let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
+            let watch = Watch { done: &|_| (), stop: self.callbacks.now };
+            let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
+            crate::model::invariants::check(recipe, &made.sample)?;
+            let mut files = native::files(recipe, &made.sample, &made.text)?;
+            files.extend(formatted(self.set, &made.sample)?);
+            (files, made.times)
+        };
+        if self.callbacks.now.load(Ordering::Relaxed) {
+            return Err(Error::interrupted());
+        }
+        let before = if task == Task::Formats { ChecksumRecord::read(folder, index) } else { None };
+        let mut own = before.as_ref().map(|before| before.files.clone()).unwrap_or_default();
+        own.retain(|path, _| native::is_native(path));
+        write_files_beside(folder, &files, &own)?;
+        let mut checksums = ChecksumRecord::of(index, recipe, &files)?;
+        if let Some(before) = before {
+            // What only the renderer knows was whole, or the image would have been rendered again.
+            let films: Vec<&str> =
+                format::all(recipe)?.into_iter().filter(|(_, f)| f.needs_film()).map(|(name, _)| name).collect();
+            let kept = |path: &str| path.starts_with("images/") || films.iter().any(|name| in_format(path, name));
+            checksums.files.extend(before.files.into_iter().filter(|(path, _)| kept(path)));
+        }
+        checksums.write(folder)?;
+        let seconds = self.tell_time(begin, times.grow);
+        let hash = checksums.image_hash()?;
+        self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
+    }
+
+    /// Tells how long an image took whose field grew so long for it, seconds.
+    fn tell_time(&self, begin: Instant, grow: Duration) -> f64 {
+        let seconds = begin.elapsed().as_secs_f64();
+        if let Some(time_left) = self.time_left {
+            time_left.add(seconds, grow);
+        }
+        seconds
+    }
+
+    /// Notes that the run ends, and what it took since the process had taken so much.
+    fn ended(&self, end: End, cpu_before: Option<Duration>) -> Result<()> {
+        let taken = meter::cpu().zip(cpu_before).map(|(now, before)| now.saturating_sub(before));
+        self.timing_log.add(&Row::Ended(Ended {
+            ended_s: now(),
+            end,
+            cpu_s: taken.map(|taken| taken.as_secs_f64()),
+            peak_bytes: meter::peak_memory(),
+        }))
+    }
+}
+
+/// The files of all formats of an image.
+pub(crate) fn formatted(set: &Set, sample: &crate::Sample) -> Result<Vec<File>> {
+    let mut files = Vec::new();
+    for (_, format) in format::all(&set.recipe)? {
+        files.extend(format.image(&set.recipe, sample)?);
+    }
+    Ok(files)
+}
+
+/// The files of those formats that follow from the native files.
+fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
+    let sample = set.sample(index)?;
+    let mut files = Vec::new();
+    for (_, format) in format::all(&set.recipe)?.into_iter().filter(|(_, format)| !format.needs_film()) {
+        files.extend(format.image(&set.recipe, &sample)?);
+    }
+    Ok(files)
+}
+
+/// An image that nothing can make again.
+fn lost(set: &Set, index: u64) -> Error {
+    Error::damaged(format!("image {index} is damaged, and nothing here can make it again"))
+        .in_file(&set.folder)
+        .help("import the images again")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_are_shared_out_whole() {
+        for (threads, workers) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
+            let shares: Vec<usize> = (0..workers).map(|worker| share(threads, workers, worker)).collect();
+            assert_eq!(shares.iter().sum::<usize>(), threads);
+            assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
+        }
+        assert_eq!(share(2, 3, 2), 1);
+    }
+
+    #[test]
+    fn a_cause_that_lasts_is_told_alone_and_faults_of_fields_together() {
+        let field = |index| (index, Error::input("no sun").help("wait"));
+        let all = together(BTreeMap::from([field(1), field(4)]));
+        assert_eq!(all.to_string(), "image 000001: no sun\n help: wait\nerror: image 000004: no sun\n help: wait");
+        assert_eq!(all.kind(), Kind::Input);
+        let with = |error: Error| together(BTreeMap::from([field(1), (3, error)]));
+        assert_eq!(with(Error::damaged("image 3: x")).kind(), Kind::Damaged);
+        for lasting in [Error::failed("cannot encode a PNG"), Error::missing("no denoiser")] {
+            let (kind, words) = (lasting.kind(), format!("image 000003: {lasting}"));
+            let told = with(lasting);
+            assert_eq!((told.kind(), told.to_string()), (kind, words));
+        }
+        let full = with(Error::io("a/b.png".as_ref())(std::io::ErrorKind::StorageFull.into()));
+        assert!(full.to_string().starts_with("a/b.png: "), "{full}");
+    }
+
+    #[test]
+    fn shards_are_read_as_they_are_written() {
+        assert_eq!(Shard::parse("2/5"), Ok(Shard { number: 2, of: 5 }));
+        for bad in ["5/5", "1", "-1/2", "a/b", "0/0"] {
+            assert!(Shard::parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,497 @@
+//! Sends what is finished elsewhere while the rest is made: a command of the user's is run for each finished image or pack.
+//!
+//! A unit is what is finished at once: a pack with its record, an image with its checksums and the files of its formats, the recipe with the
+//! scene before them, and what `finish` writes after them. For each a folder is made that holds its files by their paths below the dataset's
+//! folder, as further names of the same files. A command that copies what is in that folder, keeping paths, therefore builds the same dataset
+//! at the other place:
+//!
+//! ```text
+//! --push 'rclone copy {dir} remote:bucket/set'      --push 'cp -a {dir}/. /mnt/set/'
+//! --push 'aws s3 cp --recursive {dir} s3://bucket/set'
+//! ```
+//!
+//! What was pushed is noted in `pushed/UNIT.json` with a hash of what it was, after the command and the one that checks it have ended well; so
+//! a killed run pushes again what it was about to push, and nothing else. Freed units count as done.
+
+use crate::model::recipe::{FILE, MANIFEST, compact};
+use crate::read::checksum::Checksum;
+use crate::read::checksum_record::ChecksumRecord;
+use crate::read::native;
+use crate::read::packs::Id;
+use crate::read::packs::Packing;
+use crate::read::set::Set;
+use crate::{index, report};
+use furrow_base::input::{below, refuse_links};
+use furrow_base::{Error, Result};
+use furrow_output::{remove_unfinished_in, write_atomically};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{ErrorKind, Read, Seek};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How finished units are sent elsewhere.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Push {
+    /// Shell command; `{dir}` stands for the folder with a unit's files.
+    pub command: String,
+    /// Shell command that is run after it, and fails where what arrived is not what was sent.
+    pub check: Option<String>,
+    /// Whether the files of a unit are removed here once it was pushed.
+    pub free: bool,
+    /// How often a unit is tried before the run ends.
+    pub tries: u32,
+    /// How long a command may take; as long as it likes unless given.
+    pub timeout: Option<Duration>,
+}
+
+/// What stands for the folder in a command.
+const DIR: &str = "{dir}";
+
+/// The last words of a command that are told.
+const TOLD: u64 = 2000;
+
+/// Between two looks at a command that runs.
+const EVERY: Duration = Duration::from_millis(20);
+
+/// What is pushed at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unit {
+    /// The recipe and the scene.
+    Recipe,
+    /// A pack.
+    Pack(Id),
+    /// An image in a folder of its own.
+    Image(u64),
+    /// What belongs to all images together.
+    Whole,
+}
+
+impl Unit {
+    /// The one that an image belongs to.
+    pub(crate) fn of(set: &Set, index: u64) -> Self {
+        Packing::of(&set.recipe).map_or(Self::Image(index), |packing| Self::Pack(packing.id(index)))
+    }
+
+    pub(crate) fn name(self) -> String {
+        match self {
+            Self::Recipe => "recipe".into(),
+            Self::Pack(id) => id.name(),
+            Self::Image(index) => Set::name(index),
+            Self::Whole => "whole".into(),
+        }
+    }
+
+    fn note(self, folder: &Path) -> PathBuf {
+        folder.join("pushed").join(format!("{}.json", self.name()))
+    }
+
+    /// Its files by their paths below the dataset's folder, and a hash of what they are; `None` where it is not finished.
+    pub(crate) fn contents(self, set: &Set) -> Result<Option<(Vec<String>, String)>> {
+        let folder = &set.folder;
+        Ok(match self {
+            Self::Recipe => {
+                let mut files = vec![FILE.to_owned()];
+                below_folder(folder, "scene", &mut files)?;
+                Some(hashed(folder, files)?)
+            }
+            Self::Whole => {
+                let mut files = vec![MANIFEST.to_owned(), report::FILE.to_owned()];
+                files.extend([index::IMAGES.to_owned(), index::PLANTS.to_owned()]);
+                files.extend(set.recipe.formats.iter().flat_map(|format| lists(folder, set, format)));
+                files.retain(|file| folder.join(file).is_file());
+                Some(hashed(folder, files)?)
+            }
+            Self::Pack(id) => match set.packs.get(folder, id) {
+                None => None,
+                Some(record) => {
+                    let formats = record.images.iter().flat_map(|image| image.files.keys());
+                    let mut files: Vec<String> = formats.filter(|path| !native::is_native(path)).cloned().collect();
+                    files.extend([id.path(), id.seal()]);
+                    Some((files, record.hash()?))
+                }
+            },
+            Self::Image(index) => match ChecksumRecord::read(folder, index) {
+                None => None,
+                Some(record) => {
+                    let mut files: Vec<String> = record.files.keys().cloned().collect();
+                    files.push(format!("seals/{}.json", Set::name(index)));
+                    Some((files, record.hash()?))
+                }
+            },
+        })
+    }
+
+    /// What was noted of it, where it was pushed as it is now.
+    fn noted(self, set: &Set, hash: &str) -> Option<Note> {
+        let bytes = furrow_base::input::contents(&self.note(&set.folder)).ok()?;
+        serde_json::from_slice(&bytes).ok().filter(|note: &Note| note.sha256 == hash)
+    }
+
+    /// Whether its files were removed here because they lie elsewhere.
+    pub(crate) fn is_freed(self, set: &Set) -> bool {
+        if !self.note(&set.folder).is_file() {
+            return false;
+        }
+        let hash = self.contents(set).ok().flatten().map(|(_, hash)| hash);
+        hash.and_then(|hash| self.noted(set, &hash)).is_some_and(|note| note.freed)
+    }
+}
+
+/// Names of the units whose files were removed here because they lie elsewhere.
+pub(crate) fn freed(set: &Set) -> BTreeSet<String> {
+    let Ok(entries) = std::fs::read_dir(set.folder.join("pushed")) else { return BTreeSet::new() };
+    let notes = entries.filter_map(|entry| furrow_base::input::contents(&entry.ok()?.path()).ok());
+    let notes = notes.filter_map(|bytes| serde_json::from_slice::<Note>(&bytes).ok());
+    notes.filter(|note| note.freed).map(|note| note.unit).collect()
+}
+
+/// An error where images were pushed and removed here: what belongs to all images is made of all of them.
+pub(crate) fn refuse_freed(set: &Set) -> Result<()> {
+    let freed = freed(set).len();
+    if freed == 0 {
+        return Ok(());
+    }
+    let what = if set.recipe.pack.is_some() { "packs" } else { "images" };
+    Err(Error::misuse(format!("{freed} {what} were pushed and removed here"))
+        .help("`trace dataset finish` and `verify` read all of them: run these on the folder that they were pushed to")
+        .in_file(&set.folder))
+}
+
+/// That a unit was pushed.
+#[derive(Serialize, Deserialize)]
+struct Note {
+    unit: String,
+    /// Of its record, or of its files.
+    sha256: String,
+    /// Whether its files were removed here.
+    freed: bool,
+}
+
+/// Files below a folder of the dataset.
+fn below_folder(folder: &Path, within: &str, files: &mut Vec<String>) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder.join(within)) else { return Ok(()) };
+    for entry in entries {
+        let entry = entry.map_err(Error::io(&folder.join(within)))?;
+        let path = format!("{within}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            below_folder(folder, &path, files)?;
+        } else {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(())
+}
+
+/// Files of a format that belong to no image, from the manifest that lists all.
+fn lists(folder: &Path, set: &Set, format: &str) -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Listed {
+        files: BTreeMap<String, Checksum>,
+    }
+    let bytes = furrow_base::input::contents(&folder.join(MANIFEST)).unwrap_or_default();
+    let listed: Option<Listed> = serde_json::from_slice(&bytes).ok();
+    let mut all: Vec<String> = listed.map(|listed| listed.files.into_keys().collect()).unwrap_or_default();
+    all.retain(|path| path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/')));
+    let of_images: BTreeSet<String> = set.all_checksums().flatten().flat_map(|image| image.files.into_keys()).collect();
+    all.retain(|path| !of_images.contains(path));
+    all
+}
+
+fn hashed(folder: &Path, files: Vec<String>) -> Result<(Vec<String>, String)> {
+    let mut words = String::new();
+    for file in &files {
+        let path = folder.join(file);
+        let sum = Checksum::of_file(&path).map_err(Error::io(&path))?;
+        words.extend([sum.sha256.as_str(), " ", file, "\n"]);
+    }
+    Ok((files, Checksum::of(words.as_bytes()).sha256))
+}
+
+/// Pushes what `finish` wrote.
+pub fn whole(set: &Set, push: &Push, stop: &AtomicBool) -> Result<()> {
+    push.unit(set, Unit::Whole, stop)
+}
+
+impl Push {
+    /// An error where the commands do not say what is to be copied.
+    pub fn check(&self) -> Result<()> {
+        if self.command.contains(DIR) {
+            return Ok(());
+        }
+        Err(Error::misuse(format!("--push `{}` does not say what is to be copied", self.command))
+            .help("write {dir} for the folder whose files are finished, such as --push 'rclone copy {dir} remote:set'"))
+    }
+
+    /// Pushes a unit, unless it was pushed as it is now; does nothing where it is not finished.
+    pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: &AtomicBool) -> Result<()> {
+        let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
+        let note = |freed| Note { unit: unit.name(), sha256: hash.clone(), freed };
+        let path = unit.note(&set.folder);
+        refuse_links(&set.folder, Path::new("pushed"))?;
+        match unit.noted(set, &hash) {
+            Some(Note { freed: true, .. }) => return Ok(()),
+            Some(_) => {}
+            None => {
+                match self.send(set, unit, &files, stop) {
+                    // Another run may have pushed it meanwhile, and removed it here.
+                    Err(e) if e.is_not_found() && unit.noted(set, &hash).is_some_and(|note| note.freed) => {
+                        return Ok(());
+                    }
+                    other => other?,
+                }
+                // The command may have taken hours.
+                refuse_links(&set.folder, Path::new("pushed"))?;
+                write_atomically(&path, &compact(&note(false))?)?;
+            }
+        }
+        let is_of_images = matches!(unit, Unit::Pack(_) | Unit::Image(_));
+        if self.free && is_of_images {
+            // First what says that they lie elsewhere.
+            write_atomically(&path, &compact(&note(true))?)?;
+            free(set, &files)?;
+        }
+        Ok(())
+    }
+
+    /// Clears away what killed runs have left of their pushes and archives: further names of files that are to take no room here any longer.
+    pub(crate) fn clear(&self, set: &Set) -> Result<()> {
+        refuse_links(&set.folder, Path::new("packs"))?;
+        for folder in [set.folder.clone(), set.folder.join("packs")].iter().filter(|_| self.free) {
+            if folder.is_dir() {
+                remove_unfinished_in(folder)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs the commands until both end well.
+    fn send(&self, set: &Set, unit: Unit, files: &[String], stop: &AtomicBool) -> Result<()> {
+        let folder = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
+        let mut pause = Duration::from_secs(1);
+        for tried in 1..=self.tries {
+            match self.attempt(unit, &folder, files, stop)? {
+                None => return Ok(()),
+                Some(words) if tried >= self.tries => {
+                    return Err(Error::failed(format!("{} was not pushed: {words}", unit.name()))
+                        .help("mend the command or the place it copies to; the same run goes on with what is not pushed yet")
+                        .in_file(&set.folder));
+                }
+                Some(_) => {}
+            }
+            let until = Instant::now() + pause;
+            while Instant::now() < until && !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(EVERY);
+            }
+            pause *= 4;
+        }
+        Ok(())
+    }
+}
+
+/// How long is waited for whoever clears a folder away to be done with it.
+const CLEARING: Duration = Duration::from_secs(1);
+
+/// A folder with a unit's files, for its commands.
+struct Staged {
+    /// Around it. It has the name of unfinished files: what a killed run leaves is cleared away with these.
+    around: tempfile::TempDir,
+    dir: PathBuf,
+}
+
+impl Staged {
+    fn of(unit: Unit, folder: &Path, files: &[String]) -> Result<Self> {
+        let around = tempfile::Builder::new().prefix(".furrow-push-").tempdir_in(folder).map_err(Error::io(folder))?;
+        let dir = around.path().join(unit.name());
+        for file in files {
+            let (from, to) = (below(folder, file)?, below(&dir, file)?);
+            let parent = to.parent().unwrap_or(&dir);
+            std::fs::create_dir_all(parent).map_err(Error::io(parent))?;
+            // Another file system has no second name for it.
+            if std::fs::hard_link(&from, &to).is_err() {
+                std::fs::copy(&from, &to).map_err(Error::io(&from))?;
+            }
+        }
+        Ok(Self { around, dir })
+    }
+
+    /// Whether another run has cleared it away as what a killed one has left. A command may well move the files out of it.
+    fn was_cleared(&self, files: &[String]) -> bool {
+        if files.iter().all(|file| self.dir.join(file).is_file()) {
+            return false;
+        }
+        std::thread::sleep(CLEARING);
+        !self.around.path().is_dir()
+    }
+}
+
+impl Push {
+    /// Runs the commands once; what is wrong in words where one fails.
+    fn attempt(&self, unit: Unit, folder: &Path, files: &[String], stop: &AtomicBool) -> Result<Option<String>> {
+        loop {
+            let staged = Staged::of(unit, folder, files)?;
+            let mut failure = self.run(&self.command, &staged.dir, stop)?;
+            // The command has seen all only where nobody has taken any of it away.
+            if staged.was_cleared(files) {
+                continue;
+            }
+            if let (None, Some(check)) = (&failure, &self.check) {
+                failure = self.run(check, &staged.dir, stop)?;
+                if failure.is_some() && staged.was_cleared(files) {
+                    continue;
+                }
+            }
+            return Ok(failure);
+        }
+    }
+
+    /// Runs a command; what is wrong in words where it fails or takes too long. It is ended, with what it has started, where the run is to stop.
+    fn run(&self, command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
+        let place = dir.to_str().ok_or_else(|| {
+            Error::misuse("a folder whose name is not UTF-8 cannot stand in --push")
+                .in_file(dir)
+                .help("name --out otherwise")
+        })?;
+        let filled = filled(command, place);
+        // A file, which unlike a pipe takes any number of words.
+        let mut said = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
+        let words = |said: &std::fs::File| said.try_clone().map_err(Error::io(&std::env::temp_dir()));
+        let mut shell = Command::new("sh");
+        shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&said)?).stderr(words(&said)?);
+        // A group of its own: what it starts ends with it.
+        let mut child = shell.process_group(0).spawn().map_err(Error::io(Path::new("sh")))?;
+        let begin = Instant::now();
+        let ended = loop {
+            if let Some(ended) = child.try_wait().map_err(Error::io(Path::new("sh")))? {
+                break ended;
+            }
+            if stop.load(Ordering::Relaxed) {
+                end(&mut child);
+                return Err(Error::interrupted());
+            }
+            if let Some(timeout) = self.timeout.filter(|timeout| begin.elapsed() > *timeout) {
+                end(&mut child);
+                return Ok(Some(format!("`{filled}` took longer than {} s", timeout.as_secs())));
+            }
+            std::thread::sleep(EVERY);
+        };
+        if ended.success() {
+            return Ok(None);
+        }
+        let mut text = Vec::new();
+        let length = said.stream_position().unwrap_or(0);
+        let _ = said.seek(std::io::SeekFrom::Start(length.saturating_sub(TOLD)));
+        let _ = said.take(TOLD).read_to_end(&mut text);
+        let text = String::from_utf8_lossy(&text);
+        let last = text.trim().lines().last().unwrap_or("it said nothing");
+        Ok(Some(format!(
+            "`{filled}` ended with {}: {last}",
+            ended.code().map_or("a signal".into(), |code| code.to_string())
+        )))
+    }
+}
+
+/// How long a command that is ended may clear up after itself.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// Ends a command and what it has started: asked first, then killed.
+fn end(child: &mut Child) {
+    let group = child.id();
+    // Whether anybody of the group was there to get it.
+    let send = |signal: &str| {
+        let words = format!("kill -s {signal} -- -{group}");
+        Command::new("sh").arg("-c").arg(words).stderr(Stdio::null()).status().is_ok_and(|ended| ended.success())
+    };
+    send("TERM");
+    let until = Instant::now() + GRACE;
+    // The shell may be gone while what it started is not; signal 0 asks and does nothing.
+    while Instant::now() < until && { matches!(child.try_wait(), Ok(None)) || send("0") } {
+        std::thread::sleep(EVERY);
+    }
+    send("KILL");
+    let _ = child.wait();
+}
+
+/// Removes the files of a unit here; what tells of them stays.
+pub(crate) fn free(set: &Set, files: &[String]) -> Result<()> {
+    for file in files.iter().filter(|file| !file.starts_with("seals/")) {
+        let path = below(&set.folder, file)?;
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(&path)(e)),
+            _ => {}
+        }
+        // The folder of an image, where nothing is left in it.
+        if native::is_native(file) {
+            let _ = path.parent().map(std::fs::remove_dir);
+        }
+    }
+    Ok(())
+}
+
+/// A command with the folder in its place, as one word whatever it holds, within and without quotes.
+fn filled(command: &str, dir: &str) -> String {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Quotes {
+        None,
+        Single,
+        Double,
+    }
+    let mut quotes = Quotes::None;
+    let mut out = String::new();
+    let mut rest = command;
+    while let Some(c) = rest.chars().next() {
+        if let Some(after) = rest.strip_prefix(DIR) {
+            match quotes {
+                Quotes::None => out.extend(["'", &dir.replace('\'', r"'\''"), "'"]),
+                Quotes::Single => out += &dir.replace('\'', r"'\''"),
+                Quotes::Double => {
+                    for c in dir.chars() {
+                        if matches!(c, '"' | '\\' | '$' | '`') {
+                            out.push('\\');
+                        }
+                        out.push(c);
+                    }
+                }
+            }
+            rest = after;
+            continue;
+        }
+        out.push(c);
+        rest = &rest[c.len_utf8()..];
+        match (quotes, c) {
+            (Quotes::None, '\'') => quotes = Quotes::Single,
+            (Quotes::None, '"') => quotes = Quotes::Double,
+            (Quotes::Single, '\'') | (Quotes::Double, '"') => quotes = Quotes::None,
+            (Quotes::None | Quotes::Double, '\\') => {
+                if let Some(escaped) = rest.chars().next() {
+                    out.push(escaped);
+                    rest = &rest[escaped.len_utf8()..];
+                }
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: the shell gets the folder's name letter by letter, wherever in the command it stands.
+    #[test]
+    fn the_folder_is_one_word_wherever_it_stands() {
+        for dir in ["/a b/c", "/it's", "/$HOME `x` \"y\" \\ z", "/plain"] {
+            for command in ["printf %s {dir}", "printf %s '{dir}'", "printf %s \"{dir}\"", "printf %s \"\"{dir}"] {
+                let said = Command::new("sh").arg("-c").arg(filled(command, dir)).output().unwrap();
+                assert_eq!(String::from_utf8(said.stdout).unwrap(), dir, "{command}");
+            }
+            let said = Command::new("sh").arg("-c").arg(filled(r"printf %s \'{dir}", dir)).output().unwrap();
+            assert_eq!(String::from_utf8(said.stdout).unwrap(), format!("'{dir}"));
+        }
+    }
+}

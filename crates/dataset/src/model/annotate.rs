@@ -1,0 +1,193 @@
+//! Label maps → what is known of each plant and leaf: pixels, boxes, masks, keypoints.
+
+use crate::model::record::{ClassShare, Keypoint, Leaf, Plant, PointState, Seen};
+use crate::model::rle::{Box2, Rle};
+use crate::model::sample::{IGNORE, Sample};
+use furrow_base::math::Vec3;
+use furrow_field::PartKind;
+use furrow_optics::sensor::Camera;
+use furrow_render::render::LabelMap;
+use furrow_render::scene::tag::Class;
+use std::collections::BTreeMap;
+
+/// Pixels and box of every plant (leaf 0) and every leaf (plant, leaf) that the maps show.
+type Counted = BTreeMap<(u32, u16), (u32, Box2)>;
+
+/// Counts the pixels of plants and leaves.
+fn count(width: u32, plants: &[u32], leaves: &[u16]) -> Counted {
+    let mut all = Counted::new();
+    // Runs of one leaf are counted at once.
+    let mut from = 0;
+    while from < plants.len() {
+        let key = (plants[from], leaves[from]);
+        let (x, y) = (from as u32 % width, from as u32 / width);
+        let row_end = (y as usize + 1) * width as usize;
+        let mut to = from + 1;
+        while to < row_end && (plants[to], leaves[to]) == key {
+            to += 1;
+        }
+        let last = x + (to - from) as u32 - 1;
+        let mut add = |key| {
+            let (pixels, bounds) = all.entry(key).or_insert((0, Box2::of(x, y)));
+            *pixels += (to - from) as u32;
+            bounds.add(x, y);
+            bounds.add(last, y);
+        };
+        if key.0 != 0 {
+            add((key.0, 0));
+            if key.1 != 0 {
+                add(key);
+            }
+        }
+        from = to;
+    }
+    all
+}
+
+/// What the maps of a sample show of each plant and leaf; the rest of what a [`Plant`] knows is left out.
+///
+/// A plant's class is that of its first pixel; [`crate::model::invariants`] see to it that the others agree.
+pub fn plants(sample: &Sample) -> Vec<Plant> {
+    let (width, height) = sample.size();
+    let (plants, leaves) = (&sample.plants, &sample.leaves);
+    let counted = count(width, plants, leaves);
+    let at = |x: u32, y: u32| (y * width + x) as usize;
+    let seen = |(plant, leaf): (u32, u16), (pixels, bounds): (u32, Box2)| {
+        let inside = |x: u32, y: u32| plants[at(x, y)] == plant && (leaf == 0 || leaves[at(x, y)] == leaf);
+        let mask = Some(Rle::encode(width, height, bounds, inside));
+        Seen { pixels, unoccluded: None, whole: None, bounds: Some(bounds), mask }
+    };
+    let mut all: Vec<Plant> = Vec::new();
+    for (key, found) in counted {
+        if key.1 == 0 {
+            let first = found.1.columns().map(|x| at(x, found.1.0[1])).find(|i| plants[*i] == key.0);
+            let class = first.map_or(Class::Soil, |i| class_of(sample.semantics[i]).unwrap_or_default());
+            let kind = first.and_then(|i| sample.species.get(i)).copied().map_or(0, u16::from);
+            all.push(Plant {
+                number: key.0,
+                id: None,
+                class,
+                kind,
+                seen: seen(key, found),
+                stem: None,
+                grown: None,
+                leaves: Vec::new(),
+            });
+        } else if let Some(plant) = all.last_mut() {
+            // Keys are sorted: a leaf follows its plant.
+            plant.leaves.push(Leaf {
+                number: key.1,
+                id: None,
+                seen: seen(key, found),
+                base: None,
+                tip: None,
+                traits: None,
+            });
+        }
+    }
+    all
+}
+
+/// The number of what each pixel shows, 0 for nothing.
+pub fn part_numbers(labels: &LabelMap, kinds: &[PartKind]) -> Vec<u8> {
+    let number = |part: &u32| kinds.get(*part as usize).map_or(0, |kind| kind.number());
+    labels.parts.iter().map(number).collect()
+}
+
+/// The class that a number of `semantics` stands for; `None` for [`IGNORE`] and numbers of no class.
+pub fn class_of(number: u8) -> Option<Class> {
+    Class::ALL.get(usize::from(number)).copied()
+}
+
+/// Pixels of each class and of none, from the maps.
+pub fn classes(sample: &Sample) -> (Vec<ClassShare>, u64) {
+    let mut pixels = [0_u64; Class::ALL.len()];
+    let mut ignored = 0;
+    for number in &sample.semantics {
+        match pixels.get_mut(usize::from(*number)) {
+            Some(n) => *n += 1,
+            None => ignored += u64::from(*number == IGNORE),
+        }
+    }
+    let covered = |class: Class| {
+        let sum: u64 = sample.coverage.iter().map(|c| u64::from(c[class as usize])).sum();
+        (!sample.coverage.is_empty()).then(|| sum as f64 / 255.0)
+    };
+    let shares = Class::ALL.map(|class| ClassShare { class, pixels: pixels[class as usize], covered: covered(class) });
+    (shares.to_vec(), ignored)
+}
+
+/// How far from a point, in pixels, the thing it belongs to may begin and the point still count as seen: a stem is as thin as a
+/// pixel, and a tip ends between two pixels' centres.
+const NEAR: i64 = 1;
+
+/// A point of the world in the image: visible where a pixel `NEAR` it shows what `owns` says it belongs to. `None` behind the
+/// camera, and outside the image where the lens has no answer.
+pub fn keypoint(camera: &Camera, point: Vec3, owns: impl Fn(usize) -> bool) -> Option<Keypoint> {
+    let at = camera.project(point)?;
+    let (w, h) = (i64::from(camera.width()), i64::from(camera.height()));
+    let (column, row) = (at.x.floor() as i64, at.y.floor() as i64);
+    let state = if camera.contains(at) {
+        let near = (row - NEAR..=row + NEAR).flat_map(|y| (column - NEAR..=column + NEAR).map(move |x| (x, y)));
+        let seen =
+            near.filter(|(x, y)| (0..w).contains(x) && (0..h).contains(y)).any(|(x, y)| owns((y * w + x) as usize));
+        if seen { PointState::Visible } else { PointState::Hidden }
+    } else {
+        PointState::Outside
+    };
+    Some(Keypoint { x: at.x, y: at.y, state })
+}
+
+/// Shares that sum to 1, of 255, summing to 255: each rounded down, the rest given to those that lost most.
+pub fn of_255(shares: [f32; 3]) -> [u8; 3] {
+    let exact = shares.map(|s| s.clamp(0.0, 1.0) * 255.0);
+    let mut whole = exact.map(|s| s as u8);
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| (exact[*b] - exact[*b].floor()).total_cmp(&(exact[*a] - exact[*a].floor())));
+    let missing = 255 - whole.iter().map(|n| i32::from(*n)).sum::<i32>();
+    for k in 0..missing.max(0) {
+        whole[order[k as usize % 3]] += 1;
+    }
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn pixels_and_boxes_are_counted() {
+        #[rustfmt::skip]
+        let plants = [
+            0, 1, 1, 0,
+            0, 1, 2, 2,
+            1, 0, 0, 0,
+        ];
+        #[rustfmt::skip]
+        let leaves = [
+            0, 1, 2, 0,
+            0, 1, 0, 3,
+            2, 0, 0, 0,
+        ];
+        let counted = count(4, &plants, &leaves);
+        assert_eq!(counted[&(1, 0)], (4, Box2([0, 0, 3, 3])));
+        assert_eq!(counted[&(1, 1)], (2, Box2([1, 0, 1, 2])));
+        assert_eq!(counted[&(1, 2)], (2, Box2([0, 0, 3, 3])));
+        assert_eq!(counted[&(2, 0)], (2, Box2([2, 1, 2, 1])));
+        assert_eq!(counted.len(), 5);
+    }
+
+    proptest! {
+        #[test]
+        fn shares_of_255_sum_to_255(a in 0.0..1.0_f32, b in 0.0..1.0_f32) {
+            let (low, high) = (a.min(b), a.max(b));
+            let shares = [low, high - low, 1.0 - high];
+            let whole = of_255(shares);
+            prop_assert_eq!(whole.iter().map(|n| u32::from(*n)).sum::<u32>(), 255);
+            for (exact, whole) in shares.iter().zip(whole) {
+                prop_assert!((exact * 255.0 - f32::from(whole)).abs() < 1.01);
+            }
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! The classes that a user asks for, and which labels of a dataset belong to which of them.
+//!
+//! Written `soil; crop; weed`, or with labels, `soil; beet=BEAVX; chamomile=scentless mayweed; weed; ignore=stone`. A label is
+//!
+//! | label | is |
+//! |---|---|
+//! | soil, crop, weed | a class of `semantics.png` |
+//! | a species | of the set's table, by its name or EPPO code; wins over the class that it belongs to |
+//! | an organ, or what lies on the ground | of `parts.png`, such as petiole or stone; wins over both |
+//! | `model:NAME` | a model from disk that the scene file names, of `parts.png` too; wins over `model`, which is all of them |
+//!
+//! A pixel that no class claims has no label, nor has one that the class named `ignore` claims.
+
+use crate::model::sample::IGNORE;
+use furrow_base::{Error, Result};
+use furrow_field::PartKind;
+use furrow_field::record::SpeciesRecord;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// The labels of `semantics.png` by their number.
+const SEMANTICS: [&str; 3] = ["soil", "crop", "weed"];
+
+/// The label of all models from disk, and what that of a named one begins with.
+const MODEL: &str = "model";
+const OF_NAME: &str = "model:";
+
+/// The class whose labels are none.
+const IGNORED: &str = "ignore";
+
+/// One class.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Class {
+    /// Its name.
+    pub name: String,
+    /// The labels that mean it: `soil`, `crop`, `weed`, species, organs, things on the ground.
+    pub labels: Vec<String>,
+}
+
+/// Classes; a class's number is its place. One that is ignored stands behind all others and is not counted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Classes(pub Vec<Class>);
+
+impl Default for Classes {
+    /// Soil, crop, weed.
+    fn default() -> Self {
+        Self(SEMANTICS.map(|name| Class { name: name.into(), labels: vec![name.into()] }).to_vec())
+    }
+}
+
+impl fmt::Display for Classes {
+    /// As [`Classes::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, Class { name, labels }) in self.0.iter().enumerate() {
+            f.write_str(if i > 0 { "; " } else { "" })?;
+            f.write_str(name)?;
+            if labels.as_slice() != [name.as_str()] {
+                write!(f, "={}", labels.join(","))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Classes {
+    /// Whether the first class is soil and nothing else, as it is unless a user says otherwise.
+    pub fn begins_with_soil(&self) -> bool {
+        self.0.first().is_some_and(|class| class.labels == SEMANTICS[..1])
+    }
+
+    /// Reads `soil; beet=crop; other=weed,Galium aparine`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let mut classes: Vec<Class> = Vec::new();
+        for part in text.split(';').map(str::trim).filter(|p| !p.is_empty()) {
+            let (name, labels) = part.split_once('=').unwrap_or((part, part));
+            let labels: Vec<String> =
+                labels.split(',').map(|l| l.trim().to_owned()).filter(|l| !l.is_empty()).collect();
+            if name.trim().is_empty() || labels.is_empty() {
+                return Err(format!("`{part}` is no class: write `name` or `name=label,label`"));
+            }
+            for label in &labels {
+                if let Some(other) = classes.iter().find(|c| c.labels.contains(label)) {
+                    return Err(format!("the label `{label}` belongs to `{}` already", other.name));
+                }
+            }
+            if classes.iter().any(|c| c.name == name.trim()) {
+                return Err(format!("there are two classes `{}`", name.trim()));
+            }
+            classes.push(Class { name: name.trim().into(), labels });
+        }
+        classes.sort_by_key(|class| class.name == IGNORED);
+        let classes = Self(classes);
+        classes.check().map(|()| classes)
+    }
+
+    /// Refuses too few and too many, and names and labels that are there twice or say nothing.
+    pub fn check(&self) -> Result<(), String> {
+        match self.len() {
+            0 | 1 => return Err("two classes at least are needed, such as `soil; plant=crop,weed`".into()),
+            2..=64 => {}
+            n => return Err(format!("{n} classes are too many: 64 at most")),
+        }
+        let named = self.0.iter().position(|class| class.name == IGNORED);
+        if named.is_some_and(|place| place + 1 < self.0.len()) {
+            return Err(format!("`{IGNORED}` stands behind all other classes"));
+        }
+        if let Some(class) = self.0.iter().find(|class| class.name.contains(char::is_control)) {
+            return Err(format!("the name {:?} holds a character that ends lines or is not seen", class.name));
+        }
+        let names: BTreeSet<&str> = self.0.iter().map(|c| c.name.trim()).collect();
+        let labels: Vec<&String> = self.0.iter().flat_map(|c| &c.labels).collect();
+        let distinct: BTreeSet<&String> = labels.iter().copied().collect();
+        if names.len() < self.0.len() || names.contains("") || self.0.iter().any(|c| c.labels.is_empty()) {
+            return Err("each class needs a name of its own, and labels".into());
+        }
+        if distinct.len() < labels.len() {
+            return Err("a label belongs to one class alone".into());
+        }
+        Ok(())
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.counted().len()
+    }
+
+    /// Those that have a number.
+    pub fn counted(&self) -> &[Class] {
+        match self.0.split_last() {
+            Some((last, rest)) if last.name == IGNORED => rest,
+            _ => &self.0,
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.counted().is_empty()
+    }
+
+    /// Their names, in order.
+    pub fn names(&self) -> Vec<String> {
+        self.counted().iter().map(|c| c.name.clone()).collect()
+    }
+
+    /// sRGB colours, in order: soil, crop and weed as in the label images, others spread around the colour circle.
+    pub fn colors(&self) -> Vec<[u8; 3]> {
+        let known = furrow_render::scene::tag::Class::ALL.map(furrow_render::scene::tag::Class::color);
+        let place = |c: &Class| SEMANTICS.iter().position(|s| c.labels.iter().any(|l| l == s));
+        let mut taken = [false; 3];
+        let mut colors = Vec::new();
+        for (i, class) in self.counted().iter().enumerate() {
+            let color = match place(class).filter(|p| !std::mem::replace(&mut taken[*p], true)) {
+                Some(place) => known[place],
+                None => hue(i as f32 * 0.618_034),
+            };
+            colors.push(color);
+        }
+        colors
+    }
+
+    /// Whether an organ or a thing on the ground is a class of its own, which only `parts.png` tells.
+    pub fn needs_parts(&self) -> bool {
+        self.0.iter().flat_map(|class| &class.labels).any(|label| is_part(label))
+    }
+
+    /// Those that plants may have: all but those of soil, organs and things on the ground alone.
+    pub fn of_plants(&self) -> Vec<u8> {
+        let plant = |label: &String| label != SEMANTICS[0] && !is_part(label);
+        let places = (0..).zip(self.counted()).filter(|(_, class)| class.labels.iter().any(plant));
+        places.map(|(place, _)| place).collect()
+    }
+
+    /// Which class every label is, in a set that numbers these species and names these models. An error for labels that it does not have.
+    pub fn of(&self, species: &[SpeciesRecord], models: &[String]) -> Result<Map> {
+        let records = species;
+        let species: Vec<[&str; 2]> = species.iter().map(|s| [s.name.as_str(), s.eppo.as_str()]).collect();
+        let known = |label: &str| {
+            let is = |other: &&str| other.eq_ignore_ascii_case(label);
+            let named = label.strip_prefix(OF_NAME).is_some_and(|name| models.iter().any(|model| model == name));
+            SEMANTICS.contains(&label) || part(label).is_some() || named || species.iter().flatten().any(is)
+        };
+        if let Some(label) = self.0.iter().flat_map(|class| &class.labels).find(|label| !known(label)) {
+            return Err(unknown(label, records, models));
+        }
+        for names in &species {
+            let is = |label: &&String| names.iter().any(|name| name.eq_ignore_ascii_case(label));
+            let claims = |class: &&Class| class.labels.iter().any(|label| is(&label));
+            let claiming: Vec<&str> = self.0.iter().filter(claims).map(|class| class.name.as_str()).collect();
+            if let [first, second, ..] = claiming[..] {
+                let words = format!("the species {} ({}) belongs to `{first}` and to `{second}`", names[0], names[1]);
+                return Err(Error::input(words).help("name it in one class alone, by its name or its EPPO code"));
+            }
+        }
+        let place = |claims: &dyn Fn(&str) -> bool| {
+            let place = self.0.iter().position(|class| class.labels.iter().any(|label| claims(label)))?;
+            Some(if place < self.len() { place as u8 } else { IGNORE })
+        };
+        let of_species = |names: &[&str; 2]| place(&|label| names.iter().any(|name| name.eq_ignore_ascii_case(label)));
+        let mut parts = Vec::new();
+        for (number, name, ..) in PartKind::NUMBERED.iter().filter(|(_, name, ..)| part(name).is_some()) {
+            parts.resize(parts.len().max(usize::from(*number) + 1), None);
+            parts[usize::from(*number)] = place(&|label| label == *name);
+        }
+        for (k, name) in (0..=u8::MAX).zip(models) {
+            let number = usize::from(PartKind::Named(k).number());
+            parts.resize(parts.len().max(number + 1), None);
+            let own = place(&|label| label.strip_prefix(OF_NAME) == Some(name.as_str()));
+            parts[number] = own.or_else(|| place(&|label| label == MODEL));
+        }
+        Ok(Map {
+            semantics: SEMANTICS.map(|name| place(&|label| label == name)),
+            species: species.iter().map(of_species).collect(),
+            parts,
+        })
+    }
+}
+
+/// The number in `parts.png` of a label that no other map tells.
+fn part(label: &str) -> Option<u8> {
+    let known = PartKind::NUMBERED.iter().find(|(_, name, ..)| *name == label && !SEMANTICS.contains(name));
+    known.map(|(number, ..)| *number)
+}
+
+/// Whether only `parts.png` tells where a label is.
+fn is_part(label: &str) -> bool {
+    part(label).is_some() || label.starts_with(OF_NAME)
+}
+
+/// A label that the set does not have.
+fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
+    let parts = PartKind::NUMBERED.iter().map(|(_, name, ..)| *name).filter(|name| part(name).is_some());
+    let others = SEMANTICS.into_iter().chain(parts).map(str::to_owned);
+    let others: Vec<String> = others.chain(models.iter().map(|name| format!("{OF_NAME}{name}"))).collect();
+    let told = |s: &SpeciesRecord| {
+        if s.eppo.is_empty() { s.name.clone() } else { format!("{} ({})", s.name, s.eppo) }
+    };
+    let species: Vec<String> = species.iter().map(told).collect();
+    let species = if species.is_empty() { "the set knows no species".into() } else { species.join(", ") };
+    let what = format!("the classes name the label `{label}`, which the set does not have");
+    Error::input(what).help(format!("its labels are {}; species: {species}", others.join(", ")))
+}
+
+/// A saturated colour by its place on the colour circle, in turns.
+fn hue(turns: f32) -> [u8; 3] {
+    let channel = |shift: f32| {
+        let t = ((turns + shift).rem_euclid(1.0) * 6.0 - 3.0).abs() - 1.0;
+        (t.clamp(0.0, 1.0) * 200.0 + 55.0) as u8
+    };
+    [channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)]
+}
+
+/// The classes of one set's labels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Map {
+    semantics: [Option<u8>; 3],
+    species: Vec<Option<u8>>,
+    parts: Vec<Option<u8>>,
+}
+
+impl Map {
+    /// Whether species decide anything.
+    pub fn needs_species(&self) -> bool {
+        self.species.iter().any(Option::is_some)
+    }
+
+    /// Whether organs or things on the ground decide anything.
+    pub fn needs_parts(&self) -> bool {
+        self.parts.iter().any(Option::is_some)
+    }
+
+    /// The class of a whole plant by its number in `semantics.png` and its species' number, 0 for none.
+    pub fn of_plant(&self, semantic: u8, species: u16) -> Option<u8> {
+        let special = usize::from(species).checked_sub(1).and_then(|n| self.species.get(n).copied().flatten());
+        let class = special.or_else(|| self.semantics.get(usize::from(semantic)).copied().flatten());
+        class.filter(|class| *class != IGNORE)
+    }
+
+    /// The class of each pixel by its numbers in `semantics.png`, and in `species.png` and `parts.png` (empty where they do not matter);
+    /// [`IGNORE`] for none.
+    pub fn labels(&self, semantics: &[u8], species: &[u8], parts: &[u8]) -> Vec<u8> {
+        let class = |(i, semantic): (usize, &u8)| {
+            let part = parts.get(i).and_then(|part| self.parts.get(usize::from(*part)).copied().flatten());
+            let species = species.get(i).map_or(0, |n| u16::from(*n));
+            part.or_else(|| self.of_plant(*semantic, species)).unwrap_or(IGNORE)
+        };
+        semantics.iter().enumerate().map(class).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn classes_are_read_as_written() {
+        let classes = Classes::parse("soil; plant=crop, weed").unwrap();
+        assert_eq!(classes.names(), ["soil", "plant"]);
+        assert_eq!(classes.0[1].labels, ["crop", "weed"]);
+        assert_eq!(classes.to_string(), "soil; plant=crop,weed");
+        assert_eq!(Classes::default().to_string(), "soil; crop; weed");
+        assert_eq!(Classes::parse("soil;crop;weed").unwrap(), Classes::default());
+        for bad in ["", "soil", "soil; a=; b", "soil; a=crop; b=crop", "soil; soil=crop", "soil; ignore=weed"] {
+            assert!(Classes::parse(bad).is_err(), "{bad}");
+        }
+        assert!(Classes::parse("soil; a\nb=crop; weed").unwrap_err().contains("ends lines"));
+    }
+
+    /// Expected: the most particular label decides; what is ignored has no number and takes none from the others.
+    #[test]
+    fn species_win_over_roles_and_parts_over_both() {
+        let species = |name: &str, eppo: &str| SpeciesRecord {
+            name: name.into(),
+            eppo: eppo.into(),
+            class: furrow_render::scene::tag::Class::Weed,
+        };
+        let table = [species("fat hen", "CHEAL"), species("thistle", "CIRAR")];
+        for twice in ["soil; a=CHEAL; b=fat hen; weed", "soil; a=cheal; b=CHEAL; weed"] {
+            let said = Classes::parse(twice).unwrap().of(&table, &[]).unwrap_err().to_string();
+            assert!(said.contains("fat hen (CHEAL) belongs to `a` and to `b`"), "{said}");
+        }
+        let classes = Classes::parse("soil; ignore=thistle,stick; hen=cheal; weed; stone").unwrap();
+        assert_eq!(classes.names(), ["soil", "hen", "weed", "stone"]);
+        assert_eq!((classes.of_plants(), classes.needs_parts()), (vec![1, 2], true));
+        let map = classes.of(&table, &[]).unwrap();
+        let number = |name: &str| part(name).unwrap();
+        let (semantics, species, parts) = (
+            [0, 0, 0, 2, 2, 2, 1],
+            [0, 0, 0, 1, 2, 0, 0],
+            [1, number("stone"), number("stick"), number("blade"), 15, 15, 15],
+        );
+        assert_eq!(map.labels(&semantics, &species, &parts), [0, 3, IGNORE, 1, IGNORE, 2, IGNORE]);
+        assert_eq!([(2, 1), (2, 2), (2, 0), (1, 0)].map(|(c, s)| map.of_plant(c, s)), [Some(1), None, Some(2), None]);
+        assert!(Classes::parse("soil; a=HORSE; weed").unwrap().of(&table, &[]).is_err());
+    }
+
+    /// Expected: a named model has the class of its name, another one that of all models; without either it is the soil that it is drawn as. A
+    /// name that the set does not have is told with those that it has.
+    #[test]
+    fn models_are_told_apart_by_their_names() {
+        let names = ["robot".to_owned(), "box".to_owned()];
+        let pixels = |text: &str| {
+            let classes = Classes::parse(text).unwrap();
+            assert!(classes.needs_parts() && classes.of_plants() == [1]);
+            let parts = [1, 6, 101, 102];
+            classes.of(&[], &names).unwrap().labels(&[0; 4], &[], &parts)
+        };
+        assert_eq!(pixels("soil; crop; ignore=model:robot"), [0, 0, IGNORE, 0]);
+        assert_eq!(pixels("soil; crop; machine=model:robot; ignore=model"), [0, IGNORE, 2, IGNORE]);
+        let missing = Classes::parse("soil; crop; ignore=model:tractor").unwrap().of(&[], &names).unwrap_err();
+        let said = missing.to_string();
+        assert!(said.contains("`model:tractor`") && said.contains("model:robot, model:box"), "{said}");
+    }
+
+    #[test]
+    fn colours_differ() {
+        let classes = Classes::parse("soil; plant=crop,weed; a; b; c; d").unwrap();
+        let mut colors = classes.colors();
+        assert_eq!(colors[..2], [[0, 0, 0], [0, 255, 0]]);
+        colors.sort_unstable();
+        colors.dedup();
+        assert_eq!(colors.len(), 6);
+    }
+}

@@ -1,0 +1,256 @@
+//! What must hold of every image: checked before one is written, and again by `verify` on what lies on the disk.
+
+use crate::model::annotate;
+use crate::model::recipe::{Made, Recipe};
+use crate::model::record::{Leaf, Plant, Seen};
+use crate::model::sample::{IGNORE, Sample};
+use furrow_base::{Error, Result};
+use furrow_render::scene::tag::Class;
+use std::collections::BTreeMap;
+
+/// Share of a pixel, of 255, from which on its class is decided: more than lens blur and a few samples can undo.
+const DECIDED: u8 = 243;
+
+/// Share of the decided pixels whose centre may show another class all the same. A leaf thinner than the pixels' footprint can
+/// lie on a row of centres.
+const THIN: f64 = 0.005;
+
+/// The share that may do so for want of samples, for n samples FEW · 0.5ⁿ more: n samples of a pixel that an edge halves all miss what is at
+/// its centre with a chance of 0.5ⁿ. Where one pixel in four lies on an edge, the image is of little else.
+const FEW: f64 = 0.25;
+
+/// The same as a share of the decided pixels that lie on an edge between labels, where an image is of little else: feathery leaves finer than
+/// the pixels. Measured over 256 fields of `any-field.ron` at 480 × 360: at most 0.05 at 4 and 8 samples; maps that lie one pixel apart
+/// have 0.3 or more at 2 samples and above.
+const THIN_ON_EDGES: f64 = 0.1;
+/// So many pixels may do so in an image of any size: in one of a single pixel a blade may pass beside the centre.
+const ALWAYS_ALLOWED: f64 = 2.0;
+
+/// Checks a sample; the error names the image and everything that does not hold.
+pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
+    let faults = faults(recipe, sample);
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(Error::damaged(format!("image {}: {}", sample.record.name, faults.join("; "))))
+}
+
+/// What does not hold, in words.
+pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
+    let sizes = sizes(sample, recipe.labels_only());
+    // Nothing else can be asked of maps that do not lie on each other.
+    if !sizes.is_empty() {
+        return sizes;
+    }
+    let rendered = matches!(recipe.made, Made::Rendered(_));
+    let mut all = Vec::new();
+    all.extend(nesting(sample, rendered));
+    all.extend(numbers(recipe, sample));
+    all.extend(counts(sample));
+    let spp = recipe.rendering().map_or(u32::MAX, |r| r.spp);
+    all.extend(shares(sample, spp));
+    all.extend(geometry(sample));
+    all
+}
+
+/// Every map has the image's size, or is not there where it need not be; a photograph need not where images are labels alone.
+fn sizes(sample: &Sample, labels_only: bool) -> Vec<String> {
+    let n = sample.pixels();
+    let maps = [
+        ("rgb", sample.rgb.len(), labels_only),
+        ("nir", sample.nir.len(), true),
+        ("semantics", sample.semantics.len(), false),
+        ("species", sample.species.len(), true),
+        ("parts", sample.parts.len(), true),
+        ("plants", sample.plants.len(), false),
+        ("leaves", sample.leaves.len(), false),
+        ("coverage", sample.coverage.len(), true),
+        ("depth", sample.depth.len(), true),
+        ("normals", sample.normals.len(), true),
+    ];
+    let wrong = maps.into_iter().filter(|(_, len, optional)| *len != n && !(*optional && *len == 0));
+    wrong.map(|(name, len, _)| format!("{name} has {len} values for {n} pixels")).collect()
+}
+
+/// A leaf lies in its plant, a plant in its class and its species; without a plant nothing has either.
+fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
+    let mut of_plant: BTreeMap<u32, (u8, Option<u8>)> = BTreeMap::new();
+    let (mut loose, mut mixed, mut bare, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
+    for i in 0..sample.pixels() {
+        let (class, plant, leaf) = (sample.semantics[i], sample.plants[i], sample.leaves[i]);
+        let species = sample.species.get(i).copied();
+        let vegetation = class == Class::Crop as u8 || class == Class::Weed as u8;
+        unknown += u64::from(annotate::class_of(class).is_none() && (rendered || class != IGNORE));
+        if plant == 0 {
+            loose += u64::from(leaf != 0 || species.is_some_and(|s| s != 0));
+            bare += u64::from(rendered && vegetation);
+        } else {
+            mixed += u64::from(*of_plant.entry(plant).or_insert((class, species)) != (class, species) || !vegetation);
+        }
+    }
+    let told = [
+        (unknown, "have a class that there is none of"),
+        (loose, "have a leaf or a species but no plant"),
+        (bare, "are crop or weed but no plant"),
+        (mixed, "have another class or species than the rest of their plant, or are soil"),
+    ];
+    told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} pixels {words}")).collect()
+}
+
+/// Species are in the recipe's table; the record belongs to this recipe; its numbers are numbers.
+fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
+    let record = &sample.record;
+    let mut all = Vec::new();
+    let known = recipe.species.len();
+    if let Some(most) = sample.species.iter().max().filter(|m| usize::from(**m) > known) {
+        all.push(format!("species {most} is not among the {known} of the recipe"));
+    }
+    if record.split != recipe.split_of(record.index) {
+        all.push(format!("it is in the split {}, where it does not belong", record.split.name()));
+    }
+    let (field, capture) = recipe.field_of(record.index);
+    let told = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
+    let frames = record.capture.as_ref().is_none_or(|told| u64::from(told.frame) <= capture);
+    let day = record.capture.as_ref().and_then(|capture| capture.day);
+    let of_day = recipe.days().get((capture / recipe.captures_a_day()) as usize).copied();
+    if told != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
+        all.push("it is not the image of its field that its number says".into());
+    }
+    let points = record
+        .plants
+        .iter()
+        .flat_map(|p| p.stem.iter().chain(p.leaves.iter().flat_map(|l| l.base.iter().chain(&l.tip))));
+    if points.into_iter().any(|k| !(k.x.is_finite() && k.y.is_finite())) {
+        all.push("a keypoint is not a number".into());
+    }
+    all.extend(identities(sample));
+    all
+}
+
+/// No two plants or leaves of an image have the same identity, and none is 0. Older records have none.
+fn identities(sample: &Sample) -> Option<String> {
+    let mut ids: Vec<u32> = sample
+        .record
+        .plants
+        .iter()
+        .flat_map(|p| p.id.into_iter().chain(p.leaves.iter().filter_map(|l| l.id)))
+        .collect();
+    ids.sort_unstable();
+    let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+    let wrong = ids.first().copied().filter(|id| *id == 0).or(twice)?;
+    Some(format!("the identity {wrong} is not that of one plant or leaf alone"))
+}
+
+/// What the record says is what the maps show: pixels, boxes, masks; and nothing is seen of more than there is.
+fn counts(sample: &Sample) -> Vec<String> {
+    let record = &sample.record;
+    let mut all = Vec::new();
+    let (mut classes, ignored) = annotate::classes(sample);
+    if sample.coverage.is_empty() {
+        // The map was counted and not kept.
+        for (share, told) in classes.iter_mut().zip(&record.classes) {
+            share.covered = told.covered;
+        }
+    }
+    if (&classes, ignored) != (&record.classes, record.ignored) {
+        all.push("the record's pixels of a class are not those of the map".into());
+    }
+    let shown = annotate::plants(sample);
+    let told: Vec<&Plant> = record.seen().collect();
+    let same_leaf = |(a, b): (&Leaf, &Leaf)| a.number == b.number && same(&a.seen, &b.seen);
+    let same_plant = |(a, b): (&Plant, &&Plant)| {
+        let leaves: Vec<&Leaf> = b.leaves.iter().filter(|l| l.seen.pixels > 0).collect();
+        let fits = (a.number, a.class, a.leaves.len()) == (b.number, b.class, leaves.len()) && same(&a.seen, &b.seen);
+        fits && a.leaves.iter().zip(leaves).all(same_leaf)
+    };
+    if shown.len() != told.len() || !shown.iter().zip(&told).all(same_plant) {
+        all.push("the record's plants, boxes or masks are not those of the maps".into());
+    }
+    for plant in &record.plants {
+        let leaves = plant.leaves.iter().map(|l| &l.seen);
+        if leaves.clone().chain([&plant.seen]).any(|s| !in_order(s)) {
+            all.push(format!("more is seen of plant {} than there is of it", plant.number));
+        }
+        if leaves.clone().any(|s| s.pixels > plant.seen.pixels || s.unoccluded > plant.seen.unoccluded) {
+            all.push(format!("a leaf of plant {} is larger than the plant", plant.number));
+        }
+    }
+    all
+}
+
+fn same(a: &Seen, b: &Seen) -> bool {
+    (a.pixels, a.bounds, &a.mask) == (b.pixels, b.bounds, &b.mask)
+}
+
+fn in_order(seen: &Seen) -> bool {
+    let unoccluded = seen.unoccluded.unwrap_or(seen.pixels);
+    seen.pixels <= unoccluded && unoccluded <= seen.whole.unwrap_or(unoccluded)
+}
+
+/// Shares of a pixel sum to one, and agree with the label where they leave no doubt.
+fn shares(sample: &Sample, spp: u32) -> Vec<String> {
+    let mut all = Vec::new();
+    let wrong = sample.coverage.iter().filter(|c| c.iter().map(|n| u32::from(*n)).sum::<u32>() != 255).count();
+    if wrong > 0 {
+        all.push(format!("the shares of {wrong} pixels do not sum to one"));
+    }
+    let decided = |c: &[u8; 3]| (0_u8..3).find(|k| c[usize::from(*k)] >= DECIDED);
+    let edges = edges(sample);
+    let of_edges = edges.iter().filter(|edge| **edge).count() as f64;
+    let (mut asked, mut on_edges, mut other) = (0_u64, 0_u64, 0_u64);
+    for (at, (share, label)) in sample.coverage.iter().zip(&sample.semantics).enumerate() {
+        if let Some(class) = decided(share) {
+            asked += 1;
+            on_edges += u64::from(edges[at]);
+            other += u64::from(class != *label);
+        }
+    }
+    let missed = 0.5_f64.powi(spp.min(64) as i32);
+    let allowed = (THIN + FEW * missed) * asked as f64;
+    let allowed_on_edges = (THIN_ON_EDGES * on_edges as f64).max(by_chance(spp) * of_edges);
+    // Of few pixels a share is less than one of them.
+    if other as f64 > allowed.max(allowed_on_edges).max(ALWAYS_ALLOWED) {
+        all.push(format!("{other} of {asked} pixels are of one class by their samples and of another by their centre"));
+    }
+    all
+}
+
+/// The largest chance that all n samples of a pixel show one thing and its centre another, where what is in it is much finer than the pixel: with
+/// a share p of the one, pⁿ(1 − p) + (1 − p)ⁿp. Up to three samples p = ½ is the worst, above that n / (n + 1).
+fn by_chance(spp: u32) -> f64 {
+    let n = f64::from(spp.max(1));
+    let p = if spp <= 3 { 0.5 } else { n / (n + 1.0) };
+    p.powf(n) * (1.0 - p) + (1.0 - p).powf(n) * p
+}
+
+/// Which pixels have another label than a neighbour beside, above or below.
+fn edges(sample: &Sample) -> Vec<bool> {
+    let (width, labels) = (sample.size().0 as usize, &sample.semantics);
+    let mut edges = vec![false; labels.len()];
+    for at in 0..labels.len() {
+        let beside = ((at + 1) % width > 0).then_some(at + 1);
+        for next in beside.into_iter().chain(Some(at + width).filter(|next| *next < labels.len())) {
+            if labels[at] != labels[next] {
+                (edges[at], edges[next]) = (true, true);
+            }
+        }
+    }
+    edges
+}
+
+/// Depths lie before the camera, normals are unit vectors, and neither is "not a number".
+fn geometry(sample: &Sample) -> Vec<String> {
+    let mut all = Vec::new();
+    if sample.depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
+        all.push("a depth is not a number or not before the camera".into());
+    }
+    let unit = |n: &[f32; 3]| {
+        let square: f32 = n.iter().map(|x| x * x).sum();
+        // Each axis may be rounded to 1/128.
+        square == 0.0 || (square - 1.0).abs() < 2e-2
+    };
+    if !sample.normals.iter().all(unit) {
+        all.push("a normal is not a unit vector".into());
+    }
+    all
+}

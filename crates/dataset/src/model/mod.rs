@@ -1,0 +1,14 @@
+//! The data model: recipe, classes, one image with its labels and record, and the rules that each image satisfies.
+
+pub mod annotate;
+pub mod classes;
+pub mod image_files;
+pub mod invariants;
+pub mod keep;
+pub mod labelling;
+pub mod photo;
+pub mod recipe;
+pub mod record;
+pub mod rle;
+pub mod sample;
+pub mod split;

@@ -1,0 +1,11 @@
+//! Reading a dataset from disk: checksums, archives, image folders, and which images remain to be made.
+
+pub mod archive;
+pub mod checksum;
+pub mod checksum_record;
+pub mod label_maps;
+pub mod links;
+pub mod native;
+pub mod packs;
+pub mod set;
+pub mod task;

@@ -1,0 +1,258 @@
+//! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
+
+use crate::model::recipe::Recipe;
+use crate::model::record::Record;
+use crate::model::sample::Sample;
+use crate::model::split::Split;
+use crate::read::archive::entry_name;
+use crate::read::checksum::Checksum;
+use crate::read::checksum_record::ChecksumRecord;
+use crate::read::links;
+use crate::read::native::{self, Files};
+use crate::read::packs::Id;
+use crate::read::packs::Packing;
+use crate::read::packs::record::Packs;
+use furrow_base::input::below;
+use furrow_base::{Error, Result};
+use furrow_output::stream_atomically;
+use rayon::prelude::*;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A dataset on disk.
+#[derive(Clone, Debug)]
+pub struct Set {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What makes it.
+    pub recipe: Recipe,
+    /// Archives that images lie in.
+    pub(crate) packs: Packs,
+}
+
+impl Set {
+    /// The dataset of this recipe in a folder.
+    pub fn new(folder: &Path, recipe: Recipe) -> Self {
+        Self { folder: folder.into(), recipe, packs: Packs::default() }
+    }
+
+    /// Opens the dataset in a folder; an error where a folder in it is a symbolic link, for it may come from others.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let recipe = Recipe::read(folder)?;
+        links::refuse(folder, &recipe)?;
+        Ok(Self::new(folder, recipe))
+    }
+
+    /// The name of an image: its number in six digits or more.
+    pub fn name(index: u64) -> String {
+        native::image_name(index)
+    }
+
+    /// The names of a split's images, in the order of their numbers.
+    pub fn names(&self, split: Split) -> Vec<String> {
+        (0..self.recipe.count).filter(|k| self.recipe.split_of(*k) == split).map(Self::name).collect()
+    }
+
+    /// The records of a split's images, read in the order of their numbers.
+    pub fn records(&self, split: Split) -> impl Iterator<Item = Result<Record>> + '_ {
+        in_parallel((0..self.recipe.count).filter(move |k| self.recipe.split_of(*k) == split), |k| self.record(k))
+    }
+
+    /// The records of all images, read in the order of their numbers.
+    pub fn all(&self) -> impl Iterator<Item = Result<Record>> + '_ {
+        in_parallel(0..self.recipe.count, |k| self.record(k))
+    }
+
+    /// The checksums of all images in the order of their numbers; `None` for those that are not there.
+    pub(crate) fn all_checksums(&self) -> impl Iterator<Item = Option<ChecksumRecord>> + '_ {
+        in_parallel(0..self.recipe.count, |k| self.checksums(k))
+    }
+
+    /// An image.
+    pub fn sample(&self, index: u64) -> Result<Sample> {
+        native::sample(self, &Self::name(index))
+    }
+
+    /// What is known of an image, without its maps.
+    pub fn record(&self, index: u64) -> Result<Record> {
+        native::record(self, &Self::name(index))
+    }
+
+    /// The checksums of an image, in its folder or in its pack; `None` where there are none or they are damaged.
+    pub fn checksums(&self, index: u64) -> Option<ChecksumRecord> {
+        ChecksumRecord::read(&self.folder, index).or_else(|| {
+            let id = Packing::of(&self.recipe)?.id(index);
+            self.packs.get(&self.folder, id)?.image(index).cloned()
+        })
+    }
+
+    /// The files of an image that are missing or changed, each with what is wrong with it.
+    pub fn faults(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
+        self.faults_where(image, |_| true)
+    }
+
+    /// The same of the files that lie beside packs: those of formats.
+    pub(crate) fn faults_beside_packs(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
+        self.faults_where(image, |path| !native::is_native(path))
+    }
+
+    /// The same of its record alone, from which all that belongs to many images is made.
+    pub(crate) fn fault_of_record(&self, image: &ChecksumRecord) -> Option<(String, String)> {
+        self.faults_where(image, |path| native::is_native(path) && path.ends_with("/record.json")).pop()
+    }
+
+    fn faults_where(&self, image: &ChecksumRecord, which: impl Fn(&str) -> bool) -> Vec<(String, String)> {
+        let fault = |(path, sum): (&String, &Checksum)| match below(&self.folder, path) {
+            Ok(_) => Some((path.clone(), sum.fault_of(self.length(path), || Ok(Checksum::of(&self.contents(path)?)))?)),
+            Err(_) => Some((path.clone(), "does not lie in the dataset's folder".into())),
+        };
+        image.files.iter().filter(|(path, _)| which(path)).filter_map(fault).collect()
+    }
+
+    /// Length of a file of an image, which lies in the dataset's folder or in a pack.
+    pub(crate) fn length(&self, path: &str) -> io::Result<u64> {
+        self.find(
+            path,
+            |full| {
+                let about = std::fs::metadata(full)?;
+                if about.is_file() { Ok(about.len()) } else { Err(io::ErrorKind::IsADirectory.into()) }
+            },
+            |packs, id| packs.length(&self.folder, id, path),
+        )
+    }
+
+    /// First in the folder, for what lies there is made anew; then in the pack.
+    fn find<T>(
+        &self,
+        path: &str,
+        in_folder: impl FnOnce(&Path) -> io::Result<T>,
+        in_pack: impl FnOnce(&Packs, Id) -> io::Result<T>,
+    ) -> io::Result<T> {
+        match in_folder(&self.folder.join(path)) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => match self.pack_of(path) {
+                Some(id) => in_pack(&self.packs, id),
+                None => Err(e),
+            },
+            other => other,
+        }
+    }
+
+    /// The pack that a file belongs into.
+    fn pack_of(&self, path: &str) -> Option<Id> {
+        let packing = Packing::of(&self.recipe)?;
+        let (name, _) = path.strip_prefix("images/")?.split_once('/')?;
+        Some(packing.id(name.parse().ok()?))
+    }
+}
+
+impl Files for Set {
+    fn contents(&self, path: &str) -> io::Result<Vec<u8>> {
+        self.find(path, furrow_base::input::contents, |packs, id| packs.contents(&self.folder, id, path))
+    }
+
+    fn place(&self, path: &str) -> PathBuf {
+        let full = self.folder.join(path);
+        match self.pack_of(path) {
+            Some(id) if !full.exists() => self.folder.join(id.path()).join(entry_name(path)),
+            _ => full,
+        }
+    }
+
+    fn recipe(&self) -> Option<&Recipe> {
+        Some(&self.recipe)
+    }
+}
+
+/// Images that are read at once: enough for all threads, and little memory.
+const AT_ONCE: usize = 256;
+
+/// What is read of each image, in the order of the numbers; several at once, of few packs.
+pub(crate) fn in_parallel<'a, T: Send + 'a>(
+    mut numbers: impl Iterator<Item = u64> + 'a,
+    read: impl Fn(u64) -> T + Sync + 'a,
+) -> impl Iterator<Item = T> + 'a {
+    let next = move || {
+        let some: Vec<u64> = numbers.by_ref().take(AT_ONCE).collect();
+        (!some.is_empty()).then(|| some.into_par_iter().map(&read).collect::<Vec<T>>())
+    };
+    std::iter::from_fn(next).flatten()
+}
+
+/// Where the files that belong to all images go; keeps what tells them.
+pub struct Whole<'a> {
+    folder: &'a Path,
+    /// The files so far, by path below the dataset's folder.
+    pub files: BTreeMap<String, Checksum>,
+}
+
+impl<'a> Whole<'a> {
+    /// For a dataset's folder.
+    pub fn new(folder: &'a Path) -> Self {
+        Self { folder, files: BTreeMap::new() }
+    }
+
+    /// Writes a file piece by piece, so that it may be larger than memory; it appears whole or not at all.
+    pub fn file(&mut self, path: &str, write: impl FnOnce(&mut Stream<'_>) -> Result<()>) -> Result<()> {
+        let full = below(self.folder, path)?;
+        let mut sum = None;
+        stream_atomically(&full, |file| {
+            let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };
+            write(&mut stream)?;
+            sum = Some(Checksum { sha256: hex::encode(stream.hash.finalize()), bytes: stream.bytes });
+            Ok(())
+        })?;
+        self.files.extend(sum.map(|sum| (path.to_owned(), sum)));
+        Ok(())
+    }
+}
+
+/// A file under way.
+pub struct Stream<'a> {
+    path: &'a Path,
+    file: &'a mut (dyn Write + Send),
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl Stream<'_> {
+    /// Bytes so far.
+    pub(crate) fn written(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Adds text or bytes.
+    pub fn put(&mut self, bytes: impl AsRef<[u8]>) -> Result<()> {
+        self.write_all(bytes.as_ref()).map_err(Error::io(self.path))
+    }
+
+    /// Adds a value as JSON, on one line.
+    pub fn json(&mut self, value: &impl Serialize) -> Result<()> {
+        let path = self.path;
+        serde_json::to_writer(&mut *self, value).map_err(|e| Error::io(path)(e.into()))
+    }
+
+    /// Adds values as the items of a JSON list, one a line: what stands between the brackets.
+    pub fn items<T: Serialize>(&mut self, items: impl Iterator<Item = Result<T>>) -> Result<()> {
+        for (i, item) in items.enumerate() {
+            self.put(if i == 0 { "\n" } else { ",\n" })?;
+            self.json(&item?)?;
+        }
+        self.put("\n")
+    }
+}
+
+impl Write for Stream<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.file.write(bytes)?;
+        self.hash.update(&bytes[..n]);
+        self.bytes += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}

@@ -1,0 +1,60 @@
+//! What remains to be done for an image: found by looking at the disk.
+
+use crate::format;
+use crate::read::checksum_record::ChecksumRecord;
+use crate::read::set::Set;
+use furrow_base::Result;
+
+/// What remains to be done for an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Task {
+    /// Nothing.
+    Done,
+    /// Formats, from the native files.
+    Formats,
+    /// Everything.
+    All,
+}
+
+/// What remains to be done for an image, from what lies on the disk.
+pub(crate) fn task(set: &Set, index: u64) -> Result<Task> {
+    let Some(checksums) = set.checksums(index) else { return Ok(Task::All) };
+    let task = remaining(set, &checksums)?;
+    if task == Task::All {
+        return Ok(task);
+    }
+    let formats = format::all(&set.recipe)?;
+    let broken = set.faults(&checksums);
+    let lost = |(path, _): &(String, String)| {
+        path.starts_with("images/") || formats.iter().any(|(name, f)| f.needs_film() && in_format(path, name))
+    };
+    if broken.iter().any(lost) {
+        return Ok(Task::All);
+    }
+    // A format that is no longer wanted may be damaged.
+    let wanted = |(path, _): &(String, String)| formats.iter().any(|(name, _)| in_format(path, name));
+    Ok(if broken.iter().any(wanted) { Task::Formats } else { task })
+}
+
+/// What remains to be done of an image whose checksums are there, whatever has become of its files: it may be of another recipe, or lack a format.
+pub(crate) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
+    if checksums.recipe != set.recipe.fingerprint()? {
+        return Ok(Task::All);
+    }
+    let other_labels = checksums.labelling != set.recipe.labelling.fingerprint()?;
+    let mut task = if other_labels { Task::Formats } else { Task::Done };
+    for (name, format) in format::all(&set.recipe)? {
+        if format.has_images(&set.recipe) && !checksums.files.keys().any(|path| in_format(path, name)) {
+            if format.needs_film() {
+                return Ok(Task::All);
+            }
+            task = Task::Formats;
+        }
+    }
+    Ok(task)
+}
+
+/// Whether a path lies in the folder of a format.
+pub(crate) fn in_format(path: &str, format: &str) -> bool {
+    path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
+}

@@ -1,0 +1,259 @@
+//! The contact sheet: some images of each split, their labels over them, to be filtered, sorted, searched and enlarged.
+
+use crate::Set;
+use crate::model::record::Record;
+use crate::model::sample::{IGNORE, Sample};
+use crate::model::split::Split;
+use crate::read::native;
+use furrow_base::Result;
+use furrow_field::record::SpeciesRecord;
+use furrow_output::Picture;
+use furrow_render::scene::tag::Class;
+use furrow_report::{count, data_url, percent};
+use maud::{Markup, html};
+use rayon::prelude::*;
+
+/// Most images.
+const MOST: usize = 24;
+/// Most pixels of a side.
+const SIDE: u32 = 360;
+/// What stands for a photograph where there is none.
+const EARTH: [u8; 3] = [70, 62, 54];
+/// Quality of the JPEGs.
+const QUALITY: u8 = 82;
+
+/// The sheet. `names` are the images of each split, in the order of [`Split::ALL`].
+pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
+    let all: Vec<&String> = chosen(names.each_ref().map(Vec::len))
+        .into_iter()
+        .zip(names)
+        .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
+        .collect();
+    let samples: Vec<Sample> = all.par_iter().map(|name| native::sample(set, name)).collect::<Result<_>>()?;
+    let facts: Vec<Facts> = samples.iter().map(|sample| Facts::of(&sample.record, &set.recipe.species)).collect();
+    let unusual = unusual(&facts);
+    let cards: Vec<Markup> = samples
+        .par_iter()
+        .zip(&facts)
+        .zip(&unusual)
+        .map(|((sample, facts), unusual)| card(sample, facts, *unusual, set.recipe.pack.is_none()))
+        .collect::<Result<_>>()?;
+    Ok(html! {
+        (tools(&facts))
+        div.sheet { @for card in &cards { (card) } }
+        dialog #large {
+            form method="dialog" { button { "Close" } }
+            div {}
+            p {}
+        }
+    })
+}
+
+/// What images are filtered and sorted by.
+struct Facts {
+    /// Shares of the image under crop and weed, percent.
+    cover: [f64; 2],
+    /// Growth stage of the oldest crop plant.
+    stage: Option<u32>,
+    /// Species in view, in order, each once.
+    species: Vec<String>,
+}
+
+impl Facts {
+    fn of(record: &Record, table: &[SpeciesRecord]) -> Self {
+        let pixels = f64::from(record.width) * f64::from(record.height);
+        let share = |class: Class| {
+            100.0 * record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels
+        };
+        let crops = record.seen().filter(|p| p.class == Class::Crop);
+        let stage = crops.filter_map(|p| Some(p.grown.as_ref()?.bbch)).max();
+        let named = |kind: u16| Some(table.get(usize::from(kind).checked_sub(1)?)?.name.clone());
+        let mut species: Vec<String> = record.seen().filter_map(|p| named(p.kind)).collect();
+        species.sort();
+        species.dedup();
+        Self { cover: [share(Class::Crop), share(Class::Weed)], stage, species }
+    }
+
+    fn values(&self) -> [f64; 3] {
+        [self.cover[0], self.cover[1], self.stage.map_or(f64::NAN, f64::from)]
+    }
+}
+
+/// How far each image is from the others: the largest distance of one of its values from their mean, in standard deviations.
+fn unusual(facts: &[Facts]) -> Vec<f64> {
+    let mut far = vec![0.0_f64; facts.len()];
+    for k in 0..3 {
+        let known = || facts.iter().map(|f| f.values()[k]).filter(|v| v.is_finite());
+        let n = known().count().max(1) as f64;
+        let mean = known().sum::<f64>() / n;
+        let sd = (known().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
+        for (far, facts) in far.iter_mut().zip(facts) {
+            let distance = (facts.values()[k] - mean).abs() / sd.max(1e-9);
+            if distance.is_finite() && sd > 0.0 {
+                *far = far.max(distance);
+            }
+        }
+    }
+    far
+}
+
+/// What filters and sorts the images; without scripts it is not shown.
+fn tools(facts: &[Facts]) -> Markup {
+    let mut species: Vec<&String> = facts.iter().flat_map(|f| &f.species).collect();
+    species.sort();
+    species.dedup();
+    html! {
+        p.tools hidden {
+            label { "Show " select #show {
+                option value="all" { "all" }
+                option value="crop" { "with crop" }
+                option value="weed" { "with weeds" }
+                option value="bare" { "without plants" }
+                @for name in species { option value={ "species:" (name) } { "with " (name) } }
+            } }
+            label { "Sort by " select #sort {
+                option value="place" { "set" }
+                option value="unusual" { "most unusual first" }
+                option value="cover" { "most cover first" }
+                option value="bare" { "least cover first" }
+                option value="stage" { "oldest crop first" }
+            } }
+            label { "Find " input #find type="search" placeholder="number" size="8"; }
+            span #shown {}
+        }
+    }
+}
+
+/// Which images of splits of these sizes are shown: of each the same number as far as they go, spread over it.
+fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
+    let mut quota = [0; Split::ALL.len()];
+    while quota.iter().sum::<usize>() < MOST && quota != sizes {
+        // Of the splits with images left, the one that shows the fewest.
+        let left = (0..sizes.len()).filter(|k| quota[*k] < sizes[*k]).min_by_key(|k| quota[*k]);
+        if let Some(k) = left {
+            quota[k] += 1;
+        }
+    }
+    std::array::from_fn(|k| (0..quota[k]).map(|i| i * sizes[k] / quota[k]).collect())
+}
+
+/// One image: photograph, labels, words.
+fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result<Markup> {
+    let Record { name, source, split, width, height, .. } = &sample.record;
+    // Labels alone lie on plain earth.
+    let earth = if sample.rgb.is_empty() { vec![EARTH; sample.pixels()] } else { Vec::new() };
+    let photograph = if sample.jpeg.is_some() { "rgb.jpg" } else { "rgb.png" };
+    let (shown, full) = if earth.is_empty() { (&sample.rgb, photograph) } else { (&earth, "semantics.png") };
+    let (w, h, rgb) = furrow_output::shrink(*width, *height, shown, SIDE);
+    let photograph = data_url("jpeg", &furrow_output::encode_jpeg(w, h, &rgb, QUALITY)?);
+    let labels = data_url("png", &furrow_output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
+    Ok(html! {
+        figure.shot data-name=(name) data-crop=(rounded(facts.cover[0])) data-weed=(rounded(facts.cover[1]))
+            data-stage=[facts.stage] data-unusual=(rounded(unusual)) data-species=(facts.species.join("|")) {
+            label title=[source.as_ref()] {
+                input type="checkbox";
+                span.frame {
+                    img src=(photograph) width=(w) height=(h) alt={ "image " (name) };
+                    img.labels src=(labels) width=(w) height=(h) alt={ "labels of image " (name) };
+                }
+            }
+            figcaption {
+                b { (name) } " " (split.name()) " · " (words(&sample.record)) " "
+                @if has_files {
+                    a.enlarge href={ (native::folder(name)) "/" (full) } { "full size" } " "
+                    a href={ (native::folder(name)) "/record.json" } { "record" }
+                }
+            }
+        }
+    })
+}
+
+/// Two decimals, so that equal datasets have equal pages.
+fn rounded(value: f64) -> String {
+    format!("{value:.2}")
+}
+
+/// What an image shows: plants, or shares of classes where nobody has told plants apart.
+fn words(record: &Record) -> String {
+    let pixels = f64::from(record.width) * f64::from(record.height);
+    let share = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels;
+    let (crop, weed) = (share(Class::Crop), share(Class::Weed));
+    if record.plants.is_empty() && crop + weed > 0.0 {
+        return format!("crop {}, weed {}", percent(crop), percent(weed));
+    }
+    let of = |class: Class| record.seen().filter(|p| p.class == class).count() as u64;
+    let stages: Vec<u32> =
+        record.seen().filter(|p| p.class == Class::Crop).filter_map(|p| Some(p.grown.as_ref()?.bbch)).collect();
+    let stage = match (stages.iter().min(), stages.iter().max()) {
+        (Some(a), Some(b)) if a == b => format!(" at BBCH {a}"),
+        (Some(a), Some(b)) => format!(" at BBCH {a} to {b}"),
+        _ => String::new(),
+    };
+    format!(
+        "{}{stage}, {}",
+        count(of(Class::Crop), "crop plant", "crop plants"),
+        count(of(Class::Weed), "weed", "weeds")
+    )
+}
+
+/// Labels as colours to lay over a photograph of this size: classes tinted, one plant a little other than the next, each outlined.
+fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
+    let (width, height) = sample.size();
+    // The pixel that the middle of the small one lies in.
+    let of = |x: u32, y: u32| {
+        let at = |k: u32, small: u32, large: u32| (2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small));
+        (at(y, h, height) * u64::from(width) + at(x, w, width)) as usize
+    };
+    let who = |x: u32, y: u32| (sample.semantics[of(x, y)], sample.plants[of(x, y)]);
+    let mut out = Vec::with_capacity(w as usize * h as usize);
+    for y in 0..h {
+        for x in 0..w {
+            let here = who(x, y);
+            let edge = x + 1 < w && who(x + 1, y) != here
+                || y + 1 < h && who(x, y + 1) != here
+                || x > 0 && who(x - 1, y) != here
+                || y > 0 && who(x, y - 1) != here;
+            out.push(tint(here, edge));
+        }
+    }
+    out
+}
+
+/// The colour over a pixel of a class and a plant.
+fn tint((class, plant): (u8, u32), edge: bool) -> [u8; 4] {
+    const CROP: [[u8; 3]; 3] = [[40, 200, 80], [20, 160, 120], [130, 210, 50]];
+    const WEED: [[u8; 3]; 3] = [[235, 60, 50], [215, 50, 120], [250, 125, 40]];
+    let shade = (plant % 3) as usize;
+    let color = match class {
+        c if c == Class::Crop as u8 => CROP[shade],
+        c if c == Class::Weed as u8 => WEED[shade],
+        IGNORE => [140; 3],
+        _ => return [0; 4],
+    };
+    let [r, g, b] = color;
+    if edge { [r, g, b, 255] } else { [r, g, b, 115] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_image_that_is_unlike_the_others_is_the_most_unusual() {
+        let facts = |crop: f64, stage| Facts { cover: [crop, 1.0], stage, species: Vec::new() };
+        let all = [facts(10.0, Some(14)), facts(11.0, Some(14)), facts(12.0, None), facts(60.0, Some(14))];
+        let far = unusual(&all);
+        assert!(far[3] > 1.5 && far[..3].iter().all(|f| *f < far[3]), "{far:?}");
+        assert_eq!(unusual(&[facts(1.0, None)]), [0.0]);
+    }
+
+    #[test]
+    fn every_split_is_shown_as_far_as_it_goes() {
+        assert_eq!(chosen([10, 1, 1]), [(0..10).collect(), vec![0], vec![0]]);
+        let many = chosen([80_000, 10_000, 10_000]);
+        assert_eq!(many.each_ref().map(Vec::len), [8, 8, 8]);
+        assert_eq!(many[0][1], 10_000);
+        assert_eq!(chosen([100, 0, 2]).map(|p| p.len()), [22, 0, 2]);
+        assert_eq!(chosen([0, 0, 0]).map(|p| p.len()), [0, 0, 0]);
+    }
+}

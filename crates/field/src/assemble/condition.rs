@@ -1,0 +1,139 @@
+//! Applies a plant's condition to its organs: holes in the opacity mask, and changed tissue optics, leaf by leaf.
+
+use super::grown::Grown;
+use crate::library::Choice;
+use furrow_base::geometry::Mesh;
+use furrow_base::math::{Spectrum, Vec2};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_grow::plant::condition::{Bearer, Marks, leaf_stream};
+use furrow_grow::plant::{Condition, ConditionDesc, LeafLife, OrganKind};
+use furrow_optics::optics::Pigments;
+use furrow_render::material::{ConditionOptics, LeafMaterial};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Image size assumed for a blade without an image, mm; variation over such a blade is too small to be seen.
+const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
+
+/// Days after which a leaf has all the damage that the scene file describes: leaves are eaten for about three weeks, until they are tough.
+const MARKED_DAYS: f32 = 21.0;
+
+/// A plant's condition, drawn from its description.
+pub(super) struct Ailing<'a> {
+    desc: &'a ConditionDesc,
+    drawn: Condition,
+    /// Random stream of the plant.
+    stream: &'a Stream,
+    /// Reflectance of the soil that covers leaves as dust.
+    soil: Spectrum,
+    /// For a plant that is imaged on several days: its age in days, and the lives of its leaves.
+    over_days: Option<(f32, BTreeMap<u16, LeafLife>)>,
+}
+
+/// Properties of an organ before its condition is applied.
+pub(super) struct Bare<'a> {
+    /// Kind of the organ.
+    pub(super) kind: OrganKind,
+    /// Drawn variant of its material.
+    pub(super) choice: &'a Choice,
+    /// Material tinted for the organ's age.
+    pub(super) material: &'a LeafMaterial,
+    /// Pigments of the material.
+    pub(super) pigments: &'a Pigments,
+    /// Factor on the chlorophyll content.
+    pub(super) green: f32,
+    /// Height of the plant's foot, metres.
+    pub(super) ground: f32,
+    /// Number of the plant's last leaf.
+    pub(super) last: u16,
+}
+
+impl<'a> Ailing<'a> {
+    /// Draws the condition of the plant with this random stream.
+    pub(super) fn new(desc: &'a ConditionDesc, stream: &'a Stream, soil: Spectrum) -> Self {
+        Self { desc, drawn: desc.draw(stream), stream, soil, over_days: None }
+    }
+
+    /// Limits the marks to those that the plant has at an age of `days`. Marks only accumulate: those of earlier days stay in place.
+    pub(super) fn over_days(&mut self, lives: BTreeMap<u16, LeafLife>, days: f32) {
+        self.over_days = Some((days, lives));
+    }
+
+    /// Returns the share of its final marks that a leaf has by now, and the blade size that marks are placed on, mm.
+    fn met(&self, leaf: u16, share: f32) -> Option<(f32, Vec2)> {
+        let (days, lives) = self.over_days.as_ref()?;
+        let life = lives.get(&leaf)?;
+        let met = ((days - life.appears_days) / MARKED_DAYS).clamp(0.0, 1.0);
+        Some((met, Vec2::new(life.width, life.blade) * 1e3 * share.sqrt()))
+    }
+
+    /// Returns description and drawn values, as the growth model takes them.
+    pub(super) fn posture(&self) -> (&ConditionDesc, &Condition) {
+        (self.desc, &self.drawn)
+    }
+
+    /// Returns the drawn values.
+    pub(super) fn drawn(&self) -> Condition {
+        self.drawn
+    }
+
+    /// Applies the condition to an organ. Returns one organ, or one for each leaflet.
+    pub(super) fn dress(&self, grown: &Grown, bare: &Bare<'_>) -> Vec<Grown> {
+        let leaf = grown.part.tag.leaf;
+        let age = match leaf {
+            0 => 1.0,
+            _ => 1.0 - f32::from(leaf - 1) / f32::from(bare.last.max(2) - 1),
+        };
+        let stream = leaf_stream(self.stream, leaf);
+        let green = if leaf == 0 { self.drawn.greenness } else { self.desc.green(&self.drawn, age, &stream) };
+        let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) };
+        let base = bare.pigments.chlorophyll.f32();
+        let own = bare.material.with_chlorophyll(base, bare.green * green);
+        let blade = matches!(bare.kind, OrganKind::Blade | OrganKind::Cotyledon);
+        // Leaflets share an image but have separate holes.
+        let pieces = match grown.part.mesh.image_size() {
+            Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
+            _ => vec![Mesh::clone(&grown.part.mesh)],
+        };
+        let share = 1.0 / pieces.len().max(1) as f32;
+        let mut dressed = Vec::with_capacity(pieces.len());
+        for (k, mesh) in pieces.into_iter().enumerate() {
+            let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
+            let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
+            let chlorophyll = base * bare.green * green;
+            let mut one = Grown { chlorophyll, material: own.clone(), ..grown.with(mesh) };
+            if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
+                one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
+            }
+            let marked = marks.as_ref().is_some_and(|m| !m.nothing());
+            let wears = marked || self.drawn.reddening > 0.0 || gloss != 1.0;
+            one.own |= wears || green != 1.0;
+            if wears {
+                let of = (bare.pigments, bare.choice.tones(bare.pigments));
+                one.material = own.worn(ConditionOptics::new(of, marks, self.drawn.reddening, self.soil), gloss);
+            }
+            dressed.push(one);
+        }
+        dressed
+    }
+
+    fn marks(&self, leaf: u16, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
+        let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
+        let image = mesh.image_size().filter(|_| bare.choice.pictured);
+        let met = self.met(leaf, share);
+        let bearer = Bearer {
+            age,
+            cotyledon: bare.kind == OrganKind::Cotyledon,
+            share,
+            height: middle - bare.ground,
+            met: met.map(|(share, _)| share),
+            image_mm: image.map_or(NO_IMAGE_MM, |size| met.map_or(size * 1e3, |(_, mm)| mm).max(Vec2::splat(0.1))),
+            mask: bare.choice.mask.as_deref(),
+            margin: bare.choice.margin.as_ref(),
+        };
+        // A ribbon without an image is too narrow for bites and spots; only uniform effects apply.
+        let all_over = Condition { chlorosis: self.drawn.chlorosis, dust: self.drawn.dust, ..Condition::default() };
+        let drawn = if image.is_some() { &self.drawn } else { &all_over };
+        Marks::draw(self.desc, drawn, &bearer, stream)
+    }
+}

@@ -1,0 +1,59 @@
+//! Data of a field's ground during construction.
+
+use super::ground_view::Onlooker;
+use crate::PartKind;
+use crate::desc::Detail;
+use crate::layer::Layer;
+use furrow_base::math::Spectrum;
+use furrow_grow::soil::{Debris, Ground, Pile, Site, SoilDesc};
+use furrow_render::material::{BakedGround, Material};
+use furrow_render::scene::Part;
+use std::sync::Arc;
+
+/// All inputs of the ground that do not depend on the plants.
+#[derive(Clone, PartialEq)]
+pub(super) struct Soil {
+    pub(super) desc: SoilDesc,
+    pub(super) detail: Detail,
+    /// Reflectances of the soil's `colors`; the textures of its layers are in `maps`.
+    pub(super) colors: Vec<Spectrum>,
+    pub(super) maps: Vec<Arc<Layer>>,
+    pub(super) site: Site,
+    /// Texel size of the baked maps, metres.
+    pub(super) texel: f32,
+    /// Cameras near whose views the ground is built; empty if all of it is built.
+    pub(super) onlookers: Vec<Onlooker>,
+    /// Seed and index of the field.
+    pub(super) of: (u64, u64),
+}
+
+/// Ground and stones, before clods and litter are added.
+#[derive(Clone)]
+pub(super) struct Earth {
+    pub(super) ground: Arc<Ground>,
+    pub(super) pile: Pile,
+    pub(super) stones: Vec<Debris>,
+}
+
+/// Baked textures of the ground and of its clods (dry, damp).
+pub(super) struct BakedGrounds {
+    pub(super) ground: Arc<BakedGround>,
+    pub(super) clods: [Arc<BakedGround>; 2],
+    /// Reflectance of the dry soil that covers stones and straw as dust.
+    pub(super) dust: Spectrum,
+}
+
+/// Ground without cover, its baked textures, and the inputs that it was built from.
+pub(super) struct Bed {
+    pub(super) soil: Soil,
+    pub(super) earth: Earth,
+    pub(super) baked: Arc<BakedGrounds>,
+}
+
+/// The ground, clods and debris as scene parts. Their material indices refer to `materials` here.
+#[derive(Default)]
+pub(super) struct Laid {
+    pub(super) parts: Vec<Part>,
+    pub(super) kinds: Vec<PartKind>,
+    pub(super) materials: Vec<Material>,
+}

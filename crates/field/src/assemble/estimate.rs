@@ -1,0 +1,168 @@
+//! Estimates the cost of a field before it is built: film, LiDAR echoes, ground, debris, plants, models, images.
+
+use super::PLANT_MARGIN;
+use super::builder::Builder;
+use super::census::Population;
+use super::member::Member;
+use super::preview::Counted;
+use super::seedling::{Place, Seedling, grow};
+use super::view::View;
+use crate::desc::Detail;
+use crate::estimate::{Estimate, Share};
+use furrow_base::Result;
+use furrow_base::geometry::Cost;
+use furrow_base::math::Vec3;
+use furrow_base::ron_file::Step;
+use furrow_grow::plant::most_triangles;
+use furrow_grow::soil::Expected;
+use furrow_optics::optics::soil::LOESS;
+use furrow_render::film::Pixel;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+/// Bytes per pixel in addition to the film: labels, images, and the encoded files before they are written.
+const BYTES_BESIDE: f64 = 160.0;
+/// Core seconds to label a pixel and write it.
+const SECONDS_PER_PIXEL: f64 = 2e-6;
+/// Bytes per LiDAR pulse: its echoes in memory, and in the file before it is written.
+const BYTES_PER_PULSE: f64 = 400.0;
+/// Core seconds to trace a LiDAR pulse.
+const SECONDS_PER_PULSE: f64 = 5e-6;
+/// Number of plants of a population that are grown to estimate the size of all.
+const LOOKED_AT: usize = 4;
+/// The same number for single plants, which may differ in species.
+const LOOKED_AT_PLACED: usize = 16;
+/// Maximum number of triangles of a plant that is grown for the estimate.
+const TRIED: f64 = 2e7;
+/// Bytes of an instance of a plant without its organs, in the BVH and in the records.
+const BYTES_PER_INSTANCE: f64 = 1800.0;
+/// Bytes of each organ of an instance: its part and the record of its leaf.
+const BYTES_PER_INSTANCED_ORGAN: f64 = 500.0;
+/// Core seconds to place an instance.
+const SECONDS_PER_INSTANCE: f64 = 1e-5;
+/// Core seconds per triangle of a plant.
+const SECONDS_PER_TRIANGLE: f64 = 2e-6;
+
+impl Builder<'_> {
+    /// Estimates the cost of the field for the ground in `view`.
+    pub(super) fn estimate(&mut self, view: View) -> Result<Estimate> {
+        let camera = &self.scene.camera;
+        let pixels = f64::from(camera.width()) * f64::from(camera.height());
+        let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
+        let coarser = if self.desc.detail == Detail::Full {
+            ", or lower the camera, or set detail: ByPixel"
+        } else {
+            ", or lower the camera"
+        };
+        let mut shares = Vec::new();
+        let fewer = match (self.desc.drive.is_some(), self.scanners.is_empty()) {
+            (false, true) => "",
+            (true, true) => "use fewer frames, or ",
+            (false, false) => "lower reach_m, or ",
+            (true, false) => "use fewer frames, lower reach_m, or ",
+        };
+        let mut add = |at: &[Step<'static>], cost, advice: &str| {
+            shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
+        };
+        add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
+        // Only one frame is scanned at a time, and all frames have the same number of pulses.
+        if let Some(lidar) = self.scanners.first() {
+            let pulses = f64::from(lidar.columns()) * f64::from(lidar.beams());
+            let echoes = Cost::work(pulses * BYTES_PER_PULSE, pulses * SECONDS_PER_PULSE);
+            add(&[Step::Field("lidar")], echoes, "use fewer beams, or a larger step in `pulses`");
+        }
+        if let Some(soil) = &self.desc.soil {
+            let (bare, all) = self.expected_soil(soil, view);
+            add(
+                &[Step::Field("camera")],
+                bare,
+                "lower the camera, narrow its angle of view, or make the image smaller",
+            );
+            for Expected { at, cost, advice } in all {
+                add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}{coarser}"));
+            }
+        }
+        let (seedlings, populations) = self.seedlings(view.area.grown(PLANT_MARGIN), &[])?;
+        let mut counted = Vec::new();
+        for (population, range) in populations {
+            let (at, advice) = population.place();
+            let number = range.len();
+            let some = self.count(&seedlings, population, range.clone());
+            let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
+            add(&at, expected(&some, number, &shared), &format!("{advice}{coarser}"));
+            counted.extend(some);
+        }
+        if let Some(preview) = &self.options.preview {
+            preview.keep_counted(counted);
+        }
+        for (k, model) in self.desc.models.iter().enumerate() {
+            let model = self.library.model(self.page, model)?;
+            let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+            let cost = Cost::of(triangles as f64, model.parts.len() as f64);
+            add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
+        }
+        shares.extend(self.pictured()?);
+        Ok(Estimate { shares })
+    }
+
+    /// Estimates the memory of images: soil textures, leaf images and model textures.
+    fn pictured(&mut self) -> Result<Vec<Share>> {
+        let (page, desc) = (self.page, self.desc);
+        let at = |list, k, field| vec![Step::Field(list), Step::Item(k), Step::Field(field)];
+        let mut places = Vec::new();
+        let layers = desc.soil.iter().flat_map(|soil| &soil.layers);
+        for (k, layer) in layers.enumerate() {
+            let place = [vec![Step::Field("soil")], at("layers", k, "albedo")].concat();
+            places.push((place, vec![self.library.layer_pictures(page, layer)?]));
+        }
+        let crops = self.sown.clone().map(|k| ("crops", k, &desc.crops[k].species));
+        let weeds = desc.weeds.iter().enumerate().map(|(k, weed)| ("weeds", k, &weed.species));
+        let plants = desc.plants.iter().enumerate().map(|(k, plant)| ("plants", k, &plant.species));
+        for (list, k, species) in crops.chain(weeds).chain(plants) {
+            places.push((at(list, k, "species"), self.library.species(page, species)?.pictures.clone()));
+        }
+        for (k, model) in desc.models.iter().enumerate() {
+            places.push((at("models", k, "file"), vec![self.library.model_pictures(page, model)?]));
+        }
+        Ok(self.library.counted.shares(places))
+    }
+
+    /// Counts triangles and organs of sample plants of a population by growing them. A plant that might itself be too large is not grown.
+    fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
+        let number = range.len();
+        let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
+        let tried = number.min(most);
+        let samples = (0..tried).into_par_iter().map(|k| {
+            let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
+            let cell = self.cell(seedling.position);
+            let known = self.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
+            Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
+        });
+        samples.collect()
+    }
+}
+
+/// Returns the numbers of triangles and organs of a plant; for a plant that may exceed [`TRIED`], the upper bound and 1.
+fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
+    let bound = most_triangles(&seedling.species.desc.plant);
+    if bound > TRIED {
+        return (bound, 1.0);
+    }
+    // Holes and spots are expensive to compute and do not change the triangles.
+    let healthy = Seedling { condition: None, ..seedling.clone() };
+    let place = Place { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
+    let (_, organs) = grow(&healthy, &place, |_| true);
+    let organs = organs.unwrap_or_default();
+    (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
+}
+
+/// Estimates the cost of `number` plants from the samples `some`. `shared` lists the bank plants of those that are instances.
+fn expected(some: &[Counted], number: usize, shared: &[Member]) -> Cost {
+    let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), Counted { size: (t, o), .. }| (a + t, b + o));
+    let each = Cost::of(triangles, organs) + Cost::work(0.0, triangles * SECONDS_PER_TRIANGLE);
+    let meshes = number - shared.len() + shared.iter().collect::<BTreeSet<_>>().len();
+    let of = some.len().max(1) as f64;
+    let instances = Cost::work(BYTES_PER_INSTANCE + organs / of * BYTES_PER_INSTANCED_ORGAN, SECONDS_PER_INSTANCE);
+    each * (meshes as f64 / of) + instances * shared.len() as f64
+}

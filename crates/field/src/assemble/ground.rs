@@ -1,0 +1,310 @@
+//! Builds the ground of a field: the surface with its stones, then clods and litter, then scene parts.
+
+use super::PLANT_MARGIN;
+use super::builder::{Builder, Floor};
+use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
+use super::ground_view::{Onlooker, from_view};
+use super::preview::Under;
+use super::terrain::{GROUND_MARGIN, tilted_to};
+use super::view::View;
+use crate::desc::Detail;
+use crate::layer::Layer;
+use crate::{PartKind, PlantRecord};
+use furrow_base::geometry::{Cost, Mesh};
+use furrow_base::math::{Spectrum, Vec2};
+use furrow_base::ron_file::{Step, Vary};
+use furrow_base::sampling::Purpose;
+use furrow_base::sampling::rng::mix;
+use furrow_base::{Error, Result};
+use furrow_grow::scatter::{Disc, Rows};
+use furrow_grow::soil::{
+    self, Canopy, Clods, Debris, DebrisKind, Envelope, Expected, Ground, InView, LayerDesc, Pile, Rect, SeedRows, Site,
+    SoilDesc, SoilRecord,
+};
+use furrow_optics::bsdf::{Bsdf, OrenNayar};
+use furrow_render::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
+use furrow_render::scene::Part;
+use furrow_render::scene::tag::Tag;
+use std::sync::Arc;
+
+/// Distance that the coarse ground extends beyond the fine ground, metres.
+const GROUND_REACH: f32 = 2.5;
+/// The same distance if a camera sees ground beyond the planted area, metres: nearly to the horizon.
+const OPEN_REACH: f32 = 200.0;
+/// Ratio of the lengths of successive cells of the coarse ground.
+const GROWTH: f32 = 1.3;
+/// The same ratio if plants grow on the coarse ground: cells are about as long as the ground footprint of an oblique pixel.
+const GROWTH_BY_PIXEL: f32 = 1.06;
+/// Approximate maximum number of cells of the fine ground; a larger view gets larger cells.
+const MOST_CELLS: f32 = 1.5e7;
+/// Approximate maximum number of texels of the ground's maps; a larger view gets larger texels.
+const MOST_TEXELS: f32 = 2.4e8;
+/// Random stream addresses of the debris: stones and litter.
+const STONES: u64 = 0;
+const LITTER: u64 = 1;
+/// Standard deviation of the facet slope angle of stones, straw and wood (Oren–Nayar), radians.
+const DEBRIS_SIGMA: f32 = 0.3;
+
+/// Maximum patch size of the colour variation on straw, wood and dead leaves, metres.
+const MOTTLE: f32 = 2e-3;
+
+/// Patch size of the soil dust on stones, straw and wood, metres.
+const DUST_PATCH: f32 = 3e-3;
+/// Number of quantisation steps of the moisture of debris, from air-dry to saturated.
+const MOISTURE_STEPS: f32 = 12.0;
+
+impl Builder<'_> {
+    /// Builds the ground, the plants on it, and the clods and litter below them. Returns the plants and the record of the soil.
+    pub(super) fn cultivate(
+        &mut self,
+        desc: &SoilDesc,
+        view: View,
+        shown: Option<Rect>,
+    ) -> Result<(Vec<PlantRecord>, SoilRecord)> {
+        let soil = self.soil(desc, view)?;
+        let options = self.options;
+        let preview = options.preview.as_ref();
+        let known = preview.and_then(|preview| preview.bed(&soil));
+        let mut earth = match &known {
+            Some(bed) => bed.earth.clone(),
+            None => self.break_ground(&soil)?,
+        };
+        self.options.wanted()?;
+        let bare = preview.map(|_| earth.clone());
+        let ground = earth.ground.clone();
+        let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
+        let record = self.soil_record(desc, &ground);
+        self.warn_of_burial(floor);
+        let seen = in_view(&soil.onlookers, ground.area(), |p| floor.height(p.x, p.y));
+        // Baking takes about as long as everything else, and the two are independent.
+        let (baked, rest) = rayon::join(
+            || match &known {
+                _ if options.unlit || options.told_only => None,
+                Some(bed) => Some(bed.baked.clone()),
+                None => Some(Arc::new(bake(&ground, &soil))),
+            },
+            || {
+                let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+                let (seedlings, _) = self.seedlings(view.area.grown(PLANT_MARGIN), &taken)?;
+                // Plants first: they push the clods aside, not the other way round.
+                let plants = self.populate(&seedlings, Some(floor), shown)?;
+                let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
+                let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
+                let uncovered = same.is_some() || options.told_only;
+                let cover = if uncovered { Vec::new() } else { self.cover(desc, &mut earth, &seen) };
+                Ok::<_, Error>((plants, same, cover))
+            },
+        );
+        let (plants, same, clods) = rest?;
+        self.options.wanted()?;
+        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
+        if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
+            let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
+            let plants = self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
+            preview.keep_ground(Under { bed, plants }, &laid);
+        }
+        self.put(&laid);
+        Ok((plants, record))
+    }
+
+    /// Collects the inputs of the ground: layers, colours, site, texel size, cameras.
+    pub(super) fn soil(&mut self, desc: &SoilDesc, view: View) -> Result<Soil> {
+        let mut maps: Vec<Arc<Layer>> = Vec::new();
+        for layer in &desc.layers {
+            maps.push(self.library.layer(self.page, layer)?);
+        }
+        let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
+        let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
+        let (site, texel, of) = (self.site(view), self.texel(view), (self.seed, self.index));
+        let (desc, onlookers) = (self.weathered(desc), self.onlookers(view));
+        Ok(Soil { desc, detail: self.desc.detail, colors, maps, site, texel, onlookers, of })
+    }
+
+    /// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
+    fn weathered(&self, desc: &SoilDesc) -> SoilDesc {
+        let mut desc = desc.clone();
+        if let Some(today) = &self.today {
+            let mean = desc.moisture.mean.draw(&mut today.stream(&self.stream(Purpose::Soil, 0)));
+            desc.moisture.mean = Vary::fixed(mean);
+            desc.crust = today.crust;
+        }
+        desc
+    }
+
+    /// Builds the surface and the stones, which must exist before plants are placed.
+    fn break_ground(&self, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<Earth> {
+        let ground = Ground::new(desc, colors, maps, site, &self.stream(Purpose::Soil, 0))
+            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
+        self.options.wanted()?;
+        let mut pile = Pile::new(&ground).until(self.options.stop.as_ref());
+        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
+        Ok(Earth { ground: Arc::new(ground), pile, stones })
+    }
+
+    /// Returns the area of ground to be built, and its resolution.
+    pub(super) fn site(&self, view: View) -> Site {
+        let pixel = self.soil_pixel();
+        let [cells, _, things] = coarser(view);
+        let (coarsest, smallest_mm) = match self.desc.detail {
+            Detail::Full => (soil::FULL_CELL_M, 0.0),
+            Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
+        };
+        Site {
+            area: view.near.grown(GROUND_MARGIN),
+            grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
+            margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
+            growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
+            level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
+            smallest_mm,
+            rows: self.seed_rows(),
+        }
+    }
+
+    /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
+    fn seed_rows(&self) -> Option<SeedRows> {
+        self.sown.clone().next().map(|k| {
+            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
+            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+        })
+    }
+
+    /// Returns the bounds of the ground's height.
+    pub(super) fn envelope(&self) -> Envelope {
+        let soil = self.desc.soil.as_ref();
+        soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, self.seed_rows(), &self.stream(Purpose::Soil, 0)))
+    }
+
+    /// Returns the texel size of the ground's maps, metres.
+    pub(super) fn texel(&self, view: View) -> f32 {
+        let coarsest = if self.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
+        let [_, texels, _] = coarser(view);
+        (0.9 * texels * self.soil_pixel()).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
+    }
+
+    /// Returns the pixel footprint on the ground that sets its resolution, metres.
+    fn soil_pixel(&self) -> f32 {
+        if self.desc.detail == Detail::Full { self.ground_pixel() } else { self.finest_pixel() }
+    }
+
+    /// Estimates the cost of the ground, and of each kind of debris and clods on it, before they are built.
+    pub(super) fn expected_soil(&self, desc: &SoilDesc, view: View) -> (Cost, Vec<Expected>) {
+        let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
+        let streams = streams.map(|(purpose, index)| self.stream(purpose, index));
+        let site = self.site(view);
+        let seen = in_view(&self.onlookers(view), site.area, |_| 0.0);
+        soil::expected(desc, &site, self.texel(view), &seen, streams.each_ref())
+    }
+
+    /// Returns the record of the ground with its drawn values.
+    pub(super) fn soil_record(&self, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
+        ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
+    }
+
+    /// Places clods below the plants, and adds litter to the debris. Returns the clods; none if the ground is flat.
+    fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth, seen: &InView) -> Vec<Clods> {
+        let mut canopy = Canopy::none(ground);
+        for part in self.scene.parts.iter().filter(|_| !desc.flat) {
+            canopy.add(&part.in_world());
+        }
+        let clods = soil::clods(ground, pile, &canopy, seen);
+        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
+        if !desc.flat {
+            return clods;
+        }
+        for thing in debris {
+            thing.lower(ground);
+        }
+        Vec::new()
+    }
+
+    /// Inserts the parts of the ground before those of the plants.
+    fn put(&mut self, laid: &Laid) {
+        let first = self.scene.materials.len() as u32;
+        let parts = laid.parts.iter().map(|part| Part { material: first + part.material, ..part.clone() });
+        self.scene.parts.splice(0..0, parts);
+        self.scene.materials.extend(laid.materials.iter().cloned());
+        self.ground.extend(&laid.kinds);
+    }
+}
+
+/// Returns size factors for cells, texels and the smallest aggregates of the ground, relative to the needs of the smallest pixels.
+/// If pixels grow with the distance, most of them are several times larger than the smallest.
+fn coarser(view: View) -> [f32; 3] {
+    if view.is_graded() { [1.5, 2.0, 3.0] } else { [1.0; 3] }
+}
+
+/// Returns the distance that the view extends beyond its area of uniform cells, metres.
+fn beyond(view: View) -> f32 {
+    let ([lo, hi], [a, b]) = (view.area.corners(), view.near.corners());
+    (a - lo).max(hi - b).max_element().max(0.0)
+}
+
+/// Returns the part of the ground in view of the onlookers; all of it if there are none. `height` gives the ground's height.
+fn in_view(onlookers: &[Onlooker], area: Rect, height: impl Fn(Vec2) -> f32 + Sync) -> InView {
+    if onlookers.is_empty() {
+        return InView::ALL;
+    }
+    let run = onlookers.iter().map(Onlooker::run).fold(0.0, f32::max);
+    InView::of(area, run, height, |p| from_view(onlookers, p))
+}
+
+/// Bakes the textures of the ground and its clods. Each texel averages the layers' colours over its area, unless `detail` is full.
+fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
+    let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
+    let seen = match detail {
+        Detail::Full => maps.clone(),
+        Detail::ByPixel | Detail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
+    };
+    let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&seen, *texel, wet)));
+    BakedGrounds {
+        ground: Arc::new(BakedGround::bake(&ground.bake(&seen, *texel))),
+        clods: ground.clods_moisture().map(fabric),
+        dust: ground.mean_dry(maps),
+    }
+}
+
+/// Creates scene parts of the ground, clods and debris in view. They are black if the textures were not baked.
+fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>, seen: &InView) -> Laid {
+    let mut laid = Laid::default();
+    let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
+    let mut add = |mesh: Mesh, material: Material, kind| {
+        let material_of = laid.materials.len() as u32;
+        laid.materials.push(material);
+        laid.kinds.push(kind);
+        laid.parts.push(Part {
+            mesh: Arc::new(mesh),
+            mask: None,
+            material: material_of,
+            tag: Tag::default(),
+            instance: None,
+        });
+    };
+    let mesh = if floor.flat { floor.ground.levelled().mesh(seen) } else { floor.ground.mesh(seen) };
+    let shown = baked.map(|baked| Material::Ground(GroundMaterial::new(baked.ground.clone())));
+    add(mesh, shown.unwrap_or_else(black), PartKind::Soil);
+    for group in clods {
+        let maps = baked.map(|baked| baked.clods[usize::from(group.damp)].clone());
+        let shown = maps.map(|maps| Material::Ground(GroundMaterial::clods(maps, group.tint)));
+        add(group.mesh, shown.unwrap_or_else(black), PartKind::Soil);
+    }
+    // The index counts debris outside the view too, so that a piece has the same appearance whatever is in view.
+    let debris = debris.into_iter().enumerate();
+    for (i, thing) in debris.filter(|(_, thing)| seen.holds(thing.centre.truncate(), thing.radius)) {
+        let Some(baked) = baked else {
+            add(thing.mesh, black(), PartKind::Debris(thing.kind));
+            continue;
+        };
+        let solid = Solid::new(thing.albedo * thing.tint, DEBRIS_SIGMA);
+        let solid = if thing.kind == DebrisKind::Stone { solid } else { solid.porous() };
+        // A stone is uniform; dead plant matter is mottled by decay.
+        let patch = 0.5 * thing.radius.max(1e-3);
+        let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
+        let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
+        let solid = solid.with_dust(baked.dust, thing.dust, DUST_PATCH);
+        // Quantised, so that exporters can merge pieces with the same water film.
+        let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);
+        let solid = solid.moist((moisture * MOISTURE_STEPS).round() / MOISTURE_STEPS);
+        add(thing.mesh, Material::Solid(solid), PartKind::Debris(thing.kind));
+    }
+    laid
+}

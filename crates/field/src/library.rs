@@ -1,0 +1,553 @@
+//! Cache of all files that a scene file names: species, images, models, soil layers, environment maps. Each is read once.
+
+use super::desc::{ModelDesc, SpeciesDesc};
+use super::growing::Growing;
+use super::layer::Layer;
+use super::pictures::{self, Pictures};
+use super::poses;
+use super::shipped::species as shipped_species;
+use super::species_text::SpeciesFile;
+use furrow_base::error::{Kind, Place};
+use furrow_base::geometry::{AlphaMask, Margin};
+use furrow_base::input::{self, Outside, Scope, shipped};
+use furrow_base::math::Spectrum;
+use furrow_base::ron_file::{Pick, RonFile, nearest};
+use furrow_base::{Error, Result};
+use furrow_grow::model::{Model, Up};
+use furrow_grow::soil::LayerDesc;
+use furrow_optics::light::{Infrared, Table};
+use furrow_optics::optics::{Pigments, measured};
+use furrow_optics::sensor::Pose;
+use furrow_optics::texture::{ColorSpace, Header, Height, HeightFromBrightness, Maps, Texture, Wrap};
+use furrow_render::material::{LeafMaterial, Picture, Tones};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+/// Maximum size of a file of poses in bytes: about a million lines.
+const MOST_POSES: u64 = 64 << 20;
+
+/// A leaf image with its opacity mask.
+#[derive(Clone)]
+pub(super) struct Cut {
+    picture: Arc<Picture>,
+    mask: Option<Arc<AlphaMask>>,
+    margin: Option<Arc<Margin>>,
+}
+
+/// One variant of a material: the leaf image that a plant's organ may get, or none.
+pub(super) struct Choice {
+    pub(super) material: LeafMaterial,
+    /// Opacity mask of the blade; `None` if the image is fully opaque or there is none.
+    pub(super) mask: Option<Arc<AlphaMask>>,
+    /// Distance of each point of the blade from the edge of the mask.
+    pub(super) margin: Option<Arc<Margin>>,
+    /// Whether the variant has an image.
+    pub(super) pictured: bool,
+    tones: OnceLock<Arc<Tones>>,
+}
+
+impl Choice {
+    /// Returns the optics of yellowed and dead tissue, computed on first use. `pigments` must be those of this material.
+    pub(super) fn tones(&self, pigments: &Pigments) -> Arc<Tones> {
+        self.tones.get_or_init(|| Arc::new(Tones::new(pigments))).clone()
+    }
+}
+
+/// A species with its materials loaded.
+pub(super) struct Species {
+    pub(super) desc: SpeciesDesc,
+    /// Variants of each material, by the material's name.
+    pub(super) materials: BTreeMap<String, Vec<Choice>>,
+    /// Images of its leaves, as counted by [`Pictures`].
+    pub(super) pictures: Vec<pictures::Picture>,
+}
+
+/// Compares by address: two species read from the same path may differ, because the file may have changed in between.
+impl PartialEq for Species {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+/// Files read so far. The hash covers the contents of every file, in the order of their paths.
+#[derive(Clone, Default)]
+pub(super) struct Library {
+    /// Folders that files may be read from.
+    scope: Scope,
+    files: BTreeMap<PathBuf, [u8; 32]>,
+    /// Leaf images by file and by the bits of `relief_range`, which scales the height map beside the image.
+    pictures: BTreeMap<(PathBuf, u32), Cut>,
+    species: BTreeMap<PathBuf, Arc<Species>>,
+    /// Models by file, by whether their z axis points up, and by whether they may name files outside their folder.
+    models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
+    layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
+    /// Resolved files of soil layers, by the paths of colour and height map in the scene file.
+    layer_files: BTreeMap<(PathBuf, PathBuf), pictures::Picture>,
+    /// Memory that all these images take.
+    pub(super) counted: Pictures,
+    environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
+    /// Warnings about species files, by file: images that look wrong.
+    told: BTreeMap<PathBuf, Vec<String>>,
+    /// Built-in files, by the names that the scene file uses for them.
+    shipped: BTreeMap<String, PathBuf>,
+    /// Changes that an experiment makes to the descriptions of field and species.
+    pub(super) growing: Growing,
+    /// Library of the previous field: its entries are reused if the contents of their files have not changed.
+    before: Option<Arc<Library>>,
+}
+
+impl Library {
+    /// Creates an empty library that reads nothing outside `scope`, whatever its files name.
+    pub(super) fn within(scope: Scope) -> Self {
+        Self { scope, ..Self::default() }
+    }
+
+    /// Returns an empty library that rereads every file, but reuses this library's decoded data for files whose contents are unchanged.
+    pub(super) fn renewed(self) -> Self {
+        let (scope, growing) = (self.scope.clone(), self.growing);
+        let before = Some(Arc::new(Self { before: None, ..self }));
+        Self { scope, growing, before, ..Self::default() }
+    }
+
+    /// Returns the decoded data of the previous library if none of `files` has changed. All that exist must have been noted before.
+    fn kept<T>(&self, files: &[&Path], known: impl FnOnce(&Self) -> Option<T>) -> Option<T> {
+        let before = self.before.as_deref()?;
+        let same = files.iter().all(|file| before.files.get(*file) == self.files.get(*file));
+        if same { known(before) } else { None }
+    }
+
+    /// Resolves a path that `page` names. Returns an error that points into the page if the file does not exist or is outside the scope.
+    pub(super) fn need(&self, page: &RonFile, path: &str) -> Result<PathBuf> {
+        let folder = page.path.parent().unwrap_or(Path::new(""));
+        self.scope.resolve(folder, path).map_err(outside(page, path))?;
+        page.need_file(path)
+    }
+
+    /// Resolves a path that may also be the name of a built-in file. `find` looks the name up; `all` lists the built-in files for
+    /// suggestions. A file of that name beside the page takes precedence (a folder does not), and the lookup happens only if the
+    /// page may name files anywhere.
+    pub(super) fn need_or_shipped(
+        &mut self,
+        page: &RonFile,
+        path: &str,
+        find: impl FnOnce(&str) -> Result<Option<PathBuf>>,
+        all: impl FnOnce() -> Result<Vec<PathBuf>>,
+    ) -> Result<PathBuf> {
+        if let Some(known) = self.shipped.get(path) {
+            return Ok(known.clone());
+        }
+        let beside = page.resolve(path);
+        if self.scope == Scope::Anywhere && shipped::is_bare(path) && (beside.is_dir() || !beside.exists()) {
+            let found = find(path).map_err(|e| page.about(path, e.message(), e.advice().unwrap_or_default()))?;
+            if let Some(full) = found {
+                self.shipped.insert(path.to_owned(), full.clone());
+                return Ok(full);
+            }
+            return self.need(page, path).map_err(|error| likely(error, path, &all().unwrap_or_default()));
+        }
+        self.need(page, path)
+    }
+
+    /// Reads the scene file or species file at `path` and notes its hash.
+    pub(super) fn page(&mut self, path: &Path) -> Result<RonFile> {
+        let page = RonFile::read(path)?;
+        Ok(self.page_of(path, &page.text))
+    }
+
+    /// Notes the hash of `text` as the contents of `path`, and returns the text with its path.
+    pub(super) fn page_of(&mut self, path: &Path, text: &str) -> RonFile {
+        self.files.insert(path.into(), Sha256::digest(text.as_bytes()).into());
+        RonFile { path: path.into(), text: text.to_owned() }
+    }
+
+    /// Returns the paths of all files that were read, sorted.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        self.files.keys().cloned().collect()
+    }
+
+    /// Returns the names that the scene file uses for built-in files, with the paths of those files.
+    pub(super) fn shipped(&self) -> BTreeMap<String, PathBuf> {
+        self.shipped.clone()
+    }
+
+    /// Returns the warnings about the species files that were read, in the order of their paths.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        self.told.values().flatten().cloned().collect()
+    }
+
+    /// Returns the SHA-256 of the contents of all files that were read, in hex. Paths are not hashed, so a moved project keeps its hash.
+    pub(super) fn hash(&self) -> String {
+        let mut all = Sha256::new();
+        for digest in self.files.values() {
+            all.update(digest);
+        }
+        hex::encode(all.finalize())
+    }
+
+    /// Returns the species that `page` names.
+    pub(super) fn species(&mut self, page: &RonFile, path: &str) -> Result<Arc<Species>> {
+        let full = self.need_or_shipped(page, path, shipped_species, shipped::species_files)?;
+        if let Some(known) = self.species.get(&full) {
+            self.counted.again(&known.pictures);
+            return Ok(known.clone());
+        }
+        let file = self.species_file(&full)?;
+        let species = self.species_of(&full, &file).map_err(|error| file.locate(error))?;
+        self.species.insert(full, species.clone());
+        Ok(species)
+    }
+
+    /// Loads the species of a file that was read from `full`. The position of an error refers to the merged text of the file.
+    fn species_of(&mut self, full: &Path, file: &SpeciesFile) -> Result<Arc<Species>> {
+        let own = file.page();
+        let mut desc: SpeciesDesc = own.parse_all()?;
+        file.check_materials(&desc)?;
+        let (mut cuts, mut pictures): (Vec<Vec<Cut>>, Vec<pictures::Picture>) = (Vec::new(), Vec::new());
+        for leaf in desc.materials.values() {
+            let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
+            let range = leaf.relief_range.f32();
+            let mut all = Vec::new();
+            for path in paths {
+                let (cut, picture) = self.picture(own, path, range)?;
+                pictures.push(picture);
+                // Calibrated images hold reflectances, as `trace texture` paints them, and need no check.
+                if !leaf.calibrated {
+                    self.told.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
+                }
+                all.push(cut);
+            }
+            cuts.push(all);
+        }
+        let known = |before: &Self| {
+            let held = |cut: &Cut| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
+            cuts.iter().flatten().all(held).then(|| before.species.get(full).cloned())?
+        };
+        let files: Vec<&Path> = file.sources().iter().map(|source| source.path.as_path()).collect();
+        if let Some(known) = self.kept(&files, known) {
+            return Ok(known);
+        }
+        let mut materials = BTreeMap::new();
+        for ((name, leaf), cuts) in desc.materials.iter().zip(cuts) {
+            let mut choices = Vec::new();
+            for Cut { picture, mask, margin } in cuts {
+                let material = LeafMaterial::new(leaf, Some(picture));
+                choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
+            }
+            if choices.is_empty() {
+                let material = LeafMaterial::new(leaf, None);
+                choices.push(Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() });
+            }
+            materials.insert(name.clone(), choices);
+        }
+        if let Some(change) = self.growing.species {
+            change(&mut desc);
+        }
+        Ok(Arc::new(Species { desc, materials, pictures }))
+    }
+
+    /// Returns a leaf image, and its key among the counted images.
+    fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<(Cut, pictures::Picture)> {
+        let full = self.need(page, path)?;
+        // The height map is the file beside the image that ends in .height.png; without it the relief is derived from brightness.
+        let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
+        let relief = beside.is_file();
+        let counted = (full.clone(), if relief { beside.clone() } else { PathBuf::new() }, relief_range.to_bits());
+        self.counted.count(&counted, Header::leaf).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
+        let key = (full.clone(), relief_range.to_bits());
+        if let Some(known) = self.pictures.get(&key) {
+            return Ok((known.clone(), counted));
+        }
+        self.note(&full)?;
+        if relief {
+            self.note(&beside)?;
+        }
+        if let Some(known) = self.kept(&[&full, &beside], |before| before.pictures.get(&key).cloned()) {
+            self.pictures.insert(key, known.clone());
+            return Ok((known, counted));
+        }
+        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
+        let maps = if relief {
+            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
+        } else {
+            Maps::derive(&color, &HeightFromBrightness::LEAF)
+        };
+        let mask = color.alpha_mask().map(Arc::new);
+        let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
+        let cut = Cut { picture: Arc::new(Picture { color, maps }), mask, margin };
+        self.pictures.insert(key, cut.clone());
+        Ok((cut, counted))
+    }
+
+    /// Returns the model that `page` names, loaded with the files that it refers to.
+    pub(super) fn model(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<Arc<Model>> {
+        let path = desc.file.as_str();
+        let full = self.need(page, path)?;
+        let key = (full.clone(), desc.up == Up::Z, desc.allow_outside);
+        if let Some(known) = self.models.get(&key) {
+            self.counted.note(counted_model(&key), known.pictures);
+            return Ok(known.clone());
+        }
+        let lifted = desc.allow_outside.then_some(&self.scope);
+        let model = if let Some(known) = self.model_before(&key) {
+            known
+        } else {
+            let model = Model::load_within(&full, desc.up, lifted, self.counted.allowance());
+            Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
+        };
+        // Hashes of the bytes that the model was loaded from: the files may have changed since.
+        self.files.extend(model.files.iter().map(|(file, digest)| (file.clone(), *digest)));
+        self.counted.note(counted_model(&key), model.pictures);
+        self.models.insert(key, model.clone());
+        Ok(model)
+    }
+
+    /// Returns the key under which the images of the model that `page` names are counted.
+    pub(super) fn model_pictures(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<pictures::Picture> {
+        self.model(page, desc)?;
+        let full = self.need(page, &desc.file)?;
+        Ok(counted_model(&(full, desc.up == Up::Z, desc.allow_outside)))
+    }
+
+    /// Returns the previous library's model if the contents of its files are unchanged.
+    fn model_before(&self, key: &(PathBuf, bool, bool)) -> Option<Arc<Model>> {
+        let before = self.before.as_deref()?;
+        let known = before.models.get(key)?;
+        let same = |(file, known): (&PathBuf, &[u8; 32])| digest(file).is_ok_and(|digest| digest == *known);
+        known.files.iter().all(same).then(|| known.clone())
+    }
+
+    /// Notes the hash of an environment map that `page` names, even if the current field does not use it.
+    pub(super) fn environment_map_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
+        let full = self.need(page, path)?;
+        if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
+    }
+
+    /// Returns the environment map that `page` names.
+    pub(super) fn environment_map(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
+        let full = self.need(page, path)?;
+        let key = (full.clone(), infrared);
+        if let Some(known) = self.environment_maps.get(&key) {
+            return Ok(known.clone());
+        }
+        self.environment_map_file(page, path)?;
+        if let Some(known) = self.kept(&[&full], |before| before.environment_maps.get(&key).cloned()) {
+            self.environment_maps.insert(key, known.clone());
+            return Ok(known);
+        }
+        self.counted.check_panorama(&full).map_err(|error| at_its_place(page, path, IMAGE_HELP, error))?;
+        let table = Arc::new(Table::load(&full, infrared).map_err(|error| {
+            let help = "name an equirectangular .exr or .hdr; `nir` sets the source of near infrared: Channel, Sky or OfRed(0.8)";
+            at_its_place(page, path, help, error)
+        })?);
+        self.environment_maps.insert(key, table.clone());
+        Ok(table)
+    }
+
+    /// Reads the file of poses that `page` names: times in seconds, and poses.
+    pub(super) fn poses(&mut self, page: &RonFile, path: &str) -> Result<Vec<(f64, Pose)>> {
+        let full = self.need(page, path)?;
+        let bytes = input::read(&full, MOST_POSES).map_err(|refusal| refusal.into_error(&full))?;
+        self.files.insert(full.clone(), Sha256::digest(&bytes).into());
+        poses::read(&bytes).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+    }
+
+    /// Returns the band means of the soil spectrum that `page` names.
+    pub(super) fn soil_spectrum(&mut self, page: &RonFile, path: &str) -> Result<Spectrum> {
+        let full = self.need(page, path)?;
+        let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
+        self.files.insert(full.clone(), Sha256::digest(&bytes).into());
+        let text = String::from_utf8_lossy(&bytes);
+        measured::reflectance(&text).map_err(|e| at_its_place(page, path, "", e.in_file(full)))
+    }
+
+    /// Resolves the texture files of a soil layer, counts them, and returns their key among the counted images.
+    pub(super) fn layer_pictures(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<pictures::Picture> {
+        let key = (desc.albedo.clone(), desc.height.clone());
+        if let Some(known) = self.layer_files.get(&key) {
+            self.counted.again(std::slice::from_ref(known));
+            return Ok(known.clone());
+        }
+        let mut need = |path: &Path| {
+            let text = path.to_string_lossy();
+            self.need_or_shipped(page, &text, shipped::soil_texture, shipped::soil_textures)
+        };
+        let albedo = need(&desc.albedo)?;
+        let height = if desc.height.as_os_str().is_empty() { PathBuf::new() } else { need(&desc.height)? };
+        let files = (albedo, height, 0);
+        self.counted.count(&files, Header::layer).map_err(|e| {
+            let of_height = e.place().is_some_and(|place| place.file == files.1);
+            let named = if of_height { &desc.height } else { &desc.albedo };
+            at_its_place(page, &named.to_string_lossy(), IMAGE_HELP, e)
+        })?;
+        self.layer_files.insert(key, files.clone());
+        Ok(files)
+    }
+
+    /// Returns the textures of a soil layer.
+    pub(super) fn layer(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<Arc<Layer>> {
+        let key = (desc.albedo.clone(), desc.height.clone());
+        let (albedo, height, _) = self.layer_pictures(page, desc)?;
+        if let Some(known) = self.layers.get(&key) {
+            return Ok(known.clone());
+        }
+        let height = (!height.as_os_str().is_empty()).then_some(height);
+        let files: Vec<&Path> = std::iter::once(&albedo).chain(&height).map(PathBuf::as_path).collect();
+        for file in &files {
+            self.note(file)?;
+        }
+        if let Some(known) = self.kept(&files, |before| before.layers.get(&key).cloned()) {
+            self.layers.insert(key, known.clone());
+            return Ok(known);
+        }
+        let wrong = |named: &Path, error| at_its_place(page, &named.to_string_lossy(), IMAGE_HELP, error);
+        let albedo = Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| wrong(&desc.albedo, e))?;
+        let albedo = albedo.wrapped(Wrap::Repeat);
+        let height = match height {
+            None => read_off(&albedo),
+            Some(height) => Height::load(&height, 1.0).map_err(|e| wrong(&desc.height, e))?,
+        };
+        let layer = Arc::new(Layer::new(albedo, height.wrapped(Wrap::Repeat)));
+        self.layers.insert(key, layer.clone());
+        Ok(layer)
+    }
+
+    fn note(&mut self, path: &Path) -> Result<()> {
+        self.files.insert(path.into(), digest(path)?);
+        Ok(())
+    }
+}
+
+/// Returns the key under which the images of a model are counted.
+fn counted_model((file, z_up, outside): &(PathBuf, bool, bool)) -> pictures::Picture {
+    (file.clone(), PathBuf::new(), u32::from(*z_up) + 2 * u32::from(*outside))
+}
+
+/// Returns the SHA-256 of a file's contents.
+fn digest(path: &Path) -> Result<[u8; 32]> {
+    let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
+    Ok(Sha256::digest(&bytes).into())
+}
+
+/// Returns a function that makes the error about a path in `page` that leads outside the scope.
+fn outside(page: &RonFile, literal: &str) -> impl FnOnce(Outside) -> Error {
+    move |outside| page.about(literal, outside.to_string(), outside.help)
+}
+
+/// Adds a suggestion to the error about a missing file: the built-in file with the most similar name.
+fn likely(error: Error, path: &str, shipped: &[PathBuf]) -> Error {
+    let names: Vec<&str> = shipped.iter().filter_map(|file| file.file_name()?.to_str()).collect();
+    let advice = error.advice().unwrap_or_default();
+    match nearest(&names, path) {
+        Some(near) if !advice.starts_with("did you mean") => {
+            let help = format!("did you mean `{near}`, which ships? {advice}");
+            error.help(help)
+        }
+        _ => error,
+    }
+}
+
+/// Derives heights between 0 and 1 from a soil's brightness, for an image without a height map.
+fn read_off(albedo: &Texture) -> Height {
+    let height = Maps::derive(albedo, &HeightFromBrightness::SOIL).height;
+    let (columns, rows) = height.size();
+    let unit = |h: &f32| (0.5 + 0.5 * h / HeightFromBrightness::SOIL.amplitude).clamp(0.0, 1.0);
+    Height::from_values(columns, rows, height.values().iter().map(unit).collect())
+}
+
+/// Minimum share of a blade image's opaque pixels that must be connected to the leaf base; the rest are specks.
+const WHOLE: f64 = 0.95;
+
+/// Returns a warning if a leaf image has no transparent pixels, or if too few opaque pixels are connected to the leaf base.
+fn unlikely(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
+    let Some(mask) = mask else {
+        return Some(format!(
+            "{path} has no transparent pixels, so the blade is the whole rectangle; cut the leaf out"
+        ));
+    };
+    let share = mask.hanging().count() as f64 / mask.count().max(1) as f64;
+    (share < WHOLE).then(|| {
+        format!(
+            "{path}: {:.0} % of its opaque pixels are not connected to the leaf base in the middle of the lower edge; \
+             use one leaf per image, with its base at the bottom",
+            100.0 * (1.0 - share)
+        )
+    })
+}
+
+/// Help text of errors about images that cannot be used.
+const IMAGE_HELP: &str = "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron";
+
+/// Help text of errors about models that cannot be used, if the error has none of its own.
+const MODEL_HELP: &str = "export it again from the program that made it";
+
+/// Moves an input error about an image or a model to the place in the scene file that names the file. Adds `help` if the error has
+/// no help text of its own.
+fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Error {
+    match error.place() {
+        Some(Place { file, span: None }) if error.kind() == Kind::Input => {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let message = format!("`{name}` cannot be used: {}", error.message());
+            page.about(literal, message, error.advice().unwrap_or(help))
+        }
+        _ => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: two species may share an image and give different heights of its relief. Expected: heights in the ratio of the two
+    /// values. Source: the definition of `relief_range`.
+    #[test]
+    fn one_picture_has_the_relief_that_each_material_gives_it() {
+        let page = RonFile::of("Species()");
+        let mut library = Library::default();
+        let mut highest = |range: f32| {
+            let (cut, _) = library
+                .picture(&page, concat!(env!("CARGO_MANIFEST_DIR"), "/../../textures/leaf/sugar_beet.png"), range)
+                .unwrap();
+            cut.picture.maps.height.values().iter().fold(0.0_f32, |most, h| most.max(h.abs()))
+        };
+        let (low, high, again) = (highest(0.01), highest(0.04), highest(0.01));
+        assert!(low > 0.0 && (high / low - 4.0).abs() < 0.1, "{low} {high}");
+        assert_eq!(low, again);
+    }
+
+    /// Rationale: saving a scene file again must not decode its textures again, and must never show an outdated one. Expected: the
+    /// identical object if the file's contents are unchanged, a new one otherwise; the same hash as a library without a predecessor.
+    #[test]
+    fn what_did_not_change_is_not_decoded_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("leaf.png");
+        let leaves = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../textures/leaf");
+        let copy = |name: &str| std::fs::copy(leaves.join(format!("{name}.png")), &path).unwrap();
+        copy("sugar_beet");
+        let page = RonFile { path: folder.path().join("page.ron"), text: "Species()".to_owned() };
+        let read = |library: &mut Library| library.picture(&page, "leaf.png", 0.02).unwrap().0.picture;
+        let mut first = Library::default();
+        let picture = read(&mut first);
+        let mut second = first.clone().renewed();
+        assert!(Arc::ptr_eq(&picture, &read(&mut second)));
+        assert_eq!(first.hash(), second.hash());
+        copy("galium");
+        let mut third = second.renewed();
+        assert!(!Arc::ptr_eq(&picture, &read(&mut third)));
+        let mut fresh = Library::default();
+        read(&mut fresh);
+        assert_eq!(third.hash(), fresh.hash());
+    }
+
+    #[test]
+    fn a_soil_photograph_without_a_height_map_gets_one() {
+        let texel =
+            |i: u32| if (i / 8 + i / 64 / 8).is_multiple_of(2) { [150, 120, 90, 255] } else { [90, 70, 50, 255] };
+        let pixels: Vec<u8> = (0..64 * 64).flat_map(texel).collect();
+        let height = read_off(&Texture::from_rgba8(64, 64, &pixels, ColorSpace::Srgb).wrapped(Wrap::Repeat));
+        assert!(height.values().iter().all(|h| (0.0..=1.0).contains(h)));
+        let (low, high) = height.values().iter().fold((1.0_f32, 0.0_f32), |(l, h), v| (l.min(*v), h.max(*v)));
+        assert!(low < 0.35 && high > 0.65, "{low} to {high}: bright texels should be high, dark ones low");
+    }
+}

@@ -1,0 +1,92 @@
+//! Code shared by both formats: validation and normalisation of meshes, and error messages.
+
+use super::parts::MOST_TRIANGLES;
+use furrow_base::geometry::Mesh;
+use furrow_base::math::{DMat4, Vec2, Vec3};
+
+/// Clamps to 0..1; NaN becomes 0.
+pub(super) fn fraction(x: f32) -> f32 {
+    if x > 0.0 { x.min(1.0) } else { 0.0 }
+}
+
+/// Transforms a part into the model's frame and checks it. Returns an error message for an invalid mesh.
+pub(super) fn settle(mesh: &mut Mesh, to: &DMat4, name: &str) -> Result<(), String> {
+    // Exact, so that meshes exported by this program are read back bit-identically.
+    if *to != DMat4::IDENTITY {
+        let mirrored = to.determinant() < 0.0;
+        let normals = to.inverse().transpose();
+        for p in &mut mesh.positions {
+            *p = to.transform_point3(p.as_dvec3()).as_vec3();
+        }
+        for n in &mut mesh.normals {
+            *n = normals.transform_vector3(n.as_dvec3()).as_vec3();
+        }
+        if mirrored {
+            for t in &mut mesh.triangles {
+                t.swap(1, 2);
+            }
+        }
+    }
+    if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return Err(format!("vertex {i} of `{name}` is not a finite number"));
+    }
+    let unit = |n: &Vec3| (n.length_squared() - 1.0).abs() <= 1e-3;
+    if !mesh.normals.iter().all(unit) {
+        for n in &mut mesh.normals {
+            *n = n.normalize_or_zero();
+        }
+        // Scans contain vertices without a normal.
+        if !mesh.normals.iter().all(unit) {
+            mesh.recompute_normals();
+        }
+    }
+    mesh.fault().map_or(Ok(()), |fault| Err(format!("`{name}`: {fault}")))
+}
+
+/// Makes a mesh without normals faceted: every triangle gets its own vertices.
+pub(super) fn faceted(mesh: &mut Mesh) {
+    let corners: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    mesh.positions = corners.iter().map(|i| mesh.positions[*i as usize]).collect();
+    mesh.uvs = corners.iter().map(|i| mesh.uvs[*i as usize]).collect();
+    mesh.triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    mesh.recompute_normals();
+}
+
+/// Shifts the texture coordinates of an alpha-masked surface with a repeating texture into the one tile that its mask
+/// covers. Returns an error message if they span several tiles.
+pub(super) fn into_one_tile(uvs: &mut [Vec2], name: &str) -> Result<(), String> {
+    let Some(low) = uvs.iter().copied().reduce(Vec2::min) else { return Ok(()) };
+    let high = uvs.iter().copied().fold(low, Vec2::max);
+    // Tolerance of 10⁻³ for writers that round.
+    let tile = (low + 1e-3).floor();
+    if (high - tile).max_element() > 1.001 {
+        return Err(format!(
+            "the texture coordinates of `{name}`, which has an alpha mask, run from {:.2}, {:.2} to {:.2}, {:.2}: they must be within one tile",
+            low.x, low.y, high.x, high.y
+        ));
+    }
+    if tile != Vec2::ZERO {
+        for uv in uvs {
+            *uv -= tile;
+        }
+    }
+    Ok(())
+}
+
+/// Error in a file.
+pub(super) struct Wrong {
+    pub(super) what: String,
+    /// Advice; empty if only a new export helps.
+    pub(super) help: &'static str,
+}
+
+impl From<String> for Wrong {
+    fn from(what: String) -> Self {
+        Self { what, help: "" }
+    }
+}
+
+/// Returns the error for a file with too many triangles.
+pub(super) fn too_many_triangles() -> Wrong {
+    Wrong { what: format!("it has more than {MOST_TRIANGLES} triangles"), help: "simplify it in your program" }
+}

@@ -1,0 +1,45 @@
+//! Flowers, heads, ears, tassels, pods and berries: a few parametric meshes for many species.
+//!
+//! | file | shape | organs |
+//! |---|---|---|
+//! | `corolla` | rings of sepals and petals around stamens and ovary | flower, bud |
+//! | `head` | a composite's disc of florets with bracts and rays | head, bud |
+//! | `spike` | spikelets or florets along a rachis, with awns | ear |
+//! | `cob` | a maize ear in its husks, with silks | ear |
+//! | `panicle` | a tassel: a rachis and its branches with spikelets | tassel |
+//! | `fruit` | pods, silicles and capsules; berries | pod, berry |
+//! | `desc` | descriptions in species files | |
+//! | `pen`, `ring` | mesh primitives shared by all of them | |
+//!
+//! To add a shape, write a file with a `grow`, add a variant to [`FlowerDesc`] with its lines in `desc`, and a line to [`grow`].
+
+mod cob;
+mod corolla;
+pub(super) mod desc;
+mod fruit;
+pub(super) mod head;
+mod panicle;
+pub(super) mod pen;
+mod ring;
+mod spike;
+
+use desc::{Bloom, FlowerDesc};
+use furrow_base::sampling::Stream;
+use pen::Pen;
+
+/// Builds the meshes of one flower, inflorescence or fruit.
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+    match flower {
+        FlowerDesc::Corolla { .. } => corolla::grow(flower, bloom, pen, stream),
+        FlowerDesc::Head { .. } => head::grow(flower, bloom, pen, stream),
+        FlowerDesc::Spike { .. } => spike::grow(flower, bloom, pen, stream),
+        FlowerDesc::Cob { .. } => cob::grow(flower, bloom, pen, stream),
+        FlowerDesc::Panicle { .. } => panicle::grow(flower, bloom, pen, stream),
+        FlowerDesc::Pod { .. } => fruit::pod(flower, bloom, pen),
+        FlowerDesc::Capsule { .. } => fruit::capsule(flower, bloom, pen, stream),
+        FlowerDesc::Berry { .. } => fruit::berry(flower, bloom, pen, stream),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,288 @@
+//! Baked texture of the ground: colour, wetness and all relief that is finer than its grid.
+
+use super::blend::Weights;
+use super::crumb::Raster;
+use super::ground::blur;
+use super::{Ground, LayerMaps, MAX_LAYERS};
+use furrow_base::math::{Spectrum, Vec2, Vec3, vec2};
+use furrow_optics::optics::LostRelief;
+use rayon::prelude::*;
+
+/// Texture over [`Ground::area`], with row 0 in the south, so that [`Ground::uv`] addresses it with v increasing with
+/// the rows. All vectors hold `width · height` texels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundMaps {
+    /// Number of texels along x.
+    pub width: usize,
+    /// Number of texels along y.
+    pub height: usize,
+    /// South-west corner of the first texel, metres.
+    pub origin: Vec2,
+    /// Side of a texel, metres.
+    pub texel_m: f32,
+    /// Linear reflectance R, G, B of the dry soil, each stored as 255·√reflectance; see [`GroundMaps::decode`].
+    pub albedo: Vec<[u8; 3]>,
+    /// Weight of each layer times 255.
+    pub weights: Vec<[u8; MAX_LAYERS]>,
+    /// Moisture: 0 air-dry, 255 saturated.
+    pub moisture: Vec<u8>,
+    /// Slope ∂z/∂x, ∂z/∂y to add to that of the mesh's shading normal, times [`GroundMaps::SLOPE_STEPS`].
+    pub slope: Vec<[i8; 2]>,
+    /// Ambient occlusion by relief finer than the mesh: visible fraction of the sky times 255.
+    pub ao: Vec<u8>,
+    /// Mean reflectance of the dry soil; its ratio of NIR to red applies to every texel.
+    pub like: Spectrum,
+    /// Relief that is in neither the mesh nor the maps; `None` at full detail.
+    pub lost: Option<LostRelief>,
+}
+
+impl GroundMaps {
+    /// Number of steps of [`GroundMaps::slope`] per unit of slope.
+    pub const SLOPE_STEPS: f32 = 60.0;
+
+    /// Returns the reflectance of a stored albedo.
+    pub fn decode(albedo: [u8; 3]) -> [f32; 3] {
+        albedo.map(|a| (f32::from(a) / 255.0).powi(2))
+    }
+
+    fn encode(albedo: [f32; 3]) -> [u8; 3] {
+        albedo.map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0) as u8)
+    }
+}
+
+/// Depth of a pit between crumbs that hides half of the sky, metres; for coarse ground [`Ground::shade`] computes it.
+pub(super) const HALF_SKY_M: f32 = 0.0005;
+
+/// Side of the material texture of clods, metres (see [`Ground::fabric`]): larger than the longest clod of usual scene
+/// files.
+const FABRIC_M: f32 = 0.12;
+
+/// Increase of the moisture in such a pit.
+const PIT_WETTING: f32 = 0.2;
+
+/// Maps of the ground before ambient occlusion and moisture are computed from its pits.
+pub(super) struct Painted {
+    pub(super) maps: GroundMaps,
+    /// Depth of each texel below its surroundings, metres; 0 where it is not below them.
+    pub(super) pits: Vec<f32>,
+    /// Fraction of the ground's moisture that its crumb has lost, times 255.
+    dry: Vec<u8>,
+    /// Number of texels along each step of the grid.
+    split: usize,
+}
+
+/// Darkening of a ground by pits and missing relief.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shade {
+    /// Depth of a pit that hides half of the sky, metres.
+    pub(super) sky: f32,
+    /// Depth of a pit that keeps all of its wetness, metres.
+    pub(super) wet: f32,
+    /// Relief that is in neither the mesh nor the pits.
+    pub(super) lost: Option<LostRelief>,
+}
+
+impl Shade {
+    /// Values at full detail.
+    pub(super) const FULL: Self = Self { sky: HALF_SKY_M, wet: HALF_SKY_M, lost: None };
+}
+
+impl Painted {
+    /// Returns the texel at a point, and the slope there, bilinearly interpolated between four texel centres as in a
+    /// texture lookup.
+    pub(super) fn at(&self, p: Vec2) -> (usize, Vec2) {
+        let GroundMaps { slope, width, height, origin, texel_m, .. } = &self.maps;
+        let index = |x: f32, count: usize| (x.max(0.0) as usize).min(count - 1);
+        let q = (p - *origin) / *texel_m;
+        let nearest = index(q.y, *height) * width + index(q.x, *width);
+        let (floor, t) = ((q - 0.5).floor(), (q - 0.5).fract());
+        let at = |i: f32, j: f32| Vec2::from(slope[index(j, *height) * width + index(i, *width)].map(f32::from));
+        let row = |j: f32| at(floor.x, j).lerp(at(floor.x + 1.0, j), t.x);
+        (nearest, row(floor.y).lerp(row(floor.y + 1.0), t.y) / GroundMaps::SLOPE_STEPS)
+    }
+
+    /// Returns the fraction of the moisture that the crumb of a texel has left.
+    pub(super) fn left(&self, k: usize) -> f32 {
+        1.0 - f32::from(self.dry[k]) / 255.0
+    }
+}
+
+/// Returns the reciprocal of the fraction of the sky that is visible from a pit.
+pub(super) fn closing(pit: f32, half: f32) -> f32 {
+    1.0 + pit / half
+}
+
+/// Returns the fraction of the pits' additional wetness that a pit keeps.
+pub(super) fn wet(pit: f32, full: f32) -> f32 {
+    (pit / full).min(1.0)
+}
+
+impl Ground {
+    /// Bakes the texture with texels of at most `texel_m`; `maps` are those that the ground was built with.
+    pub fn bake<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> GroundMaps {
+        let clods = self.lost_clods(maps, texel_m);
+        let painted = self.paint(maps, texel_m, clods.laid);
+        let shade = self.shade(maps, &painted, &clods);
+        self.finish(painted, shade)
+    }
+
+    /// Bakes everything except ambient occlusion and moisture; `laid` as in [`Ground::crumbs`].
+    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, laid: f32) -> Painted {
+        let area = self.area();
+        // Texels divide the grid's steps evenly, so that the area consists of whole texels and each is in one cell.
+        let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
+        let texel = self.step / split as f32;
+        let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
+        let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
+        let n = width * height;
+        let mut baked = GroundMaps {
+            width,
+            height,
+            origin: area.corners()[0],
+            texel_m: texel,
+            albedo: vec![[0; 3]; n],
+            weights: vec![[0; MAX_LAYERS]; n],
+            moisture: Vec::new(),
+            slope: Vec::new(),
+            ao: Vec::new(),
+            like: self.color.like,
+            lost: None,
+        };
+        let look = self.look();
+        let crumbs = self.crumbs(raster, laid);
+        let mut detail = crumbs.height;
+        let rows = (
+            detail.par_chunks_mut(width),
+            baked.albedo.par_chunks_mut(width),
+            baked.weights.par_chunks_mut(width),
+            crumbs.tint.par_chunks(width),
+        );
+        rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints))| {
+            for i in 0..width {
+                let p = raster.origin + vec2(i as f32, j as f32) * texel;
+                let cell = self.texel_cell(i, j, split);
+                let mut noise = [0.0; MAX_LAYERS];
+                for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                    *n = cell.mix(|v| self.fine.noise[v][i]);
+                }
+                let heights = self.blend.heights(maps, p);
+                let share = self.blend.weights(noise, heights);
+                detail[i] += self.blend.displacement(share, heights);
+                let tint = match tints[i] {
+                    0 => 1.0,
+                    t => f32::from(t) / 128.0,
+                };
+                let tone = tint * cell.mix(|v| look.tone[v]);
+                albedo[i] = GroundMaps::encode(self.dry(maps, share, p).map(|a| a * tone));
+                weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
+            }
+        });
+        self.bake_slopes(raster, split, &detail, &mut baked);
+        Painted { maps: baked, pits: self.pits(raster, split, detail), dry: crumbs.dry, split }
+    }
+
+    /// Bakes the material of clods: a square of 12 cm of the ground's soil without crumbs or relief and with uniform
+    /// `moisture`, 0..1. Each clod samples it at its own offset.
+    pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> GroundMaps {
+        let side = ((FABRIC_M / texel_m) as usize).clamp(16, 1024);
+        let texel = FABRIC_M / side as f32;
+        let n = side * side;
+        let rest = |p: Vec2| {
+            let mut noise = [0.0; MAX_LAYERS];
+            for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
+                *n = self.blend.noise(i, p);
+            }
+            (p, self.blend.weights(noise, self.blend.heights(maps, p)))
+        };
+        let place = |k: usize| vec2((k % side) as f32 + 0.5, (k / side) as f32 + 0.5) * texel;
+        let (albedo, weights) = (0..n)
+            .into_par_iter()
+            .map(|k| rest(place(k)))
+            .map(|(p, w)| (GroundMaps::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5) as u8)))
+            .unzip();
+        GroundMaps {
+            width: side,
+            height: side,
+            origin: Vec2::ZERO,
+            texel_m: texel,
+            albedo,
+            weights,
+            moisture: vec![(moisture.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; n],
+            slope: vec![[0; 2]; n],
+            ao: vec![255; n],
+            like: self.color.like,
+            lost: None,
+        }
+    }
+
+    /// Returns the reflectance of the dry soil where the layers have the weights `share`.
+    fn dry<L: LayerMaps>(&self, maps: &[L], share: Weights, p: Vec2) -> [f32; 3] {
+        let painted = self.blend.albedo(maps, share, p);
+        std::array::from_fn(|k| painted[k] * self.color.gain[k])
+    }
+
+    /// Returns the texture coordinates in [`Ground::fabric`] of a vertex of a body with the offset `from`. The square
+    /// continues mirrored.
+    pub(super) fn fabric_uv(from: Vec2, p: Vec3) -> Vec2 {
+        // The projection is slanted, so that vertical faces show no streaks.
+        let leaning = p.truncate() + vec2(0.8, 0.6) * p.z;
+        let fold = |x: f32| {
+            let t = x.rem_euclid(2.0);
+            if t > 1.0 { 2.0 - t } else { t }
+        };
+        let q = (leaning + from) / FABRIC_M;
+        vec2(fold(q.x), fold(q.y))
+    }
+
+    /// Computes the slopes of the detail, minus those already in the mesh's normals.
+    fn bake_slopes(&self, raster: Raster, split: usize, detail: &[f32], baked: &mut GroundMaps) {
+        let coarse = differences(&self.fine.detail, self.raster());
+        let slope = |(k, fine): (usize, Vec2)| {
+            let cell = self.texel_cell(k % raster.width, k / raster.width, split);
+            let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
+            let rest = (fine - mesh).clamp_length_max(2.0) * GroundMaps::SLOPE_STEPS;
+            [rest.x as i8, rest.y as i8]
+        };
+        baked.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
+    }
+
+    /// Returns the depth of each texel below the mean of its surroundings, metres.
+    fn pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>) -> Vec<f32> {
+        let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
+        detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
+        let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
+        detail.par_iter_mut().zip(around).for_each(|(d, around)| *d = (around - *d).max(0.0));
+        detail
+    }
+
+    /// Computes ambient occlusion and moisture: pits see less of the sky and dry later; crumbs dry first.
+    fn finish(&self, painted: Painted, shade: Shade) -> GroundMaps {
+        let Shade { sky, wet: full, lost } = shade;
+        let moistures = &self.look().moisture;
+        let width = painted.maps.width;
+        let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5) as u8;
+        let moisture = |k: usize| {
+            let cell = self.texel_cell(k % width, k / width, painted.split);
+            let wet = cell.mix(|v| moistures[v]) + PIT_WETTING * wet(painted.pits[k], full);
+            ((wet * painted.left(k)).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+        };
+        let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
+        GroundMaps { moisture, ao, lost, ..painted.maps }
+    }
+}
+
+fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {
+    let (w, h) = (raster.width, raster.height);
+    let difference = |k: usize| {
+        let (i, j) = (k % w, k / w);
+        let (south, north) = (j.saturating_sub(1), (j + 1).min(h - 1));
+        let (west, east) = (i.saturating_sub(1), (i + 1).min(w - 1));
+        let v = |i: usize, j: usize| values[j * w + i];
+        let d = vec2(
+            (v(east, j) - v(west, j)) / (east - west).max(1) as f32,
+            (v(i, north) - v(i, south)) / (north - south).max(1) as f32,
+        );
+        d / raster.step
+    };
+    (0..values.len()).into_par_iter().map(difference).collect()
+}

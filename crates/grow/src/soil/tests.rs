@@ -1,0 +1,432 @@
+//! Tests of the ground as a whole: invariants across its parts.
+
+use super::*;
+use furrow_base::geometry::Mesh;
+use furrow_base::math::Vec3;
+use furrow_base::ron_file::{Num, Vary};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Wavy layers with different heights and colours.
+struct Waves(f32, [f32; 3]);
+
+impl LayerMaps for Waves {
+    fn height(&self, uv: Vec2) -> f32 {
+        0.5 + 0.5 * (std::f32::consts::TAU * self.0 * uv.x).sin() * (std::f32::consts::TAU * self.0 * uv.y).cos()
+    }
+    fn albedo(&self, _: Vec2) -> [f32; 3] {
+        self.1
+    }
+}
+
+const MAPS: [Waves; 2] = [Waves(20.0, [1.0, 0.0, 0.0]), Waves(7.0, [0.0, 1.0, 0.0])];
+
+fn page() -> SoilDesc {
+    ron::from_str(
+        r#"(layers: [
+            (albedo: "a", height: "b", size_m: 0.3, height_mm: (-1, 1)),
+            (albedo: "c", height: "d", size_m: 0.4, height_mm: (4, 8)),
+        ], stones: [(cover: 0.03)], litter: (straw_cover: 0.02, sticks_per_m2: 20))"#,
+    )
+    .unwrap()
+}
+
+fn site(size: f32) -> Site {
+    Site {
+        area: Rect::new(-size, -size, size, size),
+        grid_m: 0.001,
+        margin_m: 0.5,
+        growth: 1.3,
+        level_m: f32::INFINITY,
+        smallest_mm: 0.0,
+        rows: None,
+    }
+}
+
+fn stream() -> Stream {
+    Stream::of(21, 4, Purpose::Soil, 0)
+}
+
+fn ground(desc: &SoilDesc, size: f32) -> Ground {
+    Ground::new(desc, &[], &MAPS, &site(size), &stream()).unwrap()
+}
+
+fn root(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
+}
+
+/// Returns the connected components of a mesh.
+fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
+    let mut parent: Vec<usize> = (0..mesh.positions.len()).collect();
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| root(&mut parent, i as usize));
+        parent[b] = a;
+        parent[c] = a;
+    }
+    let mut all: BTreeMap<usize, Vec<Vec3>> = BTreeMap::new();
+    for i in 0..mesh.positions.len() {
+        let r = root(&mut parent, i);
+        all.entry(r).or_default().push(mesh.positions[i]);
+    }
+    all.into_values().collect()
+}
+
+#[test]
+fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
+    let ground = ground(&page(), 0.06);
+    let mesh = ground.mesh(&InView::ALL);
+    assert_eq!(mesh.fault(), None);
+    for t in mesh.triangles.iter().step_by(97) {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        assert!((b - a).cross(c - a).z > 0.0);
+        let p = a * 0.2 + b * 0.5 + c * 0.3;
+        assert!((ground.height(p.x, p.y) - p.z).abs() < 2e-5, "{p} {}", ground.height(p.x, p.y));
+    }
+    // Every inner edge belongs to two triangles, so there is no crack between the fine and the coarse ground.
+    let mut edges = BTreeMap::new();
+    for t in &mesh.triangles {
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+        }
+    }
+    let border = 2 * (ground.grid.columns() - 1 + ground.grid.rows() - 1);
+    assert_eq!(edges.values().filter(|n| **n == 1).count(), border);
+    assert!(edges.values().all(|n| *n <= 2));
+    for k in 0..200 {
+        let y = -0.07 + 0.0007 * k as f32;
+        for x in [-0.06, 0.06] {
+            assert!((ground.height(x - 1e-5, y) - ground.height(x + 1e-5, y)).abs() < 1e-4);
+        }
+    }
+    let (lo, hi) = mesh.bounds().unwrap();
+    assert!(lo.x < -0.55 && hi.y > 0.55);
+}
+
+/// Returns the vertices of all triangles of some meshes, as bits.
+fn triangles<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> BTreeSet<[[u32; 3]; 3]> {
+    let bits = |corner: Vec3| corner.to_array().map(f32::to_bits);
+    meshes.flat_map(|mesh| (0..mesh.triangles.len() as u32).map(move |i| mesh.corners(i).map(bits))).collect()
+}
+
+/// Returns the triangles west of a line.
+fn west(triangles: &BTreeSet<[[u32; 3]; 3]>, line: f32) -> BTreeSet<[[u32; 3]; 3]> {
+    triangles.iter().filter(|t| t.iter().all(|corner| f32::from_bits(corner[0]) < line)).copied().collect()
+}
+
+/// Rationale: most of the ground along a long oblique drive is out of view and wastes memory. Expected: there its mesh
+/// has far fewer triangles, with the same vertices; no inner edge has a triangle on one side only, and none faces down;
+/// in view it is the mesh of the whole ground. The strip in the west is in view.
+#[test]
+fn ground_out_of_view_has_few_triangles_and_no_crack() {
+    let ground = ground(&page(), 0.2);
+    let seen = InView::of(ground.area(), 0.0, |_| 0.0, |p| (p.x + 0.15).max(0.0));
+    let (whole, mesh) = (ground.mesh(&InView::ALL), ground.mesh(&seen));
+    assert_eq!(mesh.fault(), None);
+    assert!(mesh.triangles.len() * 100 < whole.triangles.len() * 65, "{}", mesh.triangles.len());
+    let (all, some) = (triangles(std::iter::once(&whole)), triangles(std::iter::once(&mesh)));
+    assert_eq!(west(&all, -0.15), west(&some, -0.15));
+    let corners: BTreeSet<[u32; 3]> = all.into_iter().flatten().collect();
+    assert!(some.iter().flatten().all(|corner| corners.contains(corner)));
+    let mut edges = BTreeMap::new();
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        assert!((b - a).cross(c - a).z > 0.0);
+        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+        }
+    }
+    let border = 2 * (ground.grid.columns() - 1 + ground.grid.rows() - 1);
+    assert_eq!(edges.values().filter(|n| **n == 1).count(), border);
+    assert!(edges.values().all(|n| *n <= 2));
+}
+
+/// Rationale: each clod rests on those placed before, so none may be missing from the pile. Expected: the pile does not
+/// depend on the view; the clods in view have meshes, bit-identical, and few others do.
+#[test]
+fn clods_out_of_view_are_laid_and_not_made() {
+    let ground = ground(&page(), 0.2);
+    let lay = |seen: &InView| {
+        let mut pile = Pile::new(&ground);
+        let clods = clods(&ground, &mut pile, &Canopy::none(&ground), seen);
+        (triangles(clods.iter().map(|group| &group.mesh)), pile)
+    };
+    let (all, whole) = lay(&InView::ALL);
+    let (some, pile) = lay(&InView::of(ground.area(), 0.0, |_| 0.0, |p| (p.x + 0.15).max(0.0)));
+    for k in 0..400 {
+        let p = vec2(-0.2 + 0.02 * (k % 20) as f32, -0.2 + 0.02 * (k / 20) as f32);
+        assert_eq!(pile.at(p), whole.at(p), "{p}");
+    }
+    assert!(some.len() * 10 < all.len() * 7, "{} of {}", some.len(), all.len());
+    assert!(some.is_subset(&all));
+    assert_eq!(west(&all, -0.15), west(&some, -0.15));
+}
+
+#[test]
+fn one_blend_drives_colour_and_height_and_sums_to_one() {
+    let mut page = page();
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(0.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    page.blend.scale_m = Vary::fixed(0.05);
+    let ground = ground(&page, 0.1);
+    let baked = ground.bake(&MAPS, 0.0005);
+    let (mut low, mut high) = (0, 0);
+    for j in (0..baked.height).step_by(7) {
+        for i in (0..baked.width).step_by(7) {
+            let k = j * baked.width + i;
+            let sum: u32 = baked.weights[k].iter().map(|w| u32::from(*w)).sum();
+            assert!((254..=256).contains(&sum), "{:?}", baked.weights[k]);
+            // The layers are pure red and green, so the colour shows the weights, up to the local brightness.
+            let [r, g, _] = GroundMaps::decode(baked.albedo[k]);
+            let second = f32::from(baked.weights[k][1]) / 255.0;
+            assert!((g / (r + g) - second).abs() < 0.02);
+            let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
+            let h = ground.height(p.x, p.y) * 1e3;
+            assert!(h > -1.1 * (1.0 - second) + 3.8 * second - 0.6 && h < 1.1 * (1.0 - second) + 8.2 * second + 0.6);
+            low += i32::from(second < 0.1);
+            high += i32::from(second > 0.9);
+        }
+    }
+    assert!(low > 50 && high > 50, "{low} {high}");
+}
+
+#[test]
+fn the_baked_maps_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.layers[0].height_mm = (Num::new(-0.2), Num::new(0.2));
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(0.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    let maps = [Waves(150.0, [0.2; 3])];
+    let site = Site { grid_m: 0.002, ..site(0.05) };
+    let ground = Ground::new(&page, &[], &maps, &site, &stream()).unwrap();
+    let baked = ground.bake(&maps, 0.0001);
+    let height = |p: Vec2| ground.blend.displacement([1.0, 0.0, 0.0, 0.0], ground.blend.heights(&maps, p));
+    let mut off = 0.0;
+    let mut n = 0.0;
+    for k in (0..baked.slope.len()).step_by(1009) {
+        let (i, j) = (k % baked.width, k / baked.width);
+        let inner = |i: usize, n: usize| i > n / 8 && i < 7 * n / 8;
+        if !inner(i, baked.width) || !inner(j, baked.height) {
+            continue;
+        }
+        let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
+        let d = 1e-4;
+        let exact = (height(p + vec2(d, 0.0)) - height(p - vec2(d, 0.0))) / (2.0 * d);
+        let normal = ground.normal(p.x, p.y);
+        let both = -normal.x / normal.z + f32::from(baked.slope[k][0]) / GroundMaps::SLOPE_STEPS;
+        off += (both - exact).abs();
+        n += 1.0;
+    }
+    assert!(off / n < 0.02, "{}", off / n);
+}
+
+#[test]
+fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
+    let page = page();
+    let (a, b) = (ground(&page, 0.05), ground(&page, 0.05));
+    assert_eq!(a.mesh(&InView::ALL), b.mesh(&InView::ALL));
+    assert_eq!(a.bake(&MAPS, 0.0005), b.bake(&MAPS, 0.0005));
+    let large = ground(&page, 0.08);
+    for k in 0..400 {
+        let (x, y) = (-0.04 + 0.004 * (k % 20) as f32, -0.04 + 0.004 * (k / 20) as f32);
+        assert!((a.height(x, y) - large.height(x, y)).abs() < 2e-4);
+    }
+    let other = Ground::new(&page, &[], &MAPS, &site(0.05), &Stream::of(21, 5, Purpose::Soil, 0)).unwrap();
+    assert_ne!(a.height(0.0, 0.0), other.height(0.0, 0.0));
+}
+
+/// Expected: all hues occur at all brightnesses; without a spread all clods are grey. Near infrared varies with the
+/// brightness only.
+#[test]
+fn clods_differ_in_hue_as_much_as_their_page_says() {
+    let ratios = |sigma: f64| {
+        let mut page = page();
+        page.clods.hue_sigma = Num::new(sigma);
+        let ground = ground(&page, 0.3);
+        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
+        let ratio = |c: &Clods| {
+            let [r, g, b, n] = c.tint.to_array();
+            assert!((r * g / (n * n) - 1.0).abs() < 1e-4, "{:?}", c.tint);
+            ((g / r).ln(), (g / b).ln(), c.mesh.triangles.len())
+        };
+        groups.iter().map(ratio).collect::<Vec<_>>()
+    };
+    assert!(ratios(0.0).iter().all(|(green, yellow, _)| green.abs() < 1e-5 && yellow.abs() < 1e-5));
+    let drawn = ratios(0.05);
+    let number: f32 = drawn.iter().map(|r| r.2 as f32).sum();
+    for of in [|r: &(f32, f32, usize)| r.0, |r: &(f32, f32, usize)| r.1] {
+        let mean = drawn.iter().map(|r| of(r) * r.2 as f32).sum::<f32>() / number;
+        let sd = (drawn.iter().map(|r| (of(r) - mean).powi(2) * r.2 as f32).sum::<f32>() / number).sqrt();
+        assert!(mean.abs() < 0.02 && (0.03..0.06).contains(&sd), "{mean} ± {sd}");
+    }
+}
+
+#[test]
+fn nothing_floats_and_nothing_is_wholly_buried() {
+    let mut page = page();
+    // Sparse, so that all clods lie on the ground and not on each other.
+    page.clods.over_5mm_per_m2 = Vary::fixed(400.0);
+    page.clods.min_mm = Num::new(5.0);
+    page.crumbs.amount = Vary::fixed(0.0);
+    let ground = ground(&page, 0.3);
+    let mut pile = Pile::new(&ground);
+    let mut all: Vec<Vec<Vec3>> = Vec::new();
+    for Clods { tint, mesh, .. } in clods(&ground, &mut pile, &Canopy::none(&ground), &InView::ALL) {
+        assert_eq!(mesh.fault(), None);
+        assert!(tint.0.min_element() > 0.5 && tint.0.max_element() < 2.0);
+        // Components of a few vertices are the rim of a body whose buried side was left out.
+        all.extend(bodies(&mesh).into_iter().filter(|b| b.len() > 6));
+    }
+    let clods = all.len();
+    assert!(clods > 60, "{clods}");
+    for body in &all {
+        let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
+        let (lo, hi) = body.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
+        assert!(hi > 0.0, "buried by {hi}");
+        assert!(lo < 0.5e-3, "floats by {lo} of {hi}");
+    }
+    let mut pile = Pile::new(&ground);
+    let mut things = stones(&page.stones, &ground, &mut pile, &stream());
+    things.extend(litter(&page.litter, &ground, &mut Pile::new(&ground), &stream()));
+    let mut touching = 0;
+    for thing in &things {
+        assert_eq!(thing.mesh.fault(), None);
+        let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
+        let (lo, hi) =
+            thing.mesh.positions.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
+        assert!(hi > 0.0, "{:?} buried by {hi}", thing.kind);
+        touching += usize::from(lo < 0.1e-3);
+        assert!(thing.mesh.positions.iter().all(|p| p.distance(thing.centre) < 1.8 * thing.radius + 0.01));
+    }
+    // A few pieces lie across others.
+    assert!(things.len() > 40 && touching * 100 > things.len() * 93, "{touching} of {}", things.len());
+}
+
+/// Rationale: ten million clods for an outdated preview delay the current one. Expected: once the flag is raised
+/// nothing is placed.
+#[test]
+fn nothing_is_laid_on_a_pile_that_is_given_up() {
+    let page = page();
+    let ground = ground(&page, 0.15);
+    let outdated = Arc::new(AtomicBool::new(false));
+    let mut pile = Pile::new(&ground).until(Some(&outdated));
+    let lay = |pile: &mut Pile| {
+        let clods = clods(&ground, pile, &Canopy::none(&ground), &InView::ALL).len();
+        let stones = stones(&page.stones, &ground, pile, &stream()).len();
+        [clods, stones, litter(&page.litter, &ground, pile, &stream()).len()]
+    };
+    assert!(lay(&mut pile).iter().all(|count| *count > 0));
+    outdated.store(true, Ordering::Relaxed);
+    assert_eq!(lay(&mut pile), [0; 3]);
+}
+
+#[test]
+fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.clods.over_5mm_per_m2 = Vary::fixed(12000.0);
+    page.clods.exponent = Vary::fixed(3.3);
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let site = Site {
+        area: Rect::new(0.0, 0.0, 0.3, 0.2),
+        grid_m: 0.001,
+        margin_m: 0.1,
+        growth: 1.3,
+        level_m: f32::INFINITY,
+        smallest_mm: 0.0,
+        rows: None,
+    };
+    let ground = Ground::new(&page, &[], &maps, &site, &stream()).unwrap();
+    let stem = vec2(0.15, 0.1);
+    let mut canopy = Canopy::none(&ground);
+    canopy.add(&sheet(stem - 0.004, stem + 0.004, ground.height(stem.x, stem.y)));
+    let groups = clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL);
+    let triangles: usize = groups.iter().map(|g| g.mesh.triangles.len()).sum();
+    let per_view = triangles as f32 / 0.06 * 0.325;
+    assert!(per_view > 3e5 && per_view < 1.5e6, "{per_view}");
+    assert!(groups.len() >= 5);
+    for Clods { mesh, .. } in &groups {
+        assert!(mesh.positions.iter().all(|p| p.truncate().distance(stem) > 0.003));
+        assert!(mesh.uvs.iter().all(|t| t.cmpge(Vec2::ZERO).all() && t.cmple(Vec2::ONE).all()));
+    }
+    assert_eq!(groups, clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL));
+}
+
+/// Returns a level rectangle at a height.
+fn sheet(low: Vec2, high: Vec2, z: f32) -> Mesh {
+    let positions = vec![low.extend(z), vec2(high.x, low.y).extend(z), high.extend(z), vec2(low.x, high.y).extend(z)];
+    Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+}
+
+#[test]
+fn clods_are_damp_and_dry_as_the_page_says_and_pierce_no_leaf() {
+    let mut page = page();
+    page.clods.over_5mm_per_m2 = Vary::fixed(4000.0);
+    page.clods.min_mm = Num::new(5.0);
+    page.clods.damp = Vary::fixed(0.25);
+    page.clods.dryness = Vary::fixed(0.75);
+    page.clods.loose = Vary::fixed(1.0);
+    page.moisture.mean = Vary::fixed(0.8);
+    let ground = ground(&page, 0.2);
+    let [dry, damp] = ground.clods_moisture();
+    assert!((dry - 0.2).abs() < 1e-6 && (damp - 0.8).abs() < 1e-6);
+    let fabric = ground.fabric(&MAPS, 0.001, dry);
+    assert!(fabric.moisture.iter().all(|m| (f32::from(*m) / 255.0 - dry).abs() < 0.01));
+    let leaf = 0.004 + ground.height(0.0, 0.0);
+    let mut canopy = Canopy::none(&ground);
+    canopy.add(&sheet(Vec2::splat(-0.03), Vec2::splat(0.03), leaf));
+    let (mut wet, mut all, mut under, mut far) = (0, 0, 0, 0f32);
+    for group in clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL) {
+        for body in bodies(&group.mesh).into_iter().filter(|b| b.len() > 6) {
+            all += 1;
+            wet += i32::from(group.damp);
+            let middle = body.iter().sum::<Vec3>().truncate() / body.len() as f32;
+            let top = body.iter().map(|p| p.z).fold(f32::MIN, f32::max);
+            if middle.abs().max_element() < 0.03 {
+                under += 1;
+                assert!(top < leaf, "{top} {leaf}");
+            }
+            far = far.max(top - ground.height(middle.x, middle.y));
+        }
+    }
+    assert!((f64::from(wet) / f64::from(all) - 0.25).abs() < 0.05, "{wet} of {all}");
+    assert!(under > 2 && far > 0.012, "{under} {far}");
+}
+
+#[test]
+fn the_trend_is_the_slope_of_a_plane() {
+    let mut page = page();
+    page.layers.truncate(1);
+    page.relief.rms_mm = Vary::fixed(0.0);
+    page.relief.tilt_deg = Vary::fixed(9.0);
+    page.clods.over_5mm_per_m2 = Vary::fixed(0.0);
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let ground = Ground::new(&page, &[], &maps, &site(0.05), &stream()).unwrap();
+    for normal in [ground.trend(0.0, 0.01, 0.02), ground.normal(0.01, 0.0)] {
+        assert!((normal.z.acos().to_degrees() - 9.0).abs() < 0.05, "{normal}");
+    }
+}
+
+#[test]
+fn impossible_pages_are_refused_in_words() {
+    let try_page =
+        |page: &SoilDesc| Ground::new(page, &[], &MAPS, &site(0.02), &stream()).map(|_| ()).unwrap_err().to_string();
+    let mut one = page();
+    one.layers.truncate(1);
+    assert!(try_page(&one).contains("1 layers but 2 were loaded"));
+    let mut swapped = page();
+    swapped.layers[0].height_mm = (Num::new(2.0), Num::new(-2.0));
+    assert!(try_page(&swapped).contains("swap its ends"));
+    let mut clods = page();
+    clods.clods.max_mm = Num::new(1.0);
+    assert!(try_page(&clods).contains("min_mm"));
+    let thin = Site { grid_m: 1e-7, ..site(1.0) };
+    assert!(Ground::new(&page(), &[], &MAPS, &thin, &stream()).is_err());
+}

@@ -1,0 +1,23 @@
+//! Sensor chip: from light to integers, one colour per pixel.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `level` | meaning of a linear value: response of the channels, full well |
+//! | `exposure` | exposure as a factor on the signal |
+//! | `noise` | electrons: shot and read noise, dark current, fixed pattern |
+//! | `bayer` | Bayer mosaic and demosaicing |
+//! | `adc` | quantisation above a black level |
+
+mod adc;
+mod bayer;
+mod exposure;
+mod level;
+mod noise;
+
+pub use adc::{Adc, AdcDesc, Black, Depth};
+pub(super) use bayer::Mosaic;
+pub use bayer::{Demosaic, MosaicDesc, Pattern};
+pub use exposure::{Exposure, ExposureDesc, Percent};
+pub(super) use level::{CLIP, RESPONSE};
+pub(super) use noise::NoiseWritten;
+pub use noise::{Noise, NoiseDesc};

@@ -1,0 +1,75 @@
+//! Focal length and principal point of a camera, as written in a scene file.
+
+use furrow_base::ron_file::{Finite, Positive, Vary};
+use furrow_base::sampling::rng::Stream;
+use furrow_base::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Intrinsics in a scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub enum IntrinsicsDesc {
+    /// OpenCV's camera matrix in pixels, with pixel centres at +0.5. For a calibration that puts the first pixel's
+    /// centre at 0, add 0.5 to cx and cy.
+    Pixels {
+        /// Focal length along x.
+        #[schemars(extend("x-example" = "500"))]
+        fx: Vary<Positive>,
+        /// Focal length along y.
+        #[schemars(extend("x-example" = "500"))]
+        fy: Vary<Positive>,
+        /// Optical axis, from the left edge.
+        #[schemars(extend("x-example" = "320"))]
+        cx: Vary<Finite>,
+        /// Optical axis, from the top edge.
+        #[schemars(extend("x-example" = "240"))]
+        cy: Vary<Finite>,
+    },
+    /// Derived from the lens and the sensor, with the optical axis in the image's middle.
+    Millimetres {
+        /// Focal length.
+        #[schemars(extend("x-example" = "8"))]
+        focal_mm: Vary<Positive>,
+        /// Side of a square pixel, micrometres.
+        #[schemars(extend("x-example" = "3.75"))]
+        pixel_um: Vary<Positive>,
+    },
+    /// Derived from the angle of view between the left and right edges, with square pixels and the optical axis in the
+    /// image's middle.
+    FieldOfView {
+        /// Angle of view, degrees, below 180.
+        #[schemars(extend("x-example" = "60"))]
+        horizontal_deg: Vary<Positive>,
+    },
+}
+
+impl IntrinsicsDesc {
+    /// Samples focal lengths and centre in pixels, and the focal length in millimetres if the scene file gives it.
+    pub(super) fn draw(&self, size: (u32, u32), stream: &mut Stream) -> Result<([f64; 2], [f64; 2], Option<f64>)> {
+        let middle = middle(size);
+        Ok(match self {
+            Self::Pixels { fx, fy, cx, cy } => {
+                ([fx.draw(stream), fy.draw(stream)], [cx.draw(stream), cy.draw(stream)], None)
+            }
+            Self::Millimetres { focal_mm, pixel_um } => {
+                let focal = focal_mm.draw(stream);
+                ([focal * 1e3 / pixel_um.draw(stream); 2], middle, Some(focal))
+            }
+            Self::FieldOfView { horizontal_deg } => {
+                let angle = horizontal_deg.draw(stream);
+                if angle >= 180.0 {
+                    return Err(Error::input(format!(
+                        "horizontal_deg {angle} is out of range: a pinhole sees less than 180 degrees"
+                    ))
+                    .help("write an angle of view such as 60"));
+                }
+                ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)
+            }
+        })
+    }
+}
+
+/// Returns the middle of an image of `width` × `height` pixels.
+pub(super) fn middle((width, height): (u32, u32)) -> [f64; 2] {
+    [f64::from(width) / 2.0, f64::from(height) / 2.0]
+}

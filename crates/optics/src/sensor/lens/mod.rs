@@ -1,0 +1,37 @@
+//! Camera model: the ray of a pixel, the pixel of a point, and the blur of the optics.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `desc` | camera description in a scene file |
+//! | `intrinsics`, `distortion`, `aperture`, `pose`, `motion` | its parts: descriptions and sampled values |
+//! | `camera` | rays and projections of a camera with a pose |
+//! | `driving`, `bounds` | the same for a moving camera; bounds of projected triangles |
+//! | `psf` | the point spread of the optics |
+//! | `record` | record of a sampled camera |
+
+mod aperture;
+mod bare;
+mod bounds;
+mod camera;
+mod desc;
+mod distortion;
+mod driving;
+mod intrinsics;
+mod motion;
+mod pose;
+mod psf;
+mod record;
+#[cfg(test)]
+mod tests;
+
+pub use aperture::{Aperture, ApertureDesc};
+pub use bounds::PixelBox;
+pub use camera::Camera;
+pub use desc::{CameraDesc, CameraModel};
+pub use distortion::{Distortion, DistortionDesc};
+pub use intrinsics::IntrinsicsDesc;
+pub use motion::{Motion, MotionDesc};
+pub use pose::{Pose, PoseDesc};
+pub(super) use psf::PsfWritten;
+pub use psf::{Psf, PsfDesc};
+pub use record::{ApertureRecord, CameraRecord, MotionRecord};

@@ -1,0 +1,295 @@
+//! LiDAR description in a scene file.
+
+use super::{HALF_LIGHT_M_NS, Lidar, Returns};
+use crate::sensor::given::{Given, layered};
+use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::ron_file::{Elevation, Finite, NonNegative, Num, Positive, PositiveCount, Vary};
+use furrow_base::sampling::Stream;
+use furrow_base::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Largest number of beams of a LiDAR.
+const MOST_BEAMS: usize = 1024;
+/// Largest number of pulses in a turn.
+const MOST_PULSES: f64 = 1e7;
+/// Upper bounds of the beam's full divergence, milliradians, and its diameter at the exit, millimetres.
+const WIDEST: [f64; 2] = [100.0, 1000.0];
+
+layered! {
+    /// Rotating LiDAR: a name, `Vlp16` or `Os164`, or a name with fields that override its values. Without a name the
+    /// values are those of `Vlp16`.
+    ///
+    /// ```
+    /// use furrow_base::sampling::{Purpose, Stream};
+    /// use furrow_optics::sensor::LidarDesc;
+    /// for text in [
+    ///     "Vlp16",
+    ///     "Os164(position_m: (0, 0.4, 1.6), pitch_deg: -15, returns: All)",
+    ///     "(
+    ///         position_m: (0, 0, Uniform(1.4, 1.6)),
+    ///         beams: Angles([-40, -30, -20]),
+    ///         azimuth_deg: (-60, 60),
+    ///         rotation_hz: 20,
+    ///         pulses: StepDeg(0.1),
+    ///         divergence_mrad: 0.3,
+    ///         exit_mm: 7,
+    ///         range_noise_m: 0.003,
+    ///         pulse_ns: 3,
+    ///         returns: FirstAndLast,
+    ///     )",
+    /// ] {
+    ///     let desc: LidarDesc = ron::from_str(text)?;
+    ///     desc.build(&mut Stream::of(1, 0, Purpose::Page, 0))?;
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+    #[schemars(default)]
+    pub struct LidarDesc, LidarWritten = "LidarDesc" {
+        /// Point where its beams cross, metres east, north and above the ground's mean level; default 1.2 above the
+        /// origin.
+        #[schemars(extend("x-example" = "(0, 0.4, 1.5)"))]
+        pub position_m: (Vary<Finite>, Vary<Finite>, Vary<Positive>) = Given<(Vary<Finite>, Vary<Finite>, Vary<Positive>)>,
+        /// Rotates its front clockwise from north; default 0.
+        pub yaw_deg: Vary<Finite> = Given<Vary<Finite>>,
+        /// Raises its front, or lowers it if negative; default 0.
+        pub pitch_deg: Vary<Finite> = Given<Vary<Finite>>,
+        /// Lowers its right side; default 0.
+        pub roll_deg: Vary<Finite> = Given<Vary<Finite>>,
+        /// Elevations of the beams; default 16 from -15° to 15°.
+        #[schemars(extend("x-example" = "Fan(count: 32, from_deg: -30, to_deg: 10)"))]
+        pub beams: BeamsDesc = Given<BeamsDesc>,
+        /// Range of azimuths in which it emits pulses, degrees clockwise from its front, from -360 to 360; default a
+        /// full turn from 0 to 360.
+        #[schemars(extend("x-example" = "(-60, 60)"))]
+        pub azimuth_deg: (Num<Finite>, Num<Finite>) = Given<(Num<Finite>, Num<Finite>)>,
+        /// Rotation rate, turns per second; default 10.
+        pub rotation_hz: Num<Positive> = Given<Num<Positive>>,
+        /// Pulse rate; default 18,084 per second for each beam.
+        #[schemars(extend("x-example" = "StepDeg(0.2)"))]
+        pub pulses: PulsesDesc = Given<PulsesDesc>,
+        /// Full divergence of a beam between the directions of 1/e² of its intensity, milliradians, which is 1.7 times
+        /// the full width at half maximum; default 3.
+        pub divergence_mrad: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Diameter of a beam at the exit, also at 1/e², millimetres; default 12.7.
+        pub exit_mm: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Standard deviation of a range, metres; default 0.01. Ranges measured below `min_m` or above `max_m` are
+        /// dropped.
+        pub range_noise_m: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Shortest range, metres; default 1.
+        pub min_m: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Longest range, metres; default 100.
+        pub max_m: Num<Positive> = Given<Num<Positive>>,
+        /// Detection threshold of intensity, with 1 for a white, matt wall at 1 m: reflectance divided by the square of
+        /// the range at which it is just detected; default 0.00001, a reflectance of a tenth at 100 m.
+        pub min_intensity: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Length of a pulse, nanoseconds. Echoes closer than half the distance that light travels in that time, 0.15 m
+        /// per nanosecond, merge; default 6.67, which is 1 m.
+        pub pulse_ns: Num<NonNegative> = Given<Num<NonNegative>>,
+        /// Which echoes of a pulse are reported; default `Strongest`.
+        pub returns: Returns = Given<Returns>,
+    }
+}
+
+/// Elevations of a LiDAR's beams.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub enum BeamsDesc {
+    /// Equally spaced elevations.
+    Fan {
+        /// Number of beams.
+        #[schemars(extend("x-example" = "32"))]
+        count: Num<PositiveCount>,
+        /// First elevation, degrees above its horizon, negative below it.
+        #[schemars(extend("x-example" = "-30"))]
+        from_deg: Num<Elevation>,
+        /// Last elevation.
+        #[schemars(extend("x-example" = "10"))]
+        to_deg: Num<Elevation>,
+    },
+    /// List of elevations, degrees above its horizon.
+    #[schemars(extend("x-example" = "([-30, -20, -12, -6])"))]
+    Angles(Vec<Num<Elevation>>),
+}
+
+/// Pulse rate of a LiDAR.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub enum PulsesDesc {
+    /// All beams fire each time the head has turned by this many degrees.
+    #[schemars(extend("x-example" = "(0.2)"))]
+    StepDeg(Num<Positive>),
+    /// Total pulses per second of all beams; the angle between them follows from `rotation_hz`.
+    #[schemars(extend("x-example" = "(300000)"))]
+    PerSecond(Num<Positive>),
+}
+
+impl BeamsDesc {
+    fn elevations_deg(&self) -> Vec<f64> {
+        match self {
+            Self::Angles(all) => all.iter().map(|angle| angle.get()).collect(),
+            Self::Fan { count, from_deg, to_deg } => {
+                let (last, from, to) = (count.get() as u32 - 1, from_deg.get(), to_deg.get());
+                if last == 0 {
+                    return vec![0.5 * (from + to)];
+                }
+                (0..=last).map(|k| from + (to - from) * f64::from(k) / f64::from(last)).collect()
+            }
+        }
+    }
+
+    /// Returns the number of beams.
+    fn count(&self) -> usize {
+        match self {
+            Self::Angles(all) => all.len(),
+            Self::Fan { count, .. } => count.get() as usize,
+        }
+    }
+}
+
+impl LidarDesc {
+    /// Returns the LiDAR at another position, metres.
+    #[must_use]
+    pub fn at(self, place: Vec3) -> Self {
+        let [x, y, z] = place.to_array().map(f64::from);
+        Self { position_m: (Vary::fixed(x), Vary::fixed(y), Vary::fixed(z)), ..self }
+    }
+
+    /// Samples the LiDAR. Returns a [`Kind::Input`](furrow_base::error::Kind::Input) error if it could not emit pulses
+    /// or could not report anything.
+    pub fn build(&self, stream: &mut Stream) -> Result<Lidar> {
+        let (x, y, z) = &self.position_m;
+        let position = vec3(x.draw32(stream), y.draw32(stream), z.draw32(stream));
+        let turns = [&self.yaw_deg, &self.pitch_deg, &self.roll_deg];
+        let [yaw, pitch, roll] = turns.map(|turn| turn.draw32(stream).to_radians());
+        if !(1..=MOST_BEAMS).contains(&self.beams.count()) {
+            let words = format!("a LiDAR of {} beams", self.beams.count());
+            return Err(Error::input(words).help(format!("`beams` takes 1 to {MOST_BEAMS} elevations")));
+        }
+        let elevations_deg = self.beams.elevations_deg();
+        let mut sorted = elevations_deg.clone();
+        sorted.sort_by(f64::total_cmp);
+        if let Some([twice, ..]) = sorted.windows(2).find(|pair| matches!(pair, [lower, upper] if lower >= upper)) {
+            return Err(Error::input(format!("two of its beams have the elevation {twice} degrees"))
+                .help("list each elevation in `Angles` once; the first and the last of a `Fan` must differ"));
+        }
+        let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());
+        if !(to > from && to - from <= 360.0 && from >= -360.0 && to <= 360.0) {
+            let words = format!("azimuth_deg goes from {from} to {to}");
+            return Err(Error::input(words)
+                .help("write a smaller and a larger angle from -360 to 360, at most 360 apart, such as (-60, 60)"));
+        }
+        let rotation_hz = self.rotation_hz.get();
+        let step_deg = match self.pulses {
+            PulsesDesc::StepDeg(step) => step.get(),
+            PulsesDesc::PerSecond(rate) => 360.0 * rotation_hz * elevations_deg.len() as f64 / rate.get(),
+        };
+        // The end of a full turn is its start; rounding must not add a column.
+        let columns = ((to - from) / step_deg - 1e-6).ceil().max(1.0);
+        if columns * elevations_deg.len() as f64 > MOST_PULSES {
+            let words = format!("{:.0} pulses in a turn are too many", columns * elevations_deg.len() as f64);
+            return Err(Error::input(words)
+                .help(format!("at most {MOST_PULSES:.0}: use fewer beams or a larger step in `pulses`")));
+        }
+        let width = [self.divergence_mrad.get(), self.exit_mm.get()];
+        if width[0] > WIDEST[0] || width[1] > WIDEST[1] {
+            let [mrad, mm] = width;
+            let words = format!("a beam of {mrad} mrad and {mm} mm at the exit is too wide");
+            let [mrad, mm] = WIDEST;
+            return Err(Error::input(words)
+                .help(format!("divergence_mrad goes up to {mrad}, exit_mm up to {mm}; typical values are 3 and 10")));
+        }
+        let (near, far) = (self.min_m.get(), self.max_m.get());
+        if near >= far {
+            return Err(Error::input(format!("min_m, {near}, is not below max_m, {far}"))
+                .help("min_m is the shortest range that is reported, max_m the longest"));
+        }
+        Ok(Lidar {
+            position,
+            axes: Mat3::from_rotation_z(-yaw) * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(roll),
+            velocity: Vec3::ZERO,
+            elevations_deg,
+            first_deg: from,
+            step_deg,
+            columns: columns as u32,
+            rotation_hz,
+            divergence: (1e-3 * self.divergence_mrad.get()) as f32,
+            exit: (1e-3 * self.exit_mm.get()) as f32,
+            noise: self.range_noise_m.get(),
+            range: [near as f32, far as f32],
+            least: self.min_intensity.f32(),
+            separation: (HALF_LIGHT_M_NS * self.pulse_ns.get()) as f32,
+            returns: self.returns,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use furrow_base::ron_file::RonFile;
+    use furrow_base::sampling::Purpose;
+
+    fn built(text: &str) -> Result<Lidar> {
+        RonFile::of(text).parse::<LidarDesc>()?.build(&mut Stream::of(1, 0, Purpose::Test, 0))
+    }
+
+    /// Expected, by the frame's definition: azimuth 0 faces north at yaw 0, azimuth 90 faces east; a lowered front
+    /// faces down, and so does a lowered right side; a quarter of a turn at 10 Hz takes 25 ms.
+    #[test]
+    fn pulses_go_where_azimuth_elevation_and_pose_say() {
+        let level = built("(beams: Angles([0, -30]), pulses: StepDeg(90), rotation_hz: 10)").unwrap();
+        assert_eq!((level.columns(), level.beams()), (4, 2));
+        let close = |a: Vec3, b: Vec3| assert!((a - b).length() < 1e-6, "{a} {b}");
+        close(level.pulse(0, 0).direction, Vec3::Y);
+        close(level.pulse(1, 0).direction, Vec3::X);
+        close(level.pulse(0, 1).direction, vec3(0.0, 0.75_f32.sqrt(), -0.5));
+        assert!((level.pulse(1, 0).time_s - 0.025).abs() < 1e-7);
+        close(level.pulse(1, 0).origin, vec3(0.0, 0.0, 1.2));
+        let of = |pose: &str, column| {
+            built(&format!("(beams: Angles([0]), pulses: StepDeg(90), {pose})")).unwrap().pulse(column, 0).direction
+        };
+        close(of("yaw_deg: 90", 0), Vec3::X);
+        close(of("pitch_deg: -90", 0), Vec3::NEG_Z);
+        close(of("roll_deg: 90", 1), Vec3::NEG_Z);
+        let moved = level.carried(Mat3::from_rotation_z(-std::f32::consts::FRAC_PI_2), Vec3::X, Vec3::X);
+        close(moved.pulse(0, 0).direction, Vec3::X);
+        close(moved.pulse(1, 0).origin, vec3(1.025, 0.0, 1.2));
+    }
+
+    /// Expected: 360° × 10 Hz × 16 beams divided by 288,000 pulses per second gives 0.2° between columns and 1800
+    /// columns; a third of a turn has a third of them.
+    #[test]
+    fn a_rate_of_pulses_becomes_a_step() {
+        assert_eq!(built("(pulses: PerSecond(288000))").unwrap().columns(), 1800);
+        assert_eq!(built("(pulses: PerSecond(288000), azimuth_deg: (-60, 60))").unwrap().columns(), 600);
+        let fan = built("(beams: Fan(count: 5, from_deg: -20, to_deg: 20))").unwrap();
+        assert_eq!(fan.elevations_deg, [-20.0, -10.0, 0.0, 10.0, 20.0]);
+    }
+
+    #[test]
+    fn what_could_not_shoot_is_refused() {
+        for (text, words) in [
+            ("(beams: Angles([]))", "of 0 beams"),
+            ("(beams: Angles([-5, 3, -5]))", "two of its beams have the elevation -5"),
+            ("(beams: Fan(count: 3, from_deg: 4, to_deg: 4))", "two of its beams have the elevation 4"),
+            ("(beams: Fan(count: 5000, from_deg: 0, to_deg: 10))", "of 5000 beams"),
+            ("(azimuth_deg: (60, -60))", "from 60 to -60"),
+            ("(azimuth_deg: (0, 400))", "from 0 to 400"),
+            ("(azimuth_deg: (3600, 3660))", "from 3600 to 3660"),
+            ("(pulses: StepDeg(0.0001))", "pulses in a turn are too many"),
+            ("(pulses: PerSecond(1000000000))", "100000000 pulses"),
+            ("(divergence_mrad: 3000)", "a beam of 3000 mrad"),
+            ("(exit_mm: 2000)", "and 2000 mm at the exit"),
+            ("(range_noise_m: NaN)", "NaN"),
+            ("(pulses: StepDeg(0))", "above 0"),
+            ("(beams: Fan(count: 0, from_deg: 0, to_deg: 10))", "whole number from 1"),
+            ("(min_m: 5, max_m: 2)", "min_m, 5, is not below max_m, 2"),
+            ("(beams: Angles([-95]))", "between -90 and 90"),
+            ("Vlp17", "unknown LiDAR `Vlp17`"),
+            ("Vlp16(divergence: 3)", "unknown field `divergence`"),
+        ] {
+            let error = built(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,424 @@
+//! Extraction of a leaf from a photograph on paper or soil, in any orientation.
+//!
+//! Green is separated from the background by the excess green of chromaticities, 2g − r − b (Woebbecke et al. 1995),
+//! with the threshold of Otsu 1979. The largest connected component is the leaf. The image is rotated so that its long
+//! axis, from the second moments, is upright. As species files expect, the narrower end, with the petiole, is at the
+//! bottom and the leaf's foot is in the middle column.
+
+use super::draw::Drawn;
+use super::srgb::{ColorSpace, decode};
+use furrow_base::error::{Error, Result};
+use furrow_base::math::{Vec2, vec2};
+
+/// Smallest fraction of the photograph that is accepted as a leaf.
+const LEAST: f64 = 0.002;
+/// Fraction of the leaf's length at each end whose pixel counts distinguish the petiole from the tip.
+const END: f32 = 0.12;
+/// Largest width of a petiole relative to the blade.
+const STALK: f64 = 0.2;
+/// Padding around the leaf, relative to its length.
+const ROOM: f32 = 0.02;
+
+/// Options for extracting a leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cutting {
+    /// Whether the base is at the wider end.
+    pub flip: bool,
+    /// Whether the petiole is kept. A species file generates its own petiole, so its textures show the blade alone.
+    pub stalk: bool,
+    /// Whether holes are kept. Photographs of glossy leaves have false holes at specular reflections.
+    pub holes: bool,
+    /// Height of the result in pixels; by default the leaf's height in the photograph.
+    pub height: Option<u32>,
+    /// Rectangle (x, y, width, height in pixels) of a grey or white reference in the photograph, and its reflectance, 0
+    /// to 1. If given, the resulting colours are reflectances.
+    pub grey: Option<([u32; 4], f32)>,
+}
+
+/// A second component larger than this fraction of the first is reported as another leaf; a smaller one is a weed or a
+/// reflection.
+const ANOTHER: f64 = 0.15;
+/// Fraction of a leaf's pixels on the photograph's border above which the leaf is reported as cut off.
+const CUT: f64 = 0.002;
+
+/// Returns warnings about a photograph, one sentence each, for problems that `cut_out` does not return as errors.
+pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]]) -> Vec<String> {
+    let (width, height) = (width as usize, height as usize);
+    let mut green = green(rgb);
+    let first = largest(&green, width, height);
+    let count = |piece: &[bool]| piece.iter().filter(|inside| **inside).count() as f64;
+    green.iter_mut().zip(&first).for_each(|(green, taken)| *green &= !taken);
+    let mut all = Vec::new();
+    if count(&largest(&green, width, height)) > ANOTHER * count(&first) {
+        all.push("there is more than one leaf: only the largest is extracted; photograph one at a time".to_owned());
+    }
+    let border = |i: &usize| [0, width - 1].contains(&(i % width)) || [0, height - 1].contains(&(i / width));
+    let beyond = (0..first.len()).filter(|i| first[*i] && border(i)).count() as f64;
+    if beyond > (CUT * count(&first)).max(4.0) {
+        all.push(
+            "the leaf reaches the photograph's border, so a part of it is missing: leave room around it".to_owned(),
+        );
+    }
+    all
+}
+
+/// Extracts the leaf of a photograph, upright and with opacity, in sRGB.
+pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> Result<Drawn> {
+    let mut leaf = largest(&green(rgb), width as usize, height as usize);
+    let count = leaf.iter().filter(|in_it| **in_it).count();
+    if (count as f64) < LEAST * rgb.len() as f64 {
+        return Err(Error::input("no leaf was found: no green area stands out from the background")
+            .help("photograph one leaf on white paper or on soil, filling at least a twentieth of the image"));
+    }
+    if !cutting.holes {
+        fill(&mut leaf, width as usize, height as usize);
+    }
+    let gain = gain(width, height, rgb, cutting)?;
+    let mut stance = Stance::of(&leaf, width as usize, cutting.flip);
+    if !cutting.stalk {
+        stance = stance.above_stalk(&mut leaf, width as usize);
+    }
+    let leaf = leaf;
+    let there = |x: i64, y: i64| {
+        (0..i64::from(width)).contains(&x)
+            && (0..i64::from(height)).contains(&y)
+            && leaf[(y * i64::from(width) + x) as usize]
+    };
+    let scale = cutting.height.map_or(1.0, |h| (h as f32 - 1.0) / ((1.0 + 2.0 * ROOM) * stance.length));
+    let side = |length: f32| ((length * scale).ceil() as u32 + 1).max(2);
+    let (w, h) = (side(2.0 * stance.reach + 2.0 * ROOM * stance.length), side((1.0 + 2.0 * ROOM) * stance.length));
+    if u64::from(w) * u64::from(h) > 1 << 26 {
+        return Err(Error::misuse(format!("an image of {w} × {h} pixels is too large")).help("use a smaller --height"));
+    }
+    let mut rgba = Vec::with_capacity(4 * w as usize * h as usize);
+    for y in 0..h {
+        for x in 0..w {
+            let across = (x as f32 + 0.5 - 0.5 * w as f32) / scale;
+            let up = (h as f32 - (y as f32 + 0.5)) / scale - ROOM * stance.length;
+            let at = stance.place(across, up);
+            rgba.extend(sample(rgb, width, at, &there, gain));
+        }
+    }
+    Ok(Drawn { width: w, height: h, rgba, opaque: false, relief: None })
+}
+
+/// Returns the bilinear colour and the opacity at a point of the photograph. Texels outside the leaf do not contribute,
+/// so the background colour does not bleed in.
+fn sample(rgb: &[[u8; 3]], width: u32, at: Vec2, there: &dyn Fn(i64, i64) -> bool, gain: [f32; 3]) -> [u8; 4] {
+    let corner = (at - 0.5).floor();
+    let part = at - 0.5 - corner;
+    let (mut sum, mut weight) = ([0.0_f32; 3], 0.0_f32);
+    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let (x, y) = (corner.x as i64 + dx, corner.y as i64 + dy);
+        let share = |d: i64, t: f32| if d == 1 { t } else { 1.0 - t };
+        if there(x, y) {
+            let own = share(dx, part.x) * share(dy, part.y);
+            let texel = rgb[(y * i64::from(width) + x) as usize];
+            for k in 0..3 {
+                sum[k] += own * decode(f32::from(texel[k]) / 255.0);
+            }
+            weight += own;
+        }
+    }
+    if weight <= 1e-4 {
+        return [0; 4];
+    }
+    let color = |k: usize| ColorSpace::Srgb.encode((sum[k] / weight * gain[k]).min(1.0));
+    [color(0), color(1), color(2), (weight.min(1.0) * 255.0 + 0.5) as u8]
+}
+
+/// Returns the factors on linear R, G, B that map the grey reference to its reflectance.
+fn gain(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> Result<[f32; 3]> {
+    let Some(([x, y, w, h], reflectance)) = cutting.grey else { return Ok([1.0; 3]) };
+    if w == 0 || h == 0 || x.saturating_add(w) > width || y.saturating_add(h) > height {
+        return Err(Error::misuse(format!("the grey area is not inside the photograph of {width} × {height} pixels"))
+            .help("write it as x,y,width,height in pixels"));
+    }
+    let mut sum = [0.0_f64; 3];
+    for row in y..y + h {
+        for column in x..x + w {
+            let texel = rgb[(row * width + column) as usize];
+            for k in 0..3 {
+                sum[k] += f64::from(decode(f32::from(texel[k]) / 255.0));
+            }
+        }
+    }
+    let mean = sum.map(|s| (s / (f64::from(w) * f64::from(h))) as f32);
+    if mean.iter().any(|m| *m < 0.01) {
+        return Err(Error::input("the grey area is black").help("choose an area of the paper or of a grey card"));
+    }
+    Ok(mean.map(|m| reflectance / m))
+}
+
+/// Classifies pixels as green, by Otsu's threshold on 2g − r − b.
+fn green(rgb: &[[u8; 3]]) -> Vec<bool> {
+    let excess: Vec<u8> = rgb
+        .iter()
+        .map(|p| {
+            let [r, g, b] = p.map(f32::from);
+            let sum = (r + g + b).max(24.0);
+            (((2.0 * g - r - b) / sum + 1.0) / 3.0 * 255.0) as u8
+        })
+        .collect();
+    let mut counts = [0_u64; 256];
+    for v in &excess {
+        counts[usize::from(*v)] += 1;
+    }
+    let threshold = otsu(&counts);
+    // A pixel is never green if 2g − r − b is about zero or negative, whatever the threshold is.
+    let grey = (255.0 / 3.0) as u8 + 3;
+    excess.into_iter().map(|v| v > threshold.max(grey)).collect()
+}
+
+/// Returns the value that splits a histogram into two classes with the largest between-class variance (Otsu 1979).
+fn otsu(counts: &[u64; 256]) -> u8 {
+    let total: f64 = counts.iter().map(|n| *n as f64).sum();
+    let all: f64 = counts.iter().enumerate().map(|(v, n)| v as f64 * *n as f64).sum();
+    let (mut below, mut sum, mut best, mut at) = (0.0, 0.0, -1.0, 0);
+    for (v, n) in counts.iter().enumerate() {
+        below += *n as f64;
+        sum += v as f64 * *n as f64;
+        let above = total - below;
+        if below > 0.0 && above > 0.0 {
+            let apart = sum / below - (all - sum) / above;
+            let between = below * above * apart * apart;
+            if between > best {
+                (best, at) = (between, v as u8);
+            }
+        }
+    }
+    at
+}
+
+/// Returns the largest 4-connected component.
+fn largest(of: &[bool], width: usize, height: usize) -> Vec<bool> {
+    let mut piece = vec![0_u32; of.len()];
+    let (mut number, mut most, mut best) = (0, 0, 0);
+    for start in 0..of.len() {
+        if !of[start] || piece[start] > 0 {
+            continue;
+        }
+        number += 1;
+        let count = flood(start, width, height, |i| {
+            of[i] && piece[i] == 0 && {
+                piece[i] = number;
+                true
+            }
+        });
+        if count > most {
+            (most, best) = (count, number);
+        }
+    }
+    piece.into_iter().map(|n| n == best && n > 0).collect()
+}
+
+/// Flood fill: visits the pixels accepted by `enter`, from `start` over shared sides, and returns their number.
+fn flood(start: usize, width: usize, height: usize, mut enter: impl FnMut(usize) -> bool) -> usize {
+    let mut open = Vec::new();
+    if enter(start) {
+        open.push(start);
+    }
+    let mut count = 0;
+    while let Some(i) = open.pop() {
+        count += 1;
+        let (x, y) = (i % width, i / width);
+        let beside = [
+            (x > 0, i.wrapping_sub(1)),
+            (x + 1 < width, i + 1),
+            (y > 0, i.wrapping_sub(width)),
+            (y + 1 < height, i + width),
+        ];
+        open.extend(beside.into_iter().filter(|(inside, _)| *inside).map(|(_, n)| n).filter(|n| enter(*n)));
+    }
+    count
+}
+
+/// Fills holes: everything not connected to the image border.
+fn fill(leaf: &mut [bool], width: usize, height: usize) {
+    let mut outside = vec![false; leaf.len()];
+    let edge = (0..width).flat_map(|x| [x, (height - 1) * width + x]);
+    let edge = edge.chain((0..height).flat_map(|y| [y * width, y * width + width - 1]));
+    for start in edge {
+        flood(start, width, height, |i| {
+            !leaf[i] && !outside[i] && {
+                outside[i] = true;
+                true
+            }
+        });
+    }
+    leaf.iter_mut().zip(outside).for_each(|(in_it, out)| *in_it = !out);
+}
+
+/// Position and orientation of a leaf in its photograph, in pixels.
+struct Stance {
+    foot: Vec2,
+    /// Unit vector from the foot to the tip.
+    up: Vec2,
+    length: f32,
+    /// Largest distance of the leaf's pixels from the line through the foot along `up`.
+    reach: f32,
+}
+
+impl Stance {
+    fn of(leaf: &[bool], width: usize, flip: bool) -> Self {
+        let points = || leaf.iter().enumerate().filter(|(_, in_it)| **in_it).map(|(i, _)| middle(i, width));
+        let count = points().count().max(1) as f64;
+        let (sx, sy) = points().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p.x), y + f64::from(p.y)));
+        let centre = vec2((sx / count) as f32, (sy / count) as f32);
+        let (mut xx, mut xy, mut yy) = (0.0_f64, 0.0, 0.0);
+        for p in points() {
+            let d = p - centre;
+            xx += f64::from(d.x * d.x);
+            xy += f64::from(d.x * d.y);
+            yy += f64::from(d.y * d.y);
+        }
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        let axis = vec2(angle.cos() as f32, angle.sin() as f32);
+        let (lo, hi) = points().fold((f32::MAX, f32::MIN), |(lo, hi), p| {
+            let t = (p - centre).dot(axis);
+            (lo.min(t), hi.max(t))
+        });
+        let length = hi - lo + 1.0;
+        // The end with fewer pixels is the petiole.
+        let (low, high) = points().fold((0_u64, 0_u64), |(low, high), p| {
+            let t = (p - centre).dot(axis);
+            (low + u64::from(t < lo + END * length), high + u64::from(t > hi - END * length))
+        });
+        let up = if (low <= high) == flip { -axis } else { axis };
+        let end = points().map(|p| (p - centre).dot(up)).fold(f32::MAX, f32::min);
+        let aside = vec2(-up.y, up.x);
+        // The foot is the middle of the lowest slice.
+        let slice = points().filter(|p| (*p - centre).dot(up) < end + (0.02 * length).max(1.5));
+        let (sum, n) = slice.fold((0.0, 0_u32), |(sum, n), p| (sum + (p - centre).dot(aside), n + 1));
+        let foot = centre + up * (end - 0.5) + aside * (sum / n.max(1) as f32);
+        let reach = points().map(|p| (p - foot).dot(aside).abs()).fold(0.0, f32::max) + 1.0;
+        Self { foot, up, length, reach }
+    }
+
+    /// Removes the petiole from `leaf` and returns the blade's position. The petiole is the part below the first row
+    /// that is wider than a fifth of the widest one.
+    fn above_stalk(self, leaf: &mut [bool], width: usize) -> Self {
+        let mut widths = vec![0_u32; self.length.ceil() as usize + 1];
+        let row = |i: usize| ((middle(i, width) - self.foot).dot(self.up).max(0.0) as usize).min(widths.len() - 1);
+        let rows: Vec<(usize, usize)> = (0..leaf.len()).filter(|i| leaf[*i]).map(|i| (i, row(i))).collect();
+        for (_, row) in &rows {
+            widths[*row] += 1;
+        }
+        let widest = widths.iter().max().copied().unwrap_or(0);
+        let cut = widths.iter().position(|w| f64::from(*w) > STALK * f64::from(widest)).unwrap_or(0);
+        // A petiole shorter than one or two rows is ignored.
+        if (cut as f32) < 0.02 * self.length {
+            return self;
+        }
+        let Self { foot, up, length, .. } = self;
+        let aside = vec2(-up.y, up.x);
+        let (mut sum, mut n, mut reach) = (0.0_f32, 0_u32, 0.0_f32);
+        for (i, row) in rows {
+            leaf[i] = row >= cut;
+            if (cut..cut + 3).contains(&row) {
+                sum += (middle(i, width) - foot).dot(aside);
+                n += 1;
+            }
+        }
+        let foot = foot + up * cut as f32 + aside * (sum / n.max(1) as f32);
+        for i in (0..leaf.len()).filter(|i| leaf[*i]) {
+            reach = reach.max((middle(i, width) - foot).dot(aside).abs() + 1.0);
+        }
+        Self { foot, up, length: length - cut as f32, reach }
+    }
+
+    /// Returns the point of the photograph at `across` to the right of the foot and `up` above it.
+    fn place(&self, across: f32, up: f32) -> Vec2 {
+        // The photograph's y axis points down, so the right-hand side of `up` is (−up.y, up.x).
+        self.foot + vec2(-self.up.y, self.up.x) * across + self.up * up
+    }
+}
+
+fn middle(i: usize, width: usize) -> Vec2 {
+    vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Draws a leaf with a petiole on paper, rotated by `turn`: half an ellipse in width at each height, with a petiole
+    /// below.
+    fn photograph(turn: f32) -> Vec<[u8; 3]> {
+        let (sin, cos) = turn.sin_cos();
+        (0..400 * 400)
+            .map(|i| {
+                let p = middle(i, 400) - 200.0;
+                let (x, y) = (cos * p.x + sin * p.y, -sin * p.x + cos * p.y);
+                let blade = (x / 45.0).powi(2) + ((y + 20.0) / 90.0).powi(2) < 1.0;
+                let stalk = x.abs() < 4.0 && (60.0..130.0).contains(&y);
+                // A notch on the right-hand side only.
+                let notch = (x - 45.0).hypot(y + 20.0) < 15.0;
+                if (blade || stalk) && !notch { [70, 120, 50] } else { [235, 232, 228] }
+            })
+            .collect()
+    }
+
+    /// Method: one leaf photographed at eight angles. Expected: the same image each time within a few pixels: upright,
+    /// the foot in the middle of the lower edge, not mirrored.
+    #[test]
+    fn a_leaf_comes_out_upright_whichever_way_it_lies() {
+        for k in 0..8 {
+            let photo = photograph(k as f32 * 0.8);
+            let leaf = cut_out(400, 400, &photo, &Cutting { stalk: true, ..Cutting::default() }).unwrap();
+            let blade = cut_out(400, 400, &photo, &Cutting::default()).unwrap();
+            assert!((blade.height as f32 - 187.0).abs() < 8.0, "{k}: the petiole is removed: {}", blade.height);
+            let (w, h) = (leaf.width as usize, leaf.height as usize);
+            assert!((h as f32 - 250.0).abs() < 8.0 && (w as f32 - 100.0).abs() < 8.0, "{k}: {w} × {h}");
+            let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
+            assert!(
+                opaque(w / 2, h - 12) && !opaque(w / 2 - 12, h - 12),
+                "{k}: the petiole is in the middle of the lower edge"
+            );
+            let (left, right) = (opaque(12, 95), opaque(w - 13, 95));
+            assert!(left && !right, "{k}: the notch is on the right: {left} {right}");
+        }
+    }
+
+    /// Expected: no warning for one leaf in the middle; a warning for a second leaf beside it, but not for a speck; a
+    /// warning for a leaf cut by the border.
+    #[test]
+    fn what_a_photograph_should_not_show_is_told() {
+        let photo = photograph(0.0);
+        assert_eq!(doubts(400, 400, &photo), Vec::<String>::new());
+        let green = |size: usize| {
+            let mut photo = photo.clone();
+            for i in
+                (0..400 * 400).filter(|i| (10..10 + size).contains(&(i % 400)) && (10..10 + size).contains(&(i / 400)))
+            {
+                photo[i] = [70, 120, 50];
+            }
+            doubts(400, 400, &photo)
+        };
+        assert_eq!(green(10), Vec::<String>::new());
+        let told = green(80);
+        assert!(told.len() == 1 && told[0].contains("more than one leaf"), "{told:?}");
+        let told = doubts(400, 250, &photo[150 * 400..]);
+        assert!(told.len() == 1 && told[0].contains("border"), "{told:?}");
+    }
+
+    #[test]
+    fn a_grey_area_makes_reflectances() {
+        let photo = photograph(0.3);
+        let cutting =
+            Cutting { grey: Some(([2, 2, 20, 20], 0.85)), height: Some(120), stalk: true, ..Cutting::default() };
+        let leaf = cut_out(400, 400, &photo, &cutting).unwrap();
+        assert!(leaf.height.abs_diff(120) <= 1);
+        let middle = 4 * (leaf.height as usize / 3 * leaf.width as usize + leaf.width as usize / 2);
+        let linear = |v: u8| decode(f32::from(v) / 255.0);
+        let wanted = linear(120) * 0.85 / linear(232);
+        assert!((linear(leaf.rgba[middle + 1]) - wanted).abs() < 0.01);
+        assert!(cut_out(400, 400, &photo, &Cutting { grey: Some(([390, 0, 20, 20], 0.8)), ..cutting }).is_err());
+    }
+
+    #[test]
+    fn paper_alone_has_no_leaf() {
+        let paper = vec![[230, 231, 229]; 64 * 64];
+        assert!(cut_out(64, 64, &paper, &Cutting::default()).is_err());
+    }
+}

@@ -1,0 +1,166 @@
+//! Mip pyramids in memory. Each level is half the size of the finer one. Texels are stored in 4×4 tiles, so a bilinear
+//! lookup touches one or two cache lines.
+
+use furrow_base::math::Vec2;
+
+/// Wrap mode: the values outside uv ∈ [0, 1]².
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The nearest texel of the edge.
+    #[default]
+    Clamp,
+    /// Repeats the image, for textures that tile.
+    Repeat,
+}
+
+impl Wrap {
+    /// Returns the index within 0..n that `i` maps to.
+    #[inline]
+    pub fn index(self, i: i32, n: u32) -> u32 {
+        match self {
+            Self::Clamp => i.clamp(0, n as i32 - 1) as u32,
+            Self::Repeat => i.rem_euclid(n as i32) as u32,
+        }
+    }
+
+    /// Maps a coordinate into the range in which its texels are addressed.
+    #[inline]
+    fn coordinate(self, x: f32) -> f32 {
+        match self {
+            Self::Clamp => x.clamp(-1.0, 2.0),
+            Self::Repeat => x - x.floor(),
+        }
+    }
+
+    /// Returns the indices of the two texels around the coordinate `x` (0..1 over the image of `n` texels) and the
+    /// weight of the second.
+    #[inline]
+    pub(super) fn pair(self, x: f32, n: u32) -> (u32, u32, f32) {
+        let place = self.coordinate(x) * n as f32 - 0.5;
+        let floor = place.floor();
+        let i = floor as i32;
+        // A repeated coordinate is at most one texel outside, so no division is needed.
+        let index = |i: i32| match self {
+            Self::Repeat if i < 0 => n - 1,
+            Self::Repeat if i as u32 >= n => 0,
+            Self::Repeat => i as u32,
+            Self::Clamp => self.index(i, n),
+        };
+        (index(i), index(i + 1), place - floor)
+    }
+}
+
+/// One mip level.
+#[derive(Clone, Debug)]
+pub(super) struct Level<T> {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    tiles_x: u32,
+    texels: Vec<T>,
+}
+
+impl<T: Copy> Level<T> {
+    /// Creates the level from the value of each texel (x, y); tile texels beyond the edge repeat the last one.
+    pub(super) fn new(width: u32, height: u32, value: impl Fn(u32, u32) -> T) -> Self {
+        let (tiles_x, tiles_y) = (width.div_ceil(4), height.div_ceil(4));
+        let mut texels = Vec::with_capacity((tiles_x * tiles_y * 16) as usize);
+        for tile in 0..tiles_x * tiles_y {
+            let (x0, y0) = (tile % tiles_x * 4, tile / tiles_x * 4);
+            for i in 0..16 {
+                texels.push(value((x0 + i % 4).min(width - 1), (y0 + i / 4).min(height - 1)));
+            }
+        }
+        Self { width, height, tiles_x, texels }
+    }
+
+    #[inline]
+    pub(super) fn get(&self, x: u32, y: u32) -> T {
+        self.texels[(((y >> 2) * self.tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3)) as usize]
+    }
+}
+
+/// All mip levels, finest first.
+#[derive(Clone, Debug)]
+pub(super) struct Pyramid<T> {
+    pub(super) levels: Vec<Level<T>>,
+}
+
+impl<T: Copy> Pyramid<T> {
+    /// Returns the four texels around `uv` on the level nearest to `lod`, with their bilinear weights.
+    #[inline]
+    pub(super) fn taps(&self, uv: Vec2, lod: f32, wrap: Wrap) -> [(T, f32); 4] {
+        // `max` comes first so that NaN selects the finest level.
+        let level = &self.levels[((lod.max(0.0) + 0.5) as usize).min(self.levels.len() - 1)];
+        let (x0, x1, fx) = wrap.pair(uv.x, level.width);
+        let (y0, y1, fy) = wrap.pair(uv.y, level.height);
+        [
+            (level.get(x0, y0), (1.0 - fx) * (1.0 - fy)),
+            (level.get(x1, y0), fx * (1.0 - fy)),
+            (level.get(x0, y1), (1.0 - fx) * fy),
+            (level.get(x1, y1), fx * fy),
+        ]
+    }
+}
+
+/// Image with N floats per texel, row by row, from which pyramids are built.
+pub(super) struct Plane<const N: usize> {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) values: Vec<[f32; N]>,
+}
+
+impl<const N: usize> Plane<N> {
+    #[inline]
+    pub(super) fn get(&self, x: u32, y: u32) -> [f32; N] {
+        self.values[(y * self.width + x) as usize]
+    }
+}
+
+/// Returns the next coarser plane, or `None` after a single texel. Each texel is the exact mean of the area it covers,
+/// so odd sizes preserve the image's mean too.
+pub(super) fn halve<const N: usize>(width: u32, height: u32, value: impl Fn(u32, u32) -> [f32; N]) -> Option<Plane<N>> {
+    if width == 1 && height == 1 {
+        return None;
+    }
+    let (w, h) = ((width / 2).max(1), (height / 2).max(1));
+    let columns: Vec<_> = (0..w).map(|x| spans(x, width, w)).collect();
+    let mut values = Vec::with_capacity((w * h) as usize);
+    for y in 0..h {
+        let rows = spans(y, height, h);
+        for column in &columns {
+            let mut sum = [0.0; N];
+            for (dy, wy) in rows.weights.iter().enumerate().take(rows.count) {
+                for (dx, wx) in column.weights.iter().enumerate().take(column.count) {
+                    let v = value(column.first + dx as u32, rows.first + dy as u32);
+                    let weight = wx * wy;
+                    for (s, v) in sum.iter_mut().zip(v) {
+                        *s += weight * v;
+                    }
+                }
+            }
+            values.push(sum);
+        }
+    }
+    Some(Plane { width: w, height: h, values })
+}
+
+struct Spans {
+    first: u32,
+    count: usize,
+    weights: [f32; 4],
+}
+
+/// Returns the texels of `n` that the coarse texel `i` of `m` covers, with their area weights.
+fn spans(i: u32, n: u32, m: u32) -> Spans {
+    let scale = f64::from(n) / f64::from(m);
+    let (start, end) = (f64::from(i) * scale, (f64::from(i) * scale + scale).min(f64::from(n)));
+    let first = (start + 1e-9) as u32;
+    let mut spans = Spans { first, count: 0, weights: [0.0; 4] };
+    let mut at = f64::from(first);
+    while at < end - 1e-9 && spans.count < 4 {
+        spans.weights[spans.count] = (((at + 1.0).min(end) - at.max(start)) / scale) as f32;
+        spans.count += 1;
+        at += 1.0;
+    }
+    spans
+}

@@ -1,0 +1,170 @@
+//! Output files: images, radiance and labels. Each file appears completely or not at all. Files contain no timestamps
+//! or paths, so equal runs write equal bytes.
+
+mod atomic;
+pub mod cloud;
+mod denoise;
+mod exr;
+pub mod gltf;
+mod lock;
+pub mod mitsuba;
+mod overlay;
+mod photo;
+mod png;
+pub mod scan;
+
+use furrow_base::Result;
+use furrow_optics::sensor::{Deep, Photograph};
+use furrow_render::film::Film;
+use furrow_render::render::LabelMap;
+use furrow_render::scene::tag::Class;
+use std::path::{Path, PathBuf};
+
+pub use self::atomic::{
+    Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
+    stream_atomically, write_atomically, write_together,
+};
+pub use self::exr::{
+    Geometry, Precision, decode_geometry, encode_geometry, encode_layers, encode_planes, half, read_geometry,
+};
+pub use self::png::{
+    Map, Picture, decode_gray, decode_gray16, decode_indexed, decode_numbers, decode_rgb, encode as encode_png, packed,
+    read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
+};
+pub use denoise::Denoiser;
+pub use lock::Lock;
+pub use photo::{
+    ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, read_color_photo,
+    read_gray_photo, read_photo, resize_gray, shrink, shrunk,
+};
+
+/// Samples per pixel of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spp {
+    /// The same number for all pixels.
+    Uniform(u32),
+    /// Per tile, as required for a relative error; the EXR channel `spp` has the number of each pixel.
+    Adaptive {
+        /// Minimum, mean and maximum.
+        samples: (u32, f64, u32),
+        /// Requested relative error.
+        target: f32,
+    },
+}
+
+impl std::fmt::Display for Spp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Uniform(n) => write!(f, "{n}"),
+            Self::Adaptive { samples: (least, mean, most), target } => {
+                write!(f, "{least} to {most}, {mean:.1} on average, for a relative error of {target}")
+            }
+        }
+    }
+}
+
+/// Result of exporting a field to another program's format.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Export {
+    /// Paths of the files; the one that references the others comes last.
+    pub paths: Vec<PathBuf>,
+    /// Warnings about features that the other program does not support, one sentence each.
+    pub warnings: Vec<String>,
+    /// Amount of data in a few words, if the number of files is not informative.
+    pub amount: Option<String>,
+}
+
+/// Provenance of an image, which is stored in its files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Provenance {
+    /// SHA-256, in hex, of the scene file and all species files, textures and tables that it uses.
+    pub scene_hash: String,
+    /// Seed.
+    pub seed: u64,
+    /// Index of the field.
+    pub index: u64,
+    /// Samples per pixel.
+    pub spp: Spp,
+    /// Name of the integrator.
+    pub integrator: String,
+    /// Non-default options, each `key: value`: disabled techniques, limits that introduce bias.
+    pub deviations: Vec<String>,
+    /// Ray tracing kernels.
+    pub kernels: String,
+}
+
+impl Provenance {
+    /// Returns the provenance as text, with one `key: value` per line.
+    pub fn text(&self) -> String {
+        let text = format!(
+            "program: furrow {}\nscene: sha256 {}\nseed: {}\nindex: {}\nspp: {}\nintegrator: {}\nkernels: {}",
+            env!("CARGO_PKG_VERSION"),
+            self.scene_hash,
+            self.seed,
+            self.index,
+            self.spp,
+            self.integrator,
+            self.kernels
+        );
+        self.deviations.iter().fold(text, |text, deviation| text + "\n" + deviation)
+    }
+
+    /// Like [`Provenance::text`], for an image that may have been denoised.
+    pub fn photograph_text(&self, denoised: bool) -> String {
+        self.text() + if denoised { "\ndenoised: Open Image Denoise" } else { "" }
+    }
+}
+
+/// Writes an image file atomically.
+pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<()> {
+    write_atomically(path, &png::encode(width, height, picture, text)?)
+}
+
+/// Files to be written together: name and content.
+pub type Files = Vec<(&'static str, Vec<u8>)>;
+
+/// Returns all files of one image: `rgb.png`, `nir.png`, `radiance.exr`, `semantics.png`, `plants.png`, `leaves.png`,
+/// `overlay.png`; also `rgb16.png` and `nir16.png` for a sensor with more than 8 bits.
+pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
+    let (w, h) = (film.window.width(), film.window.height());
+    let text = provenance.text();
+    let classes: Vec<u8> = labels.tags.iter().map(|t| t.class as u8).collect();
+    let palette: Vec<[u8; 3]> = Class::ALL.iter().map(|c| c.color()).collect();
+    let plants: Vec<u32> = labels.tags.iter().map(|t| t.plant).collect();
+    let leaves: Vec<u16> = labels.tags.iter().map(|t| t.leaf).collect();
+    let rgb = photograph.rgb.as_chunks::<3>().0;
+    let overlay = overlay::draw(rgb, labels);
+    let mut files = vec![
+        ("rgb.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+        ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
+        ("semantics.png", png::encode(w, h, &Picture::Indexed(&classes, &palette), &text)?),
+        ("plants.png", png::encode(w, h, &Picture::Numbers(&plants), &text)?),
+        ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
+        ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
+    ];
+    if let Some(Deep { rgb, nir }) = &photograph.deep {
+        files.push(("rgb16.png", png::encode(w, h, &Picture::Rgb16(rgb.as_chunks::<3>().0), &text)?));
+        files.push(("nir16.png", png::encode(w, h, &Picture::Gray16(nir), &text)?));
+    }
+    Ok(files)
+}
+
+/// Returns the files of a denoised image: `rgb_denoised.png`, `nir_denoised.png`, `denoised.exr` (R, G, B, NIR only).
+pub fn denoised_files(film: &Film, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
+    let (w, h) = (film.window.width(), film.window.height());
+    let text = provenance.photograph_text(true);
+    let rgb = photograph.rgb.as_chunks::<3>().0;
+    Ok(vec![
+        ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
+        ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("denoised.exr", exr::encode_radiance(film, &text)?),
+    ])
+}
+
+/// Writes files into `folder`, all or none, and returns their paths.
+pub fn write_files(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<Vec<PathBuf>> {
+    write_together(folder, |together| {
+        files.iter().try_for_each(|(name, bytes)| together.add(&folder.join(name), bytes))
+    })
+}

@@ -1,0 +1,73 @@
+//! `scan.ply`: LiDAR measurements of a field, with the properties of a [cloud](super::cloud) and additional ones.
+
+use super::cloud::{Cloud, Column, Point, Value};
+use super::write_together;
+use furrow_base::Result;
+use furrow_base::math::Vec3;
+use furrow_field::Field;
+use furrow_optics::sensor::Lidar;
+use furrow_optics::texture::ColorSpace;
+use furrow_render::render::Echo;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Additional properties of a scan's points.
+const COLUMNS: [Column; 9] = [
+    Column::float("range"),
+    Column::float("intensity"),
+    Column::float("reflectance"),
+    Column::float("azimuth"),
+    Column::float("time"),
+    Column::ushort("beam"),
+    Column::uchar("return_number"),
+    Column::uchar("number_of_returns"),
+    Column::uint("plant_id"),
+];
+
+/// Returns the points of a scan of a field.
+pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
+    let mut cloud = Cloud::with(&COLUMNS);
+    cloud.comment(&field.provenance());
+    let vector = |name: &str, v: Vec3| format!("lidar {name}: {} {} {}", v.x, v.y, v.z);
+    cloud.comment(&vector("position_m", lidar.position));
+    for (name, axis) in [("right", lidar.axes.x_axis), ("ahead", lidar.axes.y_axis), ("up", lidar.axes.z_axis)] {
+        cloud.comment(&vector(name, axis));
+    }
+    cloud.comment(&vector("velocity_m_s", lidar.velocity));
+    let ids: BTreeMap<u32, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
+    for echo in echoes {
+        let part = &field.scene.parts[echo.part as usize];
+        let [r, g, b, nir] = echo.reflectance.to_array().map(|linear| ColorSpace::Srgb.encode(linear));
+        let point = Point {
+            at: echo.at().to_array(),
+            normal: echo.normal.to_array(),
+            rgb: [r, g, b],
+            nir,
+            kind: [part.tag.class as u8, field.kinds[echo.part as usize].number()],
+            plant: part.tag.plant,
+            leaf: part.tag.leaf,
+        };
+        let pulse = &echo.pulse;
+        cloud.add_with(
+            &point,
+            &[
+                Value::Float(echo.range),
+                Value::Float(echo.intensity),
+                Value::Float(echo.intensity * echo.range * echo.range),
+                Value::Float(pulse.azimuth_deg),
+                Value::Float(pulse.time_s),
+                Value::Ushort(pulse.beam),
+                Value::Uchar(echo.number),
+                Value::Uchar(echo.count),
+                Value::Uint(ids.get(&part.tag.plant).copied().unwrap_or(0)),
+            ],
+        );
+    }
+    cloud
+}
+
+/// Writes `scan.ply` into `folder`.
+pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Result<Vec<PathBuf>> {
+    let file = cloud(field, lidar, echoes).file(env!("CARGO_PKG_VERSION"));
+    write_together(folder, |together| together.add(&folder.join("scan.ply"), &file))
+}

@@ -1,0 +1,147 @@
+//! Renders tiles in parallel into a film. Results are bit-identical for any number of threads.
+
+mod adaptive;
+mod coverage;
+mod explain;
+mod extent;
+pub mod label;
+mod progressive;
+pub mod scan;
+mod tiles;
+
+use crate::accel::prepare_thread;
+use crate::film::{Accumulator, Film, Pixel};
+use crate::integrator::{Integrator, Sample, World};
+use furrow_base::geometry::{PACKET, Ray, Window};
+use furrow_base::math::vec2;
+use furrow_base::sampling::{Points, Sampler, sets};
+use furrow_base::{Error, Result};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+pub use adaptive::adaptive;
+pub use coverage::coverage;
+pub use explain::explain;
+pub use extent::{Extent, extents};
+pub use label::{LabelMap, label};
+pub use progressive::{Progressive, timed};
+pub use scan::{Echo, scan};
+
+/// Settings of a rendering.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Samples per pixel, 1 to [`Sampler::MAX_SAMPLES`].
+    pub spp: u32,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Window of pixels to render.
+    pub window: Window,
+    /// Kind of sample points.
+    pub points: Points,
+}
+
+/// Progress callback and stop flag of a rendering.
+pub struct Watch<'a> {
+    /// Called from any thread with the number of samples just finished.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Set this flag to stop the rendering.
+    pub stop: &'a AtomicBool,
+}
+
+impl Default for Watch<'_> {
+    /// No progress callback; never stops.
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { done: &|_| (), stop: &NEVER }
+    }
+}
+
+impl Watch<'_> {
+    /// Returns `true` if the rendering must stop.
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Builds a pool of `threads` workers (0: one per core) that flush denormals like Embree's own threads.
+pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .start_handler(|_| prepare_thread())
+        .build()
+        .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))
+}
+
+/// Renders a window. Call it inside the `install` of a [`pool`].
+pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, watch: &Watch<'_>) -> Result<Film> {
+    let tiles = tiles::tiles(settings.window);
+    let rendered: Vec<Vec<Pixel>> = tiles
+        .par_iter()
+        .map(|tile| {
+            // Checked for every pixel, because with thousands of samples a tile takes minutes. Incomplete tiles are
+            // discarded.
+            let pixels: Vec<Pixel> = tiles::pixels(*tile)
+                .take_while(|_| !watch.stopped())
+                .map(|(x, y)| pixel(world, integrator, settings, x, y))
+                .collect();
+            (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
+            pixels
+        })
+        .collect();
+    if watch.stopped() {
+        return Err(Error::interrupted());
+    }
+    let pixels = tiles::assemble(settings.window, tiles.into_iter().zip(rendered));
+    Ok(Film { window: settings.window, pixels })
+}
+
+/// Renders one pixel, as within a tile; `--pixel` uses it too.
+pub fn pixel(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, x: u32, y: u32) -> Pixel {
+    let mut sum = Accumulator::default();
+    gather(world, integrator, settings, (x, y), 0..settings.spp, &mut sum);
+    sum.finish()
+}
+
+/// Adds samples of one pixel to its accumulator, in order, in packets aligned to multiples of [`PACKET`]. A range of
+/// samples that starts and ends at such multiples gives the same bits as part of a larger range.
+fn gather(
+    world: &World<'_>,
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    at: (u32, u32),
+    samples: Range<u32>,
+    sum: &mut Accumulator,
+) {
+    let spread = world.scene.camera.pixel_angle();
+    for packet in samples.start / PACKET as u32..samples.end.div_ceil(PACKET as u32) {
+        let mut wanted = [None; PACKET];
+        for (index, wanted) in (packet * PACKET as u32..).zip(&mut wanted) {
+            if samples.contains(&index) {
+                *wanted = Some(sample(world, settings, at, index));
+            }
+        }
+        for (seen, _) in integrator.li_packet(world, &wanted, spread).iter().zip(&wanted).filter(|(_, s)| s.is_some()) {
+            sum.add(seen.radiance);
+            if let Some(first) = seen.first {
+                sum.add_first(first.part, first.albedo, first.normal, first.distance);
+            }
+        }
+    }
+}
+
+/// Builds sample number `index` of a pixel.
+#[inline]
+fn sample(world: &World<'_>, settings: &Settings, (x, y): (u32, u32), index: u32) -> Sample {
+    let (camera, filter) = (&world.scene.camera, &world.scene.filter);
+    let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
+    let [u, v, ..] = sampler.get4(sets::FIRST);
+    let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + filter.sample([u, v]);
+    let lens = camera.aperture().map_or([0.0; 2], |_| {
+        let [u, v, ..] = sampler.get4(sets::LENS);
+        [u, v]
+    });
+    let shutter = if camera.blurs() { sampler.get4(sets::SHUTTER)[0] } else { 0.5 };
+    let (origin, direction) = camera.ray_during(at, lens, shutter);
+    Sample { ray: Ray::new(origin, direction), sampler }
+}

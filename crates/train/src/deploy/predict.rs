@@ -1,0 +1,283 @@
+//! Prediction of images: class maps and overlays from a trained model.
+//!
+//! Reader and writer threads run beside the network, so that it does not wait for input or output. An unreadable image is reported and does
+//! not stop the prediction of the others.
+
+use super::pictures::{PREDICTION, Picture, Prediction, files};
+use super::{enlarge, overlay};
+use crate::data::resize::{self, Input};
+use crate::ensemble::Ensemble;
+use crate::refine::{Appearance, Refine};
+use crate::run::ModelCard;
+use crate::session::Machine;
+use crate::torch::multiscale::{self, Scores};
+use crate::torch::{Model, device};
+use furrow_base::{Error, Result};
+use furrow_output::Picture as Png;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
+use std::time::Instant;
+
+/// Options of a prediction.
+pub struct Options<'a> {
+    /// `auto`, `f32` or `bf16`.
+    pub precision: &'a str,
+    /// Number of compute threads.
+    pub threads: usize,
+    /// Batch size; ≥ 1.
+    pub batch: usize,
+    /// Ground sampling distance of the images in millimetres a pixel, if images are resized by it; recorded in `prediction.json`.
+    pub pixel_mm: Option<f64>,
+    /// Progress callback: receives the number of finished passes, out of [`passes`].
+    pub done: &'a (dyn Fn(usize) + Sync),
+    /// Set by the caller to stop early.
+    pub stop: &'a AtomicBool,
+}
+
+/// Result of [`predict`].
+#[derive(Debug, Default)]
+pub struct Predictions {
+    /// Files written: two per image in the order of the images, then `prediction.json`.
+    pub paths: Vec<PathBuf>,
+    /// Number of images with a prediction.
+    pub done: usize,
+    /// One error for each image that could not be read.
+    pub faults: Vec<Error>,
+    /// Time spent in the network, seconds.
+    pub seconds: f64,
+}
+
+/// An image that has been read and prepared for the network.
+struct Ready<'a> {
+    picture: &'a Picture,
+    width: u32,
+    height: u32,
+    rgb: Vec<[u8; 3]>,
+    /// Network inputs: the normalized image at one or several sizes.
+    inputs: Vec<Input>,
+}
+
+/// Returns the number of images that go through the network. Images that the appearance features are learnt from count twice.
+pub fn passes(card: &ModelCard, pictures: usize) -> usize {
+    pictures + multiscale::learnt_from(card.refine, pictures).len()
+}
+
+/// Capacity of each queue between the network and a reader or writer thread, images.
+const AHEAD: usize = 2;
+
+/// Predicts the classes of images. Writes two PNG files per image into `out`, both at the image's original size: the class map (indexed
+/// colours) and its overlay on the image. Fails if it would overwrite files that are not predictions of the same images.
+pub fn predict(
+    trained: &Ensemble,
+    pictures: &[Picture],
+    out: &Path,
+    machine: &Machine,
+    options: &Options<'_>,
+) -> Result<Predictions> {
+    let card = &trained.card;
+    let place = machine.place(options.precision)?;
+    device::set_threads(options.threads);
+    let models = trained.models(place)?;
+    let prediction = Prediction::claim(out, card, options.pixel_mm, pictures)?;
+    let workers = machine.loaders.max(1);
+    let failed = AtomicBool::new(false);
+    let mut made = Predictions::default();
+    let mut unread = Vec::new();
+    let (appearance, learnt) = learn(&models, card, pictures, options)?;
+    std::thread::scope(|scope| -> Result<()> {
+        let readers: Vec<_> =
+            (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect::<Result<_>>()?;
+        let begun = (0..workers).map(|_| write(scope, card, out, appearance.as_ref(), &failed));
+        let (writers, handles): (Vec<_>, Vec<_>) = begun.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        let mut batch = Vec::new();
+        for number in 0..pictures.len() {
+            if options.stop.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
+                break;
+            }
+            match readers[number % workers].recv() {
+                Ok(Ok(ready)) => batch.push((number, ready)),
+                Ok(Err(fault)) => {
+                    unread.push(pictures[number].name.as_str());
+                    made.faults.push(fault);
+                }
+                Err(_) => break,
+            }
+            if batch.len() == options.batch || number + 1 == pictures.len() {
+                made.seconds += infer(&models, card.refine, std::mem::take(&mut batch), &writers)?;
+                (options.done)(learnt + number + 1);
+            }
+        }
+        drop((readers, writers));
+        let mut written = Vec::new();
+        for handle in handles {
+            written.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
+        }
+        written.sort();
+        made.done = written.len();
+        made.paths = written.into_iter().flat_map(|(_, paths)| paths).collect();
+        Ok(())
+    })?;
+    if options.stop.load(Ordering::Relaxed) {
+        let words = format!("stopped: {} of {} images are predicted", made.done, pictures.len());
+        return Err(Error::stopped(words).help("run the same command again to predict all of them").in_file(out));
+    }
+    if !unread.is_empty() {
+        prediction.forget(out, &unread)?;
+    }
+    made.paths.push(out.join(PREDICTION));
+    Ok(made)
+}
+
+impl<'a> Ready<'a> {
+    fn read(picture: &'a Picture, card: &ModelCard) -> Result<Self> {
+        let found = picture.read()?;
+        let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
+        let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
+        let inputs = resize::inputs(&found.planes, size, &sizes, &card.normalization);
+        Ok(Self { picture, width: found.width, height: found.height, rgb: found.rgb, inputs })
+    }
+}
+
+/// Learns the appearance model of crop and weeds from some of the images, if `--refine appearance` asks for it. Returns the model and the
+/// number of images picked for it. Unreadable images are skipped here and reported when they are predicted.
+fn learn(
+    models: &[Model],
+    card: &ModelCard,
+    pictures: &[Picture],
+    options: &Options<'_>,
+) -> Result<(Option<Appearance>, usize)> {
+    let picked = multiscale::learnt_from(card.refine, pictures.len());
+    // After a stop request this ends early; the caller reports the stop.
+    let going = |_: &(usize, &usize)| !options.stop.load(Ordering::Relaxed);
+    let read = |(k, place): (usize, &usize)| {
+        (options.done)(k);
+        Ready::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
+    };
+    let inputs = picked.iter().enumerate().take_while(going).filter_map(read);
+    let found = multiscale::learn(models, card.refine, &card.input.bands, inputs)?;
+    Ok((found, picked.len()))
+}
+
+/// Starts a thread that reads the images and sends them to the returned receiver.
+fn read<'s, 'a: 's>(
+    scope: &'s Scope<'s, '_>,
+    card: &'a ModelCard,
+    pictures: impl Iterator<Item = &'a Picture> + Send + 's,
+) -> Result<Receiver<Result<Ready<'a>>>> {
+    let (sender, receiver) = sync_channel(AHEAD);
+    let work = move || {
+        for picture in pictures {
+            let ready = Ready::read(picture, card);
+            // The receiver is gone: the prediction was stopped.
+            if sender.send(ready).is_err() {
+                return;
+            }
+        }
+    };
+    Builder::new().name("reader".into()).spawn_scoped(scope, work).map_err(Error::no_thread)?;
+    Ok(receiver)
+}
+
+/// Index of an image, the image, and its class scores.
+type Scored<'a> = (usize, Ready<'a>, Scores);
+/// Index of each image and the files written for it.
+type Written = Result<Vec<(usize, [PathBuf; 2])>>;
+
+/// Starts a thread that writes the predictions sent to it; sets `failed` if a file cannot be written.
+fn write<'s, 'a: 's>(
+    scope: &'s Scope<'s, '_>,
+    card: &'a ModelCard,
+    out: &'a Path,
+    appearance: Option<&'s Appearance>,
+    failed: &'s AtomicBool,
+) -> Result<(SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>)> {
+    let (sender, receiver) = sync_channel::<Scored<'a>>(AHEAD);
+    let work = move || {
+        let mut written = Vec::new();
+        for (number, ready, mut scores) in receiver {
+            match draw(card, out, &ready, &mut scores, appearance) {
+                Ok(paths) => written.push((number, paths)),
+                Err(e) => {
+                    failed.store(true, Ordering::Relaxed);
+                    return Err(e);
+                }
+            }
+        }
+        Ok(written)
+    };
+    let handle = Builder::new().name("writer".into()).spawn_scoped(scope, work).map_err(Error::no_thread)?;
+    Ok((sender, handle))
+}
+
+/// Runs the networks on a batch and sends the scores to the writers. Returns the time spent in the networks, seconds.
+fn infer<'a>(
+    models: &[Model],
+    refine: Refine,
+    batch: Vec<(usize, Ready<'a>)>,
+    writers: &[SyncSender<Scored<'a>>],
+) -> Result<f64> {
+    let begun = Instant::now();
+    // Consecutive images go through the network together if there is one network and one input per image, of equal size.
+    let alike = |a: &(usize, Ready<'_>), b: &(usize, Ready<'_>)| match (a.1.inputs.as_slice(), b.1.inputs.as_slice()) {
+        ([a], [b]) => models.len() == 1 && a.size == b.size && !refine.appearance,
+        _ => false,
+    };
+    let mut all = Vec::new();
+    for group in batch.chunk_by(alike) {
+        match group {
+            [(_, ready)] => all.push(multiscale::scores(models, refine, &ready.inputs)?),
+            several => {
+                let size = several[0].1.inputs[0].size;
+                let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();
+                let values = models[0].scores(&pixels, size)?;
+                let each = values.chunks_exact(values.len() / several.len());
+                let whole = |values: &[f32]| Scores {
+                    values: values.to_vec(),
+                    size,
+                    finest: None,
+                    features: None,
+                    are_logits: true,
+                };
+                all.extend(each.map(whole));
+            }
+        }
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    for ((number, ready), scores) in batch.into_iter().zip(all) {
+        // A writer that has ended returns its error when it is joined.
+        let _ = writers[number % writers.len()].send((number, ready, scores));
+    }
+    Ok(seconds)
+}
+
+/// Refines the scores of one image and writes its class map and overlay; returns the two paths.
+fn draw(
+    card: &ModelCard,
+    out: &Path,
+    ready: &Ready<'_>,
+    scores: &mut Scores,
+    appearance: Option<&Appearance>,
+) -> Result<[PathBuf; 2]> {
+    let (width, height) = (ready.width, ready.height);
+    scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
+    let colors = card.classes.colors();
+    let classes = enlarge::classes_at(&scores.values, scores.size, (width, height));
+    let over = overlay::draw(&ready.rgb, &classes, width, &colors);
+    let text = format!(
+        "program: furrow {}\nnetwork: {}\nweights: sha256 {}\nclasses: {}",
+        env!("CARGO_PKG_VERSION"),
+        card.network.name(),
+        card.weights_sha256,
+        card.classes.names().join("; ")
+    );
+    let paths = files(&ready.picture.name).map(|file| out.join(file));
+    let labels = furrow_output::encode_png(width, height, &Png::Indexed(&classes, &colors), &text)?;
+    let over = furrow_output::encode_png(width, height, &Png::Rgb(&over), &text)?;
+    furrow_output::write_together(out, |files| {
+        files.add(&paths[0], &labels)?;
+        files.add(&paths[1], &over)
+    })?;
+    Ok(paths)
+}

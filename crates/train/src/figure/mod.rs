@@ -1,0 +1,17 @@
+//! Figures and report pages of trained networks.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `shot`, `sheet` | image, ground truth and predictions side by side: the paper's figure, as one PNG |
+//! | `shots` | selection of the images to show |
+//! | `page` | numbers, curves and images of a run or an evaluation on one HTML page |
+
+mod page;
+mod sheet;
+mod shot;
+mod shots;
+
+pub use page::{Page, Plot};
+pub use sheet::{Sheet, sheet};
+pub use shot::{Shot, spread};
+pub use shots::Shots;

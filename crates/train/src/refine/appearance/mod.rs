@@ -1,0 +1,305 @@
+//! Refinement step `appearance`: plants of one field with similar appearance features tend to be of one class.
+//!
+//! A network cannot recognize a crop that it was never trained on. The rows, the plant sizes and the network give each plant of a
+//! field a probability of being crop. These probabilities are the labels from which a classifier learns the appearance of crop and
+//! weeds in this field; a plant between rows that looks like the plants in rows is then crop. This needs no labelled images and no
+//! further training of the network.
+//!
+//! Appearance features are activations of the network's encoder, at its levels with strides of 8 and 16 pixels.
+//!
+//! The classifier is weighted by its cross-validated accuracy on held-out images. If crop and weeds look alike, or all plants are of one
+//! class, a classifier can only predict the more frequent class; it is then left out.
+//!
+//! Source: self-training on the arrangement of plants, Lottes & Stachniss 2017, "Semi-supervised online visual crop and weed
+//! classification in precision farming exploiting plant arrangement"; features and constants are our choice.
+
+mod logistic;
+
+use crate::measure::components::Components;
+use logistic::Classifier;
+use std::collections::BTreeMap;
+
+pub use logistic::Examples;
+
+/// Weight of the appearance log odds relative to the sum of the other log odds.
+const WEIGHT: f64 = 8.0;
+/// Weight of the local log odds at a pixel; the rest, 1 − `PLACE`, is that of the mean over its plant.
+const PLACE: f64 = 0.5;
+/// Standard deviation of the Gaussian blur of the local log odds, as a fraction of the longer side of the feature map.
+const BLUR: f64 = 1.0 / 60.0;
+/// Bound on the absolute log odds of the labels.
+const SURE: f64 = 8.0;
+/// Maximum number of regions per image used as examples, the largest first: bounds the memory on noisy predictions.
+const MOST: usize = 2000;
+/// Range of the cross-validated pseudo-R² over which the classifier's weight rises linearly from 0 to 1.
+const TOLD: (f64, f64) = (0.05, 0.15);
+/// Minimum number of images with plants: within one image, plants only repeat the errors of its rows.
+const LEAST: usize = 2;
+
+/// Encoder features of an image: a vector for each cell of a grid.
+#[derive(Clone, Debug, Default)]
+pub struct Features {
+    /// Width and height of the grid, cells.
+    pub size: (usize, usize),
+    /// One plane of cells per feature.
+    pub planes: Vec<Vec<f32>>,
+}
+
+impl Features {
+    /// Returns the index of the cell that contains pixel `at` of an image of this size.
+    fn cell(&self, at: usize, (width, height): (usize, usize)) -> usize {
+        let (x, y) = (at % width * self.size.0 / width, at / width * self.size.1 / height);
+        y * self.size.0 + x
+    }
+
+    /// Interpolates cell values bilinearly between cell centres at pixel `at` of an image of this size.
+    fn between(&self, values: &[f64], at: usize, (width, height): (usize, usize)) -> f64 {
+        let place = |pixel: usize, pixels: usize, cells: usize| {
+            let place = ((pixel as f64 + 0.5) * cells as f64 / pixels as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
+            (place as usize, (place as usize + 1).min(cells - 1), place.fract())
+        };
+        let (left, right, x) = place(at % width, width, self.size.0);
+        let (above, below, y) = place(at / width, height, self.size.1);
+        let linear = |from: f64, to: f64, share: f64| from + (to - from) * share;
+        let row = |row: usize| linear(values[row * self.size.0 + left], values[row * self.size.0 + right], x);
+        linear(row(above), row(below), y)
+    }
+
+    /// Counts the pixels of each (region, cell) pair; regions are numbered from 0. `size` is that of the image.
+    fn shared(&self, regions: &Components, size: (usize, usize)) -> BTreeMap<(usize, usize), f32> {
+        let mut shared = BTreeMap::new();
+        for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            *shared.entry((*region as usize - 1, self.cell(at, size))).or_insert(0.0) += 1.0;
+        }
+        shared
+    }
+}
+
+impl Examples {
+    /// Collects the largest regions of an image as examples. `odds` holds each region's log odds of crop over weed from the
+    /// network, sizes and rows; an example's weight is the square root of its area.
+    pub(super) fn of(regions: &Components, size: (usize, usize), odds: &[f64], features: &Features) -> Self {
+        let mut largest: Vec<usize> = (0..regions.areas.len()).collect();
+        largest.sort_by_key(|region| std::cmp::Reverse(regions.areas[*region]));
+        largest.truncate(MOST);
+        let mut places = vec![None; regions.areas.len()];
+        largest.iter().enumerate().for_each(|(place, region)| places[*region] = Some(place));
+        let channels = features.planes.len();
+        let mut means = vec![0.0f32; largest.len() * channels];
+        for ((region, cell), pixels) in features.shared(regions, size) {
+            let Some(place) = places[region] else { continue };
+            let share = pixels / regions.areas[region] as f32;
+            let means = &mut means[place * channels..(place + 1) * channels];
+            means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
+        }
+        let label = |region: &usize| 1.0 / (1.0 + (-odds[*region].clamp(-SURE, SURE)).exp());
+        Self {
+            features: means,
+            labels: largest.iter().map(label).collect(),
+            weights: largest.iter().map(|region| f64::from(regions.areas[*region]).sqrt()).collect(),
+        }
+    }
+}
+
+/// Appearance model of crop and weeds in one field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appearance {
+    classifier: Classifier,
+    /// Weight of the classifier by its cross-validated accuracy, 0 to 1.
+    trust: f64,
+}
+
+impl Appearance {
+    /// Learns the model from the plants of several images. Returns `None` if there are too few of them or if appearance does not
+    /// predict the labels of held-out images.
+    pub fn learn(pictures: &[Examples]) -> Option<Self> {
+        let pictures: Vec<&Examples> = pictures.iter().filter(|picture| !picture.labels.is_empty()).collect();
+        if pictures.len() < LEAST {
+            return None;
+        }
+        let (mut all, mut numbers) = (Examples::default(), Vec::new());
+        for (number, picture) in pictures.into_iter().enumerate() {
+            all.features.extend(&picture.features);
+            all.labels.extend(&picture.labels);
+            all.weights.extend(&picture.weights);
+            numbers.resize(all.labels.len(), number);
+        }
+        let (classifier, told) = all.learn(&numbers)?;
+        let trust = ((told - TOLD.0) / (TOLD.1 - TOLD.0)).clamp(0.0, 1.0);
+        (trust > 0.0).then_some(Self { classifier, trust })
+    }
+
+    /// Returns the term to add to the log odds of crop over weed at each plant pixel of an image; 0 at other pixels.
+    pub(super) fn log_odds(&self, regions: &Components, size: (usize, usize), features: &Features) -> Vec<f64> {
+        let cells = self.cells(features);
+        let mut counts = vec![0.0; cells.len()];
+        let mut sums = vec![0.0; regions.areas.len()];
+        for ((region, cell), pixels) in features.shared(regions, size) {
+            counts[cell] += f64::from(pixels);
+            sums[region] += f64::from(pixels) * cells[cell];
+        }
+        let near = blurred(&cells, &counts, features.size);
+        let value = |(at, region): (usize, &u32)| {
+            let Some(region) = (*region as usize).checked_sub(1) else { return 0.0 };
+            let whole = sums[region] / f64::from(regions.areas[region]);
+            WEIGHT * self.trust * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
+        };
+        regions.labels.iter().enumerate().map(value).collect()
+    }
+
+    /// Evaluates the classifier in each cell; returns log odds.
+    fn cells(&self, features: &Features) -> Vec<f64> {
+        let mut cells = vec![self.classifier.bias; features.size.0 * features.size.1];
+        for (plane, weight) in features.planes.iter().zip(&self.classifier.weights) {
+            cells.iter_mut().zip(plane).for_each(|(cell, value)| *cell += weight * f64::from(*value));
+        }
+        cells
+    }
+}
+
+/// Blurs cell values with a Gaussian, each cell weighted by its number of plant pixels. Cells without plants nearby keep their value.
+fn blurred(values: &[f64], counts: &[f64], (width, height): (usize, usize)) -> Vec<f64> {
+    let sd = BLUR * width.max(height) as f64;
+    let reach = (3.0 * sd).ceil() as isize;
+    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sd.max(1e-9)).powi(2)).exp()).collect();
+    let along = |grid: &[f64], stride: usize, cells: usize| -> Vec<f64> {
+        let value = |at: usize| {
+            let place = (at / stride % cells) as isize;
+            let near = (-reach..=reach).zip(&kernel).filter(|(k, _)| (0..cells as isize).contains(&(place + k)));
+            near.map(|(k, weight)| weight * grid[at.wrapping_add_signed(k * stride as isize)]).sum()
+        };
+        (0..grid.len()).map(value).collect()
+    };
+    let both = |grid: Vec<f64>| along(&along(&grid, 1, width), width, height);
+    let (sums, all) = (both(values.iter().zip(counts).map(|(v, n)| v * n).collect()), both(counts.to_vec()));
+    let value = |((sum, all), value): ((&f64, &f64), &f64)| if *all > 0.0 { sum / all } else { *value };
+    sums.iter().zip(&all).zip(values).map(value).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use furrow_base::sampling::{Purpose, Stream};
+
+    /// Builds an image of 80 × 80 pixels in cells of 8. Each plant (cell x, cell y, feature value, log odds by rows) covers 6 × 6
+    /// pixels of its cell. Returns the regions, the features and the log odds.
+    fn picture(plants: &[(usize, usize, f32, f64)]) -> (Components, Features, Vec<f64>) {
+        let inside = |at: usize| {
+            let (x, y) = (at % 80, at / 80);
+            let plant = plants.iter().position(|(cx, cy, ..)| x / 8 == *cx && y / 8 == *cy)?;
+            ((1..7).contains(&(x % 8)) && (1..7).contains(&(y % 8))).then_some(plant)
+        };
+        let regions = Components::of(80, 80, inside);
+        let cell =
+            |c: usize| plants.iter().find(|(x, y, ..)| (*x, *y) == (c % 10, c / 10)).map_or(0.0, |plant| plant.2);
+        let plane: Vec<f32> = (0..100).map(cell).collect();
+        let other = (0..100).map(|c| (c % 7) as f32).collect();
+        let mut order: Vec<_> = plants.to_vec();
+        order.sort_by_key(|(x, y, ..)| (*y, *x));
+        (regions, Features { size: (10, 10), planes: vec![plane, other] }, order.iter().map(|plant| plant.3).collect())
+    }
+
+    /// Expected: if plants in rows and plants between rows differ in appearance, a plant between rows that looks like those in rows
+    /// is crop and a plant in a row that looks like those between rows is weed; soil has log odds 0. Source: the rule.
+    #[test]
+    fn plants_that_look_alike_are_of_one_class() {
+        let crops = [(2, 0), (2, 2), (2, 4), (2, 6), (7, 1), (7, 3), (7, 5), (7, 7)].map(|(x, y)| (x, y, 1.0, 3.0));
+        let weeds = [(0, 1), (4, 3), (5, 5), (4, 7), (0, 9), (9, 0)].map(|(x, y)| (x, y, -1.0, -3.0));
+        let odd = [(2, 8, -1.0, 3.0), (9, 9, 1.0, -3.0)];
+        let plants = [crops.as_slice(), &weeds, &odd].concat();
+        let (regions, features, evidence) = picture(&plants);
+        assert_eq!(regions.areas, [36; 16]);
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
+        let appearance = Appearance::learn(&[learnt(), learnt(), Examples::default()]).unwrap();
+        let odds = appearance.log_odds(&regions, (80, 80), &features);
+        for (x, y, looks, rows) in plants {
+            let at = (y * 8 + 4) * 80 + x * 8 + 4;
+            assert_eq!(odds[at] + rows > 0.0, looks > 0.0, "({x}, {y}): {}", odds[at]);
+        }
+        assert!(regions.labels.iter().zip(&odds).all(|(region, odds)| (*region == 0) == (*odds == 0.0)));
+    }
+
+    /// Expected: appearance that predicts the labels of held-out images counts fully; it is left out if it does not predict them, or if all
+    /// plants have one label; if it predicts a third of the labels it counts in part. Source: the rule.
+    #[test]
+    fn looks_count_as_far_as_they_tell_on_other_pictures() {
+        let mut s = Stream::of(4, 0, Purpose::Test, 0);
+        let mut field = |share: f64, kinds: bool| -> Vec<Examples> {
+            let mut one = |_| {
+                let mut examples = Examples::default();
+                for _ in 0..60 {
+                    let crop = s.chance(0.5);
+                    let follows = s.chance(share);
+                    let says = if follows { crop } else { s.chance(0.5) };
+                    let looks = if crop { 1.0 } else { -1.0 };
+                    examples.features.extend([looks + 0.2 * s.normal() as f32, s.normal() as f32]);
+                    examples.labels.push(if says || !kinds { 0.95 } else { 0.05 });
+                    examples.weights.push(s.range(0.5, 2.0));
+                }
+                examples
+            };
+            (0..8).map(&mut one).collect()
+        };
+        let trust = |pictures: &[Examples]| Appearance::learn(pictures).map_or(0.0, |found| found.trust);
+        assert_eq!(trust(&field(0.9, true)), 1.0);
+        assert_eq!(trust(&field(0.0, true)), 0.0);
+        assert_eq!(trust(&field(0.9, false)), 0.0);
+        let part = trust(&field(0.33, true));
+        assert!(part > 0.0 && part < 1.0, "{part}");
+    }
+
+    /// Expected: nothing is learnt from one image alone, nor from images without plants. Source: the rule.
+    #[test]
+    fn one_picture_says_too_little() {
+        let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let plants: Vec<_> = (0..10).map(|k| (k, k, side(k), f64::from(side(k)))).collect();
+        let (regions, features, evidence) = picture(&plants);
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
+        assert!(Appearance::learn(&[learnt()]).is_none());
+        assert!(Appearance::learn(&[learnt(), Examples::default()]).is_none());
+        assert!(Appearance::learn(&[]).is_none());
+        assert!(Appearance::learn(&[learnt(), learnt()]).is_some());
+    }
+
+    /// Expected: if each cell holds x + 10 y of its centre, interpolation returns x + 10 y of each pixel's centre; beyond the
+    /// outermost cell centres values are clamped. Source: linear interpolation.
+    #[test]
+    fn values_are_linear_between_cells() {
+        let features = Features { size: (5, 4), planes: Vec::new() };
+        let centre = |c: usize| ((c % 5) as f64 + 0.5) * 8.0 + 10.0 * ((c / 5) as f64 + 0.5) * 8.0;
+        let values: Vec<f64> = (0..20).map(centre).collect();
+        for (x, y) in [(4, 4), (10, 4), (17, 21), (35, 27), (0, 0), (39, 31)] {
+            let (cx, cy) = ((x as f64 + 0.5).clamp(4.0, 36.0), (y as f64 + 0.5).clamp(4.0, 28.0));
+            let found = features.between(&values, y * 40 + x, (40, 32));
+            assert!((found - cx - 10.0 * cy).abs() < 1e-9, "({x}, {y}): {found}");
+        }
+    }
+
+    /// Expected: a constant map stays constant up to its edges, whichever cells hold plants; without plants values stay; a step is
+    /// smoothed. Source: the rule.
+    #[test]
+    fn blurring_keeps_what_is_even() {
+        let counts: Vec<f64> = (0..600).map(|c| f64::from(u8::from(c % 3 == 0))).collect();
+        let even = blurred(&[0.25; 600], &counts, (30, 20));
+        assert!(even.iter().all(|v| (v - 0.25).abs() < 1e-12), "{even:?}");
+        assert_eq!(blurred(&[1.0, 2.0], &[0.0, 0.0], (2, 1)), [1.0, 2.0]);
+        let halves: Vec<f64> = (0..600).map(|c| if c % 30 < 15 { 1.0 } else { -1.0 }).collect();
+        let soft = blurred(&halves, &[1.0; 600], (30, 20));
+        assert!(soft[0] > 0.999 && soft[29] < -0.999 && soft[14].abs() < 0.9 && (soft[14] + soft[15]).abs() < 1e-9);
+    }
+
+    /// Expected: of 2500 specks and one plant with the last region number, the plant is the first example and specks fill the rest.
+    /// Source: the rule.
+    #[test]
+    fn the_largest_regions_are_learnt_from() {
+        let plant = |at: usize| at / 202 > 100 && at % 202 < 10;
+        let speck = |at: usize| [at / 202, at % 202].iter().all(|place| *place < 100 && place & 1 == 0);
+        let regions = Components::of(202, 110, |at| (plant(at) || speck(at)).then_some(()));
+        assert_eq!(regions.areas.len(), 2501);
+        let odds: Vec<f64> = (0..2501).map(|k| if k == 2500 { 4.0 } else { -4.0 }).collect();
+        let found = Examples::of(&regions, (202, 110), &odds, &Features { size: (1, 1), planes: vec![vec![2.5]] });
+        assert_eq!((found.labels.len(), found.weights[0], found.weights[1]), (MOST, 90f64.sqrt(), 1.0));
+        assert!(found.labels[0] > 0.9 && found.labels[1..].iter().all(|p| *p < 0.1));
+        assert!(found.features.iter().all(|f| (f - 2.5).abs() < 1e-5));
+    }
+}

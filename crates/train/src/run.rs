@@ -1,0 +1,378 @@
+//! The folder of a training run.
+//!
+//! ```text
+//! plan.json                training plan: hyper-parameters and checksums of the images
+//! checkpoint.safetensors   state between two steps; deleted when the training is complete
+//! weights.safetensors      trained weights, readable by other programs
+//! model.json               model card: network, bands, size, classes, normalisation
+//! result.json              loss curve, validation passes, time; written last
+//! ```
+
+use super::data::{Band, Normalization, Resize, Shape, Store, ground};
+use super::fit::Plan;
+use super::fit::checkpoint::History;
+use super::fit::hyper::SIDES;
+use super::net::{Network, Parameter, Pretrained, parameters};
+use super::refine::Refine;
+use super::weights::{self, Array, Stored};
+use furrow_base::input::{below, shipped};
+use furrow_base::{Error, Result};
+use furrow_dataset::model::classes::Classes;
+use furrow_output::{Together, write_atomically, write_together};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+/// File name of the plan.
+pub const PLAN: &str = "plan.json";
+/// File name of the trained weights.
+pub const WEIGHTS: &str = "weights.safetensors";
+/// File name of the model card.
+pub const MODEL: &str = "model.json";
+/// File name of the results.
+pub const RESULT: &str = "result.json";
+/// Valid range of a model card's pixel size on the ground, millimetres.
+pub const PIXEL_MM: RangeInclusive<f64> = ground::PIXEL_MM;
+
+/// Plan with checksums of its images. Two trainings with equal identities give the same weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Plan.
+    pub plan: Plan,
+    /// Checksum of each training dataset, and the numbers of the images used.
+    pub train: Vec<(String, Vec<u64>)>,
+    /// The same for the validation images.
+    pub val: Vec<(String, Vec<u64>)>,
+}
+
+impl Identity {
+    /// Returns the identity of a plan with these training and validation images.
+    pub fn of(plan: &Plan, train: &Store, val: &Store) -> Result<Self> {
+        Ok(Self { plan: plan.clone(), train: train.fingerprints()?, val: val.fingerprints()? })
+    }
+
+    /// Returns the SHA-256 over everything that determines the trained weights. The folders of datasets, the path of pretrained
+    /// weights and the time limit are excluded.
+    pub fn hash(&self) -> Result<String> {
+        let mut plan = Plan { seconds: None, ..self.plan.clone() };
+        for selection in plan.train.iter_mut().chain(&mut plan.val) {
+            selection.folder = "".into();
+        }
+        if let Pretrained::File(path) = &mut plan.hyper.pretrained {
+            path.clear();
+        }
+        let text = serde_json::to_string(&Self { plan, ..self.clone() }).map_err(|e| failed(&e))?;
+        Ok(hex::encode(Sha256::digest(text)))
+    }
+
+    /// Claims a folder for this training: writes the plan, or checks that the folder already has the same plan.
+    ///
+    /// # Errors
+    /// If the folder contains the plan of another training; the message lists the differences.
+    pub fn claim(&self, folder: &Path) -> Result<()> {
+        let path = folder.join(PLAN);
+        if !path.exists() {
+            return write_json(&path, self);
+        }
+        let there: Self = read_json(&path)?;
+        if there.hash()? == self.hash()? {
+            return Ok(());
+        }
+        let (a, b) = (fields(&there)?, fields(self)?);
+        let names: BTreeSet<&String> = a.keys().chain(b.keys()).filter(|k| *k != "seconds" && *k != "folder").collect();
+        let of = |fields: &'_ Fields, k: &String| fields.get(k).map_or("none".to_owned(), String::clone);
+        let differ: Vec<String> = names
+            .into_iter()
+            .filter(|k| a.get(*k) != b.get(*k))
+            .map(|k| format!("{k} is {} there and {} here", of(&a, k), of(&b, k)))
+            .collect();
+        let what = if differ.is_empty() { "its images differ".into() } else { differ.join("; ") };
+        Err(Error::misuse(format!("this folder contains another training: {what}"))
+            .help("give another --out, or the same arguments to resume that training")
+            .in_file(path))
+    }
+}
+
+/// Fields of a plan by name, as JSON text.
+type Fields = BTreeMap<String, String>;
+
+/// Returns the fields of the plan by name, as JSON text.
+fn fields(identity: &Identity) -> Result<Fields> {
+    let value = serde_json::to_value(&identity.plan).map_err(|e| failed(&e))?;
+    Ok(value.as_object().into_iter().flatten().map(|(k, v)| (k.clone(), v.to_string())).collect())
+}
+
+/// Model card: everything that a program needs to know to use the weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelCard {
+    /// Version of Furrow that trained the model.
+    pub furrow: String,
+    /// Network.
+    pub network: Network,
+    /// Number of trainable parameters.
+    pub parameters: usize,
+    /// Input bands and size.
+    pub input: Shape,
+    /// Input normalization of values from 0 to 1 (8-bit values divided by 255); `normalisation` in JSON.
+    #[serde(rename = "normalisation")]
+    pub normalization: Normalization,
+    /// Rule for the sizes that images are resized to.
+    #[serde(default, skip_serializing_if = "Resize::is_stretch")]
+    pub resize: Resize,
+    /// Refinement of predictions.
+    #[serde(default, skip_serializing_if = "Refine::is_none")]
+    pub refine: Refine,
+    /// Pixel size on the ground, millimetres: the median of the training set, if its records describe the cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_mm: Option<f64>,
+    /// Classes, in the order of the network's outputs.
+    pub classes: Classes,
+    /// File name of the weights, in the folder of the card.
+    pub weights: String,
+    /// SHA-256 over names, shapes and values of the weights.
+    pub weights_sha256: String,
+    /// Checksum of the training plan: [`Identity::hash`].
+    pub plan_sha256: String,
+}
+
+impl ModelCard {
+    /// Checks the card. Returns a description of the first value that `train fit` would not accept: the sizes of an untrusted
+    /// card decide how much memory is allocated.
+    fn check(&self) -> Result<(), String> {
+        let Shape { bands, width, height } = &self.input;
+        if !SIDES.contains(width) || !SIDES.contains(height) {
+            return Err(format!("networks do not support {width} × {height} pixels"));
+        }
+        let names: Vec<&str> = bands.iter().map(Band::name).collect();
+        if Band::list(&names.join(",")).as_ref() != Ok(bands) {
+            return Err(format!("`{}` are not valid bands", names.join(",")));
+        }
+        self.resize.check()?;
+        self.classes.check()?;
+        self.refine.check(&self.classes, bands)?;
+        if [width, height].iter().any(|side| **side < self.network.least_side()) {
+            return Err(format!("{} does not support {width} × {height} pixels", self.network.name()));
+        }
+        let learnt = parameters(self.network, bands.len(), self.classes.len());
+        let trainable = learnt.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum::<usize>();
+        if self.parameters != trainable {
+            let words = "parameters: this network with these bands and classes has";
+            return Err(format!("it lists {} {words} {trainable}", self.parameters));
+        }
+        if self.pixel_mm.is_some_and(|mm| !PIXEL_MM.contains(&mm)) {
+            return Err(format!("the size of its pixels is not {} to {} mm", PIXEL_MM.start(), PIXEL_MM.end()));
+        }
+        if let Normalization::Fixed { mean, sd } = &self.normalization
+            && (mean.len() != bands.len()
+                || sd.len() != bands.len()
+                || !mean.iter().all(|m| (0.0..=1.0).contains(m))
+                || !sd.iter().all(|s| (f32::MIN_POSITIVE..=1.0).contains(s)))
+        {
+            return Err(format!("its normalization is not one of {} bands or is out of range", bands.len()));
+        }
+        Ok(())
+    }
+}
+
+/// Results of a training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    /// Number of completed steps.
+    pub steps: u64,
+    /// Step of the best validation pass; `None` without validation images.
+    pub best_step: Option<u64>,
+    /// Reason for the end of the training: `steps`, `patience` or `time`.
+    pub ended: String,
+    /// Loss curve and validation passes.
+    pub history: History,
+    /// Training time, seconds, summed over interruptions.
+    pub seconds: f64,
+    /// Training images per second.
+    pub images_per_second: f64,
+}
+
+/// Returns whether the folder contains a training, complete or not.
+pub fn is_run(folder: &Path) -> bool {
+    [MODEL, PLAN].iter().any(|file| folder.join(file).exists())
+}
+
+/// Resolves the run that a user names: the folder itself if it contains a run; otherwise the folder of a shipped network if the
+/// name is a bare one such as `any-field`; otherwise the path as written.
+pub fn folder(written: &Path) -> PathBuf {
+    let bare = written.to_str().is_some_and(shipped::is_bare) && !is_run(written);
+    let named = bare.then(|| shipped::networks().ok()).flatten().map(|networks| networks.join(written));
+    named.filter(|folder| folder.join(MODEL).is_file()).unwrap_or_else(|| written.to_owned())
+}
+
+/// Returns an error if the folder, the output folder of another model, already contains a run, complete or not.
+pub fn check_untaken(folder: &Path) -> Result<()> {
+    if is_run(folder) {
+        return Err(Error::misuse("there is a trained model in this folder already")
+            .in_file(folder)
+            .help("give another --out"));
+    }
+    Ok(())
+}
+
+/// Trained model: card and weights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainedModel {
+    /// Model card.
+    pub card: ModelCard,
+    /// Weights.
+    pub values: Vec<Array>,
+}
+
+impl TrainedModel {
+    /// Opens a run's folder, or a shipped network by its name. Card and weights are checked.
+    pub fn open(run: &Path) -> Result<Self> {
+        let folder = &folder(run);
+        let path = folder.join(MODEL);
+        if !path.exists() {
+            let error = if folder.join(PLAN).exists() {
+                Error::input("this training is not complete").help("run the command that started it to resume it")
+            } else {
+                // A bare name means a shipped network. If the folder of these is missing, that is the error.
+                if run.to_str().is_some_and(shipped::is_bare) && !run.exists() {
+                    shipped::networks()?;
+                }
+                Error::input("there is no trained network in this folder")
+                    .help("`train fit --out DIR` trains one; `train zoo` lists the networks that ship, by name")
+            };
+            return Err(error.in_file(folder));
+        }
+        let bytes = furrow_base::input::contents(&path).map_err(Error::reading(&path))?;
+        let card = serde_json::from_slice(&bytes).map_err(|e| format!("this file cannot be read: {e}"));
+        let card = card.and_then(|card: ModelCard| card.check().map(|()| card)).map_err(|what| {
+            Error::input(what).help("`train fit` does not write such cards: use one that you trust").in_file(path)
+        })?;
+        let path = below(folder, &card.weights)?;
+        let (values, _) = weights::read(&path)?;
+        if weights::hash(&values) != card.weights_sha256 {
+            return Err(
+                Error::input(format!("these are not the weights that {MODEL} in this folder describes")).in_file(path)
+            );
+        }
+        if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
+            let what = format!("`{}` contains values that are not finite", array.name);
+            return Err(Error::input(what).help("train again, with a lower --rate").in_file(path));
+        }
+        let is_below = |a: &&Array| a.name.ends_with(".running_var") && a.values.iter().any(|v| *v < 0.0);
+        if let Some(array) = values.iter().find(is_below) {
+            let what = format!("`{}` contains variances below 0", array.name);
+            return Err(Error::input(what).help("no training gives these: use weights that you trust").in_file(path));
+        }
+        Ok(Self { card, values })
+    }
+
+    /// Writes weights and card to a folder, either both or neither.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        self.store(folder, Stored::Single)
+    }
+
+    /// Writes weights and card with the weights rounded to half precision, in half of the bytes.
+    ///
+    /// # Errors
+    /// If a weight is too large for half precision (above 65504).
+    pub fn write_half(&self, folder: &Path) -> Result<()> {
+        let values: Vec<Array> = self.values.iter().map(Array::halved).collect();
+        if let Some(large) = values.iter().find(|array| !array.values.iter().all(|v| v.is_finite())) {
+            return Err(Error::input(format!(
+                "`{}` contains values above 65504, which half precision cannot hold",
+                large.name
+            ))
+            .help("keep this network in single precision"));
+        }
+        let card = ModelCard { weights_sha256: weights::hash(&values), ..self.card.clone() };
+        Self { card, values }.store(folder, Stored::Half)
+    }
+
+    fn store(&self, folder: &Path, stored: Stored) -> Result<()> {
+        let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
+        let path = below(folder, &self.card.weights)?;
+        let (values, card) = (weights::encode(&path, &self.values, &text, stored)?, json(&self.card)?);
+        let add_both = |files: &mut Together| {
+            files.add(&path, &values)?;
+            files.add(&folder.join(MODEL), &card)
+        };
+        write_together(folder, add_both).map(drop)
+    }
+}
+
+/// Returns the results of the training in `folder`, or `None` if it is not complete.
+pub fn results(folder: &Path) -> Result<Option<Results>> {
+    let path = folder.join(RESULT);
+    if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
+}
+
+/// Reads a JSON file of a run.
+pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
+    let bytes = furrow_base::input::contents(path).map_err(Error::reading(path))?;
+    let unreadable = |e| {
+        Error::damaged(format!("this file cannot be read: {e}")).help("delete it to have it recreated").in_file(path)
+    };
+    serde_json::from_slice(&bytes).map_err(unreadable)
+}
+
+/// Writes a JSON file atomically.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_atomically(path, &json(value)?)
+}
+
+/// Returns indented JSON that ends with a newline.
+pub fn json(value: &impl Serialize) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value).map_err(|e| failed(&e))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+fn failed(e: &serde_json::Error) -> Error {
+    Error::failed(format!("cannot write JSON: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: a run that an earlier version started must be resumable, and its checkpoint and weights refer to the checksum of
+    /// its plan. Expected: a plan written by version 0.1 is read, has the checksum that version 0.1 computed, and is written as the
+    /// same text. Source: `plan.json` and `model.json` of a run by commit 3803143.
+    #[test]
+    fn runs_of_version_0_1_are_read_and_keep_their_checksum() {
+        let text = concat!(
+            r#"{"plan":{"network":"unet","classes":[{"name":"soil","labels":["soil"]},{"name":"crop","labels":["crop"]},"#,
+            r#"{"name":"weed","labels":["weed"]}],"shape":{"bands":["red","green","blue"],"width":64,"height":48},"#,
+            r#""train":[{"folder":"set","pick":"All","margin":1.4,"repeat":1}],"val":[{"folder":"set","pick":{"Range":[0,1]},"#,
+            r#""repeat":1}],"seed":1,"steps":4,"batch":2,"window":[40,32],"rare":0.5,"method":"adam","rate":0.001,"#,
+            r#""decay":0.0005,"schedule":"poly","loss":"dice","balance":"fading","calibrate":2,"augment":{"flip":true,"#,
+            r#""rotate":true,"scale":true,"crop":true,"colour":true,"blur":true,"noise":true},"exposure":"image","#,
+            r#""watch_every":2,"patience":1000,"precision":"f32","threads":1,"begin_with":null,"seconds":null},"#,
+            r#""train":[["5a02e49679d75b9e7051ae515fb4371077f7a303a2ccb61e2f2f528064e609be",[0,1,2,3]]],"#,
+            r#""val":[["5a02e49679d75b9e7051ae515fb4371077f7a303a2ccb61e2f2f528064e609be",[0]]]}"#
+        );
+        let identity: Identity = serde_json::from_str(text).unwrap();
+        assert_eq!(serde_json::to_string(&identity).unwrap(), text);
+        assert_eq!(identity.hash().unwrap(), "f1d0a304d9f74cce6867a24237cebc60846ba30fe7dc6f9d7920b7dd5f560dc6");
+        assert_eq!(identity.plan.hyper.crop_size, Some((40, 32)));
+    }
+
+    /// Rationale: a field that has its default value is not written, and was once not compared. Expected: the error lists the
+    /// difference, whichever of the two plans has the field.
+    #[test]
+    fn what_differs_from_the_plan_of_a_folder_is_told_both_ways() {
+        let plain = Identity { plan: Plan::default(), train: Vec::new(), val: Vec::new() };
+        let mut averaged = plain.clone();
+        averaged.plan.hyper.ema = 0.9;
+        for (there, here, words) in [
+            (&plain, &averaged, "ema is none there and 0.9 here"),
+            (&averaged, &plain, "ema is 0.9 there and none here"),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            there.claim(folder.path()).unwrap();
+            let said = here.claim(folder.path()).unwrap_err().to_string();
+            assert!(said.contains(words), "{said}");
+        }
+    }
+}

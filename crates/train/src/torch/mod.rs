@@ -1,0 +1,215 @@
+//! Computes networks with libtorch.
+//!
+//! Images and weights are stored as height × width × bands ("channels last"), with which convolutions are faster on CPUs and GPUs.
+
+mod compute;
+pub mod device;
+pub mod multiscale;
+
+use super::net::{Network, Parameter, fitting, parameters};
+use super::refine::Features;
+use super::weights::Array;
+use compute::Compute;
+use furrow_base::{Error, Result};
+use std::collections::BTreeMap;
+/// The bindings of libtorch that networks are computed with.
+pub use tch;
+use tch::{Device, Kind, Tensor};
+
+pub use compute::Pass;
+pub use device::{Precision, Where};
+
+/// Number of times the finer encoder features are halved: cells of 8 pixels.
+const FINE: usize = 3;
+
+/// Network with its parameters on a device.
+pub struct Model {
+    /// Network.
+    pub network: Network,
+    /// Number of input bands.
+    pub bands: usize,
+    /// Number of classes.
+    pub classes: usize,
+    /// Device and precision.
+    pub place: Where,
+    list: Vec<Parameter>,
+    tensors: BTreeMap<String, Tensor>,
+}
+
+impl Model {
+    /// Returns a network with random initial values, which depend only on the seed.
+    pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Where) -> Self {
+        let list = parameters(network, bands, classes);
+        let tensors =
+            list.iter().enumerate().map(|(i, p)| (p.name.clone(), tensor(p, &p.begin(seed, i), place.device)));
+        let tensors = tensors.collect();
+        Self { network, bands, classes, place, list, tensors }
+    }
+
+    /// Returns a network with these values. An error names the array that does not match.
+    pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Where) -> Result<Self> {
+        let mut model = Self::new(network, bands, classes, 0, place);
+        model.load(arrays)?;
+        Ok(model)
+    }
+
+    /// Replaces the values by name. All parameters must be present in their shapes; other arrays are ignored.
+    pub fn load(&mut self, arrays: &[Array]) -> Result<()> {
+        for (parameter, array) in self.list.iter().zip(fitting(self.network, self.bands, self.classes, arrays)?) {
+            self.tensors.insert(parameter.name.clone(), tensor(parameter, &array.values, self.place.device));
+        }
+        Ok(())
+    }
+
+    /// Returns all values, including running means and variances, in the order of the network.
+    pub fn arrays(&self) -> Result<Vec<Array>> {
+        self.list
+            .iter()
+            .map(|p| {
+                Ok(Array { name: p.name.clone(), shape: p.shape.clone(), values: values(&self.tensors[&p.name])? })
+            })
+            .collect()
+    }
+
+    /// Interpolates all values, including running means and variances, by the fraction `share` towards another model of the same
+    /// network.
+    pub fn approach(&mut self, other: &Self, share: f64) {
+        tch::no_grad(|| {
+            for (name, tensor) in &mut self.tensors {
+                let _ = tensor.lerp_(&other.tensors[name], share);
+            }
+        });
+    }
+
+    /// Returns the trainable parameters and their tensors, in the order of the network.
+    pub fn trainable(&self) -> impl Iterator<Item = (&Parameter, &Tensor)> {
+        self.list.iter().filter(|p| p.role.is_trainable()).map(|p| (p, &self.tensors[&p.name]))
+    }
+
+    /// Computes logits: images × bands × height × width to images × classes × height × width, in single precision.
+    pub fn forward(&self, x: &Tensor, pass: Pass) -> Tensor {
+        self.walk(x, pass).to_kind(Kind::Float)
+    }
+
+    /// Computes logits like [`Self::forward`], in the precision of the last convolution.
+    pub(super) fn walk(&self, x: &Tensor, pass: Pass) -> Tensor {
+        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, pass, features: None };
+        self.network.walk(&mut compute, x, self.bands, self.classes)
+    }
+
+    /// Predicts the class of each pixel of one or more images, stored as images × height × width × bands.
+    pub fn predict(&self, pixels: &[f32], (width, height): (u32, u32)) -> Result<Vec<u8>> {
+        let x = self.images(pixels, (width, height));
+        classes(&tch::no_grad(|| self.forward(&x, Pass::Inference)))
+    }
+
+    /// Returns the logits as images × classes × height × width. Images are stored as in [`Self::predict`].
+    pub fn scores(&self, pixels: &[f32], size: (u32, u32)) -> Result<Vec<f32>> {
+        values(&tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference)))
+    }
+
+    /// Returns the class probabilities of one image, resized bilinearly to the size `to`; sample points are pixel centres.
+    pub fn probabilities(&self, pixels: &[f32], size: (u32, u32), to: (u32, u32)) -> Result<Vec<f32>> {
+        values(&tch::no_grad(|| {
+            let found = self.forward(&self.images(pixels, size), Pass::Inference).softmax(1, Kind::Float);
+            if size == to {
+                return found;
+            }
+            found.upsample_bilinear2d([i64::from(to.1), i64::from(to.0)], false, None, None)
+        }))
+    }
+
+    /// Returns the logits of one image and the encoder features with cells of 8 and of 16 pixels, both in cells of 8.
+    pub(super) fn scores_and_features(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Tensor, Features)> {
+        let features = Some(BTreeMap::new());
+        let mut compute =
+            Compute { tensors: &self.tensors, precision: self.place.precision, pass: Pass::Inference, features };
+        let x = self.images(pixels, size);
+        let scores = tch::no_grad(|| self.network.walk(&mut compute, &x, self.bands, self.classes));
+        let features = compute.features.unwrap_or_default();
+        let (Some(fine), Some(coarse)) = (features.get(&FINE), features.get(&(FINE + 1))) else {
+            return Err(Error::failed(format!("{} gives no features of its encoder", self.network.name())));
+        };
+        let (height, width) = (fine.size()[2], fine.size()[3]);
+        let all = tch::no_grad(|| Tensor::cat(&[fine, &coarse.upsample_nearest2d([height, width], None, None)], 1));
+        let planes = values(&all)?.chunks_exact((width * height) as usize).map(<[f32]>::to_vec).collect();
+        Ok((scores.to_kind(Kind::Float), Features { size: (width as usize, height as usize), planes }))
+    }
+
+    /// Predicts the class of each pixel like [`Self::predict`], and returns its probability as well.
+    pub fn predict_with_probability(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Vec<u8>, Vec<f32>)> {
+        let scores = tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference));
+        let (highest, _) = scores.softmax(1, Kind::Float).max_dim(1, false);
+        Ok((classes(&scores)?, values(&highest)?))
+    }
+
+    /// Excludes all parameters from gradients, so that they can become constants of a traced graph.
+    pub(super) fn freeze(&mut self) {
+        for tensor in self.tensors.values_mut() {
+            *tensor = tensor.detach();
+        }
+    }
+
+    /// Returns images (stored as in [`Self::predict`]) as a tensor of images × bands × height × width on the device.
+    pub fn images(&self, pixels: &[f32], (width, height): (u32, u32)) -> Tensor {
+        let bands = self.bands as i64;
+        let images = pixels.len() as i64 / (bands * i64::from(width) * i64::from(height));
+        let lying = Tensor::from_slice(pixels).view([images, i64::from(height), i64::from(width), bands]);
+        lying.to_device(self.place.device).permute([0, 3, 1, 2])
+    }
+}
+
+/// Returns the class with the highest score at each pixel.
+pub(super) fn classes(scores: &Tensor) -> Result<Vec<u8>> {
+    let classes = scores.argmax(1, false).to_kind(Kind::Uint8).to_device(Device::Cpu);
+    Vec::<u8>::try_from(classes.contiguous().view(-1)).map_err(|e| failed(&e))
+}
+
+/// Returns the values of a tensor in single precision, row-major.
+pub(super) fn values(tensor: &Tensor) -> Result<Vec<f32>> {
+    let flat = tensor.detach().to_device(Device::Cpu).to_kind(Kind::Float).contiguous().view(-1);
+    Vec::try_from(flat).map_err(|e| failed(&e))
+}
+
+/// Converts an error of libtorch, without its stack trace.
+pub(super) fn failed(e: &tch::TchError) -> Error {
+    let words = e.to_string();
+    Error::failed(format!("libtorch: {}", words.lines().next().unwrap_or_default()))
+}
+
+fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
+    laid(&parameter.shape, values, device).detach().set_requires_grad(parameter.role.is_trainable())
+}
+
+/// Copies values to a device, in the memory layout of weights.
+pub(super) fn laid(shape: &[usize], values: &[f32], device: Device) -> Tensor {
+    let shape: Vec<i64> = shape.iter().map(|n| *n as i64).collect();
+    let plain = Tensor::from_slice(values).view(shape.as_slice()).to_device(device);
+    if shape.len() == 4 { channels_last(&plain) } else { plain }
+}
+
+/// Returns the tensor in channels-last memory format, for which tch has no function.
+fn channels_last(x: &Tensor) -> Tensor {
+    x.permute([0, 2, 3, 1]).contiguous().permute([0, 3, 1, 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: every network gives features with cells of 8 and of 16 pixels, in cells of 8, with the channels of its encoder there;
+    /// the scores are the same as without features. Source: the networks' tables of channels.
+    #[test]
+    fn every_network_tells_of_its_encoder() {
+        let place = Where { device: Device::Cpu, precision: Precision::Single };
+        let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256, 384 + 384]);
+        let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17) as f32 / 17.0).collect();
+        for (network, channels) in Network::ALL.iter().zip(channels) {
+            let model = Model::new(*network, 3, 3, 1, place);
+            let (scores, features) = model.scores_and_features(&pixels, size).unwrap();
+            assert_eq!((features.size, features.planes.len()), ((12, 8), channels), "{}", network.name());
+            assert!(features.planes.iter().all(|plane| plane.len() == 96));
+            assert_eq!(values(&scores).unwrap(), model.scores(&pixels, size).unwrap(), "{}", network.name());
+        }
+    }
+}

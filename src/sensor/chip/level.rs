@@ -1,9 +1,0 @@
-//! What the linear values of the sensor mean: electrons for a radiance, and where a pixel is full.
-
-use crate::math::Spectrum;
-
-/// Electrons per radiance in R, G, B, NIR, relative to G; from the quantum efficiencies of the JAI AD-130's two sensors.
-pub(in crate::sensor) const RESPONSE: Spectrum = Spectrum::new(0.94, 1.0, 0.77, 0.93);
-
-/// The largest linear value a sensor gives: a tenth above white, which is 90 % of the full well.
-pub(in crate::sensor) const CLIP: f32 = 1.0 / 0.9;
