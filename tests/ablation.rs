@@ -383,7 +383,7 @@ fn what_cannot_be_is_told_before_anything_is_written() {
     for (more, words) in [
         (&["--only", "no-sky,no-skye"][..], "did you mean `no-sky`?"),
         (&["--except", "sky"], "there is no edit `sky`"),
-        (&["--only", "spp-4", "--spp", "4"], "drawn like that already"),
+        (&["--only", "spp-4", "--spp", "4"], "already rendered like this"),
         (&["--only", "no-sky", "--except", "no-sky"], "cannot be used with"),
     ] {
         let mut command = trace(&["ablate", "--scene", SMALL, "--count", "2", "--out", path(&out)]);

@@ -164,7 +164,7 @@ fn what_cannot_be_adapted_is_told() {
         (format!("--images {images} --rate 0"), "rate"),
         (format!("--images {images} --steps 0"), "--steps"),
         (format!("--images {}/none", folder.display()), "none"),
-        (format!("--images {}", run.display()), "no picture"),
+        (format!("--images {}", run.display()), "no image"),
     ] {
         let said = adapt(&more);
         assert!(said.contains(words), "{more}: {said}");

@@ -206,7 +206,7 @@ fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
         (&["--classes", CLASSES][..], "need parts.png"),
         (&["--classes", "soil; horse"], "`horse`"),
         (&["--format", "ply"], "--format ply holds "),
-        (&["--min-visible", "1.5"], "a share"),
+        (&["--min-visible", "1.5"], "a fraction"),
         (&["--min-pixels", "0"], "0"),
         (&["--classes", "soil; a=crop; b=crop"], "belongs to `a`"),
     ] {
@@ -227,7 +227,7 @@ fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
         let labelling = format!("\"labelling\": {{ \"classes\": {classes} }},\n  \"licence\"");
         fs::write(&recipe, forged.replace("\"licence\"", &labelling)).unwrap();
         let words = fail(verb("finish", &data, &["--format", "cityscapes"]), 1);
-        assert!(words.contains("the classes of this dataset are none: "), "{words}");
+        assert!(words.contains("the classes of this dataset are invalid: "), "{words}");
     }
 }
 
@@ -288,7 +288,7 @@ fn maps_are_kept_as_asked() {
     assert_eq!(crate::common::program::names(&oldest.join("images/000002")), files(&oldest));
     assert!(!fs::read_to_string(oldest.join("dataset.json")).unwrap().contains("keep"));
     let words = fail(make(&oldest, "3", &["--keep", "depth"]), 2);
-    assert!(words.contains("another dataset lies in this folder: maps of --keep "), "{words}");
+    assert!(words.contains("another dataset is in this folder: maps of --keep "), "{words}");
 }
 
 /// Rationale: a robot in view must not be learnt as soil. Expected: pixels of the model named in the class list have no

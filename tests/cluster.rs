@@ -191,9 +191,9 @@ fn orders_that_make_no_sense_are_refused() {
         (&["--scheduler", "pbs", "--shards", "2"], "slurm, kubernetes, parallel"),
         (
             &["--scheduler", "kubernetes", "--shards", "2", "--claim", "a\nevil: b"],
-            "--claim \"a\\nevil: b\" is no name",
+            "--claim \"a\\nevil: b\" is not a volume claim name",
         ),
-        (&["--scheduler", "kubernetes", "--shards", "2", "--image", "a b"], "no name of a container image"),
+        (&["--scheduler", "kubernetes", "--shards", "2", "--image", "a b"], "not a container image name"),
     ] {
         let said = fail(verb("emit", &folder, more), 2);
         assert!(said.contains(words), "{more:?}: no `{words}` in\n{said}");
@@ -277,7 +277,7 @@ fn a_slurm_task_tells_its_scheduler_what_to_do() {
     send("USR1", &child);
     // A shell that receives two signals at almost the same time may handle only the later one; schedulers leave half a
     // minute between them.
-    until("told USR1", || std::fs::read_to_string(jobs.join("tools/log")).unwrap().contains("told USR1"));
+    until("received USR1", || std::fs::read_to_string(jobs.join("tools/log")).unwrap().contains("received USR1"));
     send("TERM", &child);
     assert_eq!(end(&mut child).code(), Some(75));
     assert_eq!(asked(), "requeue 7_1\nrequeue 7_0\n");

@@ -159,7 +159,7 @@ fn signals_stop_a_dataset_cleanly() {
         let images = files.keys().filter(|name| name.ends_with("/record.json")).count();
         assert!(sealed > 0 && sealed < 500, "{signal}: {sealed}");
         let told =
-            format!("{}: stopped: {sealed} of 500 images are there\n help: the same command goes on", path(&data));
+            format!("{}: stopped: {sealed} of 500 images are complete\n help: the same command continues", path(&data));
         assert!(said.contains(&told) && !said.contains("nothing was written"), "{signal}: {said}");
         if signal == "-USR1" {
             assert_eq!(sealed, images, "images in progress must be finished");

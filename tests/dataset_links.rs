@@ -68,7 +68,7 @@ impl<'a> Linked<'a> {
 fn refused(command: Command, name: &str) {
     let said = fail(command, 2);
     assert!(said.contains("symbolic link") && said.contains(&format!("/{name}: ")), "{said}");
-    assert!(said.contains("replace it by the folder"), "{said}");
+    assert!(said.contains("replace it with the folder"), "{said}");
 }
 
 #[test]

@@ -180,7 +180,7 @@ fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
         let ended = command.args(["--format", "colmap,mots,nerf,tum"]).output().unwrap();
         let said = String::from_utf8_lossy(&ended.stderr);
         assert!(ended.status.success(), "{said}");
-        let words = "colmap, nerf, tum cannot tell a rolling shutter: poses are those of the middle row";
+        let words = "colmap, nerf, tum cannot represent a rolling shutter: poses are those of the middle row";
         assert_eq!(said.contains(words), rolls, "{said}");
     }
 }
@@ -583,7 +583,7 @@ fn what_is_no_drive_is_told() {
         assert!(said.contains(words), "{name}: {said}");
     }
     let alone = trace(&["sequence", "--scene", "tests/ref/small.ron", "--out", path(&folder.join("no"))]);
-    assert!(fail(alone, 2).contains("takes one image of each field"));
+    assert!(fail(alone, 2).contains("renders one image of each field"));
     assert!(!folder.join("no").exists());
 }
 

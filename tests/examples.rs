@@ -1,7 +1,7 @@
 //! The programs in `examples/` run, and the library's image equals the program's byte for byte.
 //!
 //! Rationale: users of the library start by copying an example. Expected: each runs at a small size and writes the
-//! promised files. Cargo builds the examples with the tests; with `--test all` alone, run `cargo build --examples`
+//! promised files. Cargo builds the examples with the tests; with the test program alone, run `cargo build --examples`
 //! first.
 
 use crate::common::program::{SMALL, names, scratch, trace};

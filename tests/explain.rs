@@ -133,7 +133,7 @@ fn what_is_said_of_soil_is_so() {
     assert!(told("soil").contains("One to four layers"), "{}", told("soil"));
     assert!(fs::read_to_string("scenes/11-drone.ron").unwrap().contains("patch_m: 2.5"));
     let patches = told("soil.moisture.patch_m");
-    assert!(patches.contains("0.02–0.15") && patches.contains("some metres in those of a field"), "{patches}");
+    assert!(patches.contains("0.02–0.15") && patches.contains("some metres in images of a field"), "{patches}");
 }
 
 /// Method: scene files with values that are valid but probably unintended. Expected: a warning for each, and none for

@@ -48,7 +48,7 @@ fn images(pick: &str) -> String {
 fn fit(out: &Path, more: &[&str]) -> Command {
     let (all, some) = (images("all"), images("0..1"));
     let mut command = train("fit", &["--set", &all, "--val", &some, "--out", path(out)]);
-    command.args(["--network", "basic-segnet", "--size", "64x48", "--batch", "2", "--steps", "6"]);
+    command.args(["--network", "tiny-unet", "--size", "64x48", "--batch", "2", "--steps", "6"]);
     command.args(["--validate-every", "2"]).args(more);
     command
 }

@@ -129,7 +129,7 @@ fn masks_of_numbers_come_in_pixel_by_pixel() {
     }
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(
-        report.contains("no plant is told from another") && !report.contains("0 weeds"),
+        report.contains("it does not distinguish plants") && !report.contains("0 weeds"),
         "masks contain only classes"
     );
     assert!(out.join("manifest.json").is_file());
@@ -182,7 +182,7 @@ fn what_cannot_be_read_is_told_by_its_file() {
     assert!(refused(&out, &all(&["--mask-suffix", "_mask", "--from", "x"])).contains("--from"));
     assert!(refused(&out, &["--format", "coco"]).contains("--from"));
     assert!(refused(&out, &["--format", "phenobench", "--from", text(root)]).contains("train/images"));
-    assert!(refused(&out, &all(&["--colors", "0,0=crop"])).contains("no colour"));
+    assert!(refused(&out, &all(&["--colors", "0,0=crop"])).contains("not a colour"));
     // A mask of another size, and one that is truncated.
     let mask = masks.join("val/c_mask.png");
     write_png(&mask, 1, 1, &Picture::Gray(&[0]), "").unwrap();
@@ -215,7 +215,7 @@ fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
     assert!(whole == files(&out), "other bytes after resuming");
     // Other images cannot be imported into the same folder.
     let other = [&arguments[..], &["--others", "ignore"]].concat();
-    assert!(refused(&out, &other).contains("another dataset lies in this folder"));
+    assert!(refused(&out, &other).contains("another dataset is in this folder"));
     assert!(whole == files(&out), "a refused import has changed files");
 }
 
@@ -247,7 +247,7 @@ assert ['nir' in furrow.Dataset(folder)[0] for folder in sys.argv[1:]] == [False
     let (with, _) = imported(&full, &with_nir);
     assert_eq!((says_nir(&set), says_nir(&with)), (Some(false), Some(true)));
     let words = refused(&out, &with_nir);
-    assert!(words.contains("another dataset lies in this folder: near infrared false there, true here"), "{words}");
+    assert!(words.contains("another dataset is in this folder: near infrared false there, true here"), "{words}");
 
     let stray = out.join("images/000000/nir.png");
     std::fs::copy(full.join("images/000000/nir.png"), &stray).unwrap();

@@ -124,8 +124,8 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
     ] {
         let before = tree(folder);
         let words = fail(make(folder, 3, &["--keep", keep]), 2);
-        let told = format!("another dataset lies in this folder: label maps that --keep leaves out {begun}");
-        assert!(words.contains(&told) && words.contains("without --keep it goes on"), "{keep}: {words}");
+        let told = format!("another dataset is in this folder: label maps that --keep leaves out {begun}");
+        assert!(words.contains(&told) && words.contains("omit --keep to continue"), "{keep}: {words}");
         same(&tree(folder), &before);
     }
     let other = base.join("other");
@@ -152,7 +152,7 @@ fn labels_alone_may_be_classes_alone() {
         command
     };
     let words = fail(make("rgb,semantics"), 2);
-    assert!(words.contains("--keep rgb is a photograph") && !data.join("dataset.json").exists(), "{words}");
+    assert!(words.contains("--keep rgb needs images") && !data.join("dataset.json").exists(), "{words}");
     succeed(make("semantics"));
     assert_eq!(names(&data.join("images/000001")), ["record.json", "semantics.png"]);
     verify(&data);
@@ -166,7 +166,7 @@ fn labels_alone_may_be_classes_alone() {
     assert_eq!(fail(verb("verify", &data, &["--quiet"]), 1), stray("000001", "rgb.png"));
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
     let error = pictures::find(std::slice::from_ref(&data), &shape, &[]).expect_err("no photograph");
-    assert!(error.to_string().contains("it holds labels alone"), "{error}");
+    assert!(error.to_string().contains("holds labels only"), "{error}");
 }
 
 /// Expected output of `verify` for a file that does not belong to an image.

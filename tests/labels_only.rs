@@ -83,12 +83,15 @@ fn formats_without_photographs_are_written_and_others_refused() {
     // The same command continues it.
     succeed(make(&data, &["--labels-only"]));
     let later = fail(verb("finish", &data, &["--format", "yolo"]), 2);
-    assert!(later.contains("--format yolo holds photographs"), "{later}");
+    assert!(later.contains("--format yolo holds rendered images"), "{later}");
     for (more, words) in [
-        (&["--format", "coco"][..], "without photographs there are damage, flow, mots, parts, skeletons, traits, tum"),
-        (&["--keep", "nir"], "--keep nir is drawn by samples"),
-        (&["--edit", "smooth-labels"], "makes labels of samples"),
-        (&["--edit", "raster"], "draws its labels with its picture"),
+        (
+            &["--format", "coco"][..],
+            "formats without rendered images are damage, flow, mots, parts, skeletons, traits, tum",
+        ),
+        (&["--keep", "nir"], "--keep nir needs samples"),
+        (&["--edit", "smooth-labels"], "makes labels from samples"),
+        (&["--edit", "raster"], "renders labels together with the image"),
         (&["--spp", "4"], "cannot be used with"),
     ] {
         let (_keep, other) = scratch();

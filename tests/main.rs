@@ -1,4 +1,4 @@
-//! All integration tests of the library and the programs, one module per subject: `cargo test --test all labels::`.
+//! All integration tests of the library and the programs, one module per subject: `cargo test --features system-tests --test all labels::`.
 //!
 //! They form a single test binary. 70 separate binaries would each link the whole library, libtorch and Embree, which
 //! takes minutes longer.
@@ -8,7 +8,6 @@ mod accel;
 #[cfg(feature = "train")]
 mod adapt;
 mod analytic;
-mod architecture;
 mod bsdf;
 mod camera;
 mod classes;
@@ -25,7 +24,6 @@ mod dataset_kill;
 #[cfg(unix)]
 mod dataset_links;
 mod denoise;
-mod dependencies;
 #[cfg(feature = "train")]
 mod deploy;
 mod detail;

@@ -527,7 +527,7 @@ fn baselines_say_what_they_cannot_learn_from() {
         said(Kind::Exg, Cut::Fitted, std::slice::from_ref(&bare))
             .contains("no pixel of the training images is a plant")
     );
-    assert!(said(Kind::ExgSize, Cut::Otsu, &[]).contains("no image"));
+    assert!(said(Kind::ExgSize, Cut::Otsu, &[]).contains("there is no training image"));
     let strange = Example { truth: vec![0, 3], ..bare.clone() };
     assert!(said(Kind::Exg, Cut::Fitted, &[strange]).contains("has the class 3"));
     let short = Example { truth: vec![0], ..bare.clone() };

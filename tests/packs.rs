@@ -121,7 +121,7 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     let mut other = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
     other.args(["--split", "3,1,0", "--pack", "5", "--out"]).arg(&later);
     let said = fail(other, 2);
-    assert!(said.contains("another dataset lies in this folder: pack 4 there, 5 here"), "{said}");
+    assert!(said.contains("another dataset is in this folder: pack 4 there, 5 here"), "{said}");
 
     // Killed repeatedly.
     let (_keep, killed) = scratch();
@@ -188,7 +188,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
             command.args(["--synthetic", path(&images)]);
         }
         let said = fail(command, 2);
-        assert!(said.contains("lie in archives"), "{said}");
+        assert!(said.contains("are in archives"), "{said}");
     }
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
@@ -332,7 +332,7 @@ fn what_is_finished_is_pushed_once_and_whole() {
     let status = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
     assert!(status.contains("9 of 9 images"), "{status}");
     let said = fail(verb("finish", &data, &["--quiet"]), 2);
-    assert!(said.contains("3 packs were pushed and removed here"), "{said}");
+    assert!(said.contains("the local files of 3 packs were removed after they were pushed"), "{said}");
     succeed(verb("finish", &there, &["--quiet"]));
     same(&tree(&there), &whole);
     succeed(verb("verify", &there, &["--quiet"]));
@@ -420,11 +420,11 @@ fn who_reads_folders_says_how_to_unpack() {
                 continue;
             }
             let said = fail(command, 2);
-            assert!(said.contains("lie in archives"), "{said}");
+            assert!(said.contains("are in archives"), "{said}");
         }
     }
     let said = fail(trace(&["compare", path(&data), path(&data)]), 2);
-    let way = said.split_once("name `unpacked`: ").expect("a remedy").1.trim();
+    let way = said.split_once("give `unpacked`: ").expect("a remedy").1.trim();
     let mut shell = Command::new("sh");
     shell.current_dir(data.parent().expect("a folder")).args(["-c", way]);
     succeed(shell);

@@ -309,7 +309,7 @@ fn datasets_of_before_keep_their_bytes() {
         let before = tree(folder);
         let count = if folder == &old { 2 } else { 1 };
         let said = fail(make(folder, count, &["--photo", photo]), 2);
-        let words = format!("another dataset lies in this folder: photo {there} there, \"{photo}\" here");
+        let words = format!("another dataset is in this folder: photo {there} there, \"{photo}\" here");
         assert!(said.contains(&words), "{said}");
         same(&tree(folder), &before);
     }
@@ -329,6 +329,6 @@ fn wrong_words_are_told() {
         trace(&["dataset", "--scene", SMALL, "--count", "1", "--labels-only", "--photo", "jpeg95", "--out"]);
     labels.arg(&data);
     let said = fail(labels, 2);
-    assert!(said.contains("--labels-only draws none") && said.matches("error: ").count() == 1, "{said}");
+    assert!(said.contains("--labels-only renders none") && said.matches("error: ").count() == 1, "{said}");
     assert!(names(&data).is_empty(), "files were written");
 }

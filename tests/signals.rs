@@ -188,7 +188,7 @@ fn an_interrupt_while_a_plan_grows_its_field_is_told() {
     succeed(trace(&[&["dataset"][..], &rest, &["1", "--quiet"]].concat()));
     let before = tree(&data);
     write_weeds(&page, MANY);
-    assert!(stopped(&["dataset"], "stopped: 1 of 5 images are there"));
+    assert!(stopped(&["dataset"], "stopped: 1 of 5 images are complete"));
     assert!(before == tree(&data));
 }
 

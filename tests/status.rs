@@ -77,7 +77,7 @@ fn a_dataset_that_is_done_says_so() {
     assert!(html.contains("000000") && !html.contains("location.reload"), "{html}");
     assert!(fail(verb("status", &data, &["--page", path(&data)]), 2).contains("this is not a regular file"));
     let own = data.join("dataset.json");
-    assert!(fail(verb("status", &data, &["--page", path(&own)]), 2).contains("lies in the dataset's folder"));
+    assert!(fail(verb("status", &data, &["--page", path(&own)]), 2).contains("inside the dataset's folder"));
     assert!(before == tree(&data));
 }
 
@@ -157,7 +157,7 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
             fs::write(&log, lines.join("\n") + "\n").unwrap();
             let found = status(&data, &[]);
             assert_eq!((&found["shards"][0]["state"], number(&found, "working")), (&Value::from("silent"), 0.0));
-            assert!(told(&data, &[]).contains("perhaps killed"));
+            assert!(told(&data, &[]).contains("possibly killed"));
         }
     }
 }
@@ -404,13 +404,13 @@ fn a_dry_run_refuses_what_the_run_refuses() {
     succeed(order(&data, SMALL, "1", &[&["--count", "2"][..], &begun].concat()));
     let before = tree(keep.path());
     for (out, scene, spp, more, told) in [
-        (&data, "scenes/01-one-leaf.ron", "1", &["--count", "2"][..], "another dataset lies in this folder: "),
+        (&data, "scenes/01-one-leaf.ron", "1", &["--count", "2"][..], "another dataset is in this folder: "),
         (&data, SMALL, "2", &["--count", "2"], "spp 1 there, 2 here"),
         (&data, SMALL, "1", &["--count", "2", "--seed", "7"], "seed 3 there, 7 here"),
         (&data, SMALL, "1", &["--count", "2", "--keep", "depth"], "maps of --keep [] there"),
         (&data, SMALL, "1", &["--count", "2", "--format", "ply"], "--format ply holds "),
         (&data, SMALL, "1", &["--count", "1"], "it has 2 images, more than 1"),
-        (&full, SMALL, "1", &["--count", "2"], "other things lie in this folder, notes.txt among them"),
+        (&full, SMALL, "1", &["--count", "2"], "this folder contains other files, such as notes.txt"),
     ] {
         let words = [&["--dry-run"][..], &[]].map(|dry| fail(order(out, scene, spp, &[more, dry].concat()), 2));
         assert!(words[0] == words[1] && words[0].contains(told), "{more:?}: {words:?}");
@@ -456,7 +456,7 @@ fn the_memory_of_a_bill_is_what_is_taken() {
     let (_keep, data) = scratch();
     let rows = bill(&[&order[..], &["--out", path(&data), "--dry-run"]].concat());
     let words = rows["memory"].as_str();
-    assert!(words.contains("with one image under way, ") && words.ends_with(" with 2 cores"), "{words}");
+    assert!(words.contains("for one image at a time, ") && words.ends_with(" with 2 cores"), "{words}");
     for (told, at_once) in words.split(", ").zip(["1", "2"]) {
         let (_keep, data) = scratch();
         let order = [&order[..], &["--out", path(&data), "--at-once", at_once, "--quiet"]].concat();

@@ -181,7 +181,7 @@ fn what_cannot_be_streamed_is_refused() {
         (&["--shard", "3/2"][..], "write it as k/N"),
         (&["--count", "0"], "0 is not in 1..="),
         (&["--first", "99999999"], "99999999 is not in 0..99999999"),
-        (&["--first", "99999990", "--count", "10"], "lead past the last one"),
+        (&["--first", "99999990", "--count", "10"], "lead past the last image"),
         (&["--edit", "none-such"], "none-such"),
         (&["--keep", "colour"], "invalid value 'colour'"),
     ] {

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 /// An experiment with two networks, two training sets and two seeds; one dataset is rendered and one is imported.
 const PAGE: &str = r#"Experiment(
-    networks: ["basic-segnet", "unet"],
+    networks: ["basic-segnet", "tiny-unet"],
     seeds: [1, 2],
     hyperparameters: (size: (48, 32), steps: 2, batch: 2, validate_every: 1, resize: "64,96"),
     sets: {
@@ -98,7 +98,7 @@ fn spawn(mut command: Command) -> Child {
 fn one_command_makes_sets_trainings_and_tables() {
     let (_, out, _) = whole();
     let found = files(out);
-    for network in ["basic-segnet", "unet"] {
+    for network in ["basic-segnet", "tiny-unet"] {
         for train in ["synthetic", "real-augmented"] {
             for seed in [1, 2] {
                 let run = format!("runs/{network}/{train}/seed-{seed}");
@@ -146,7 +146,7 @@ fn killed_at_many_moments_it_ends_as_if_never_killed() {
     }
     assert!(alive > 8, "{alive} of 20 kills hit a running program");
     // No kill is certain to hit a file write, so partial files are added here.
-    for within in ["", "runs/unet/synthetic/seed-1/eval"] {
+    for within in ["", "runs/tiny-unet/synthetic/seed-1/eval"] {
         std::fs::create_dir_all(out.join(within)).expect("a folder");
         std::fs::write(out.join(within).join(".furrow-half"), "half").expect("a file");
     }
@@ -184,7 +184,7 @@ fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
     let mut copy = Command::new("cp");
     copy.arg("-r").args([expected, &out]);
     succeed(copy);
-    std::fs::remove_dir_all(out.join("runs/unet/synthetic/seed-1")).expect("a run");
+    std::fs::remove_dir_all(out.join("runs/tiny-unet/synthetic/seed-1")).expect("a run");
     for lost in ["sets/small/seals/000001.json", "table-1.md"] {
         std::fs::remove_file(out.join(lost)).expect("a file");
     }

@@ -160,7 +160,7 @@ fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
     let command = format!("`trace dataset render {} --shard 0/2 --scratch {}`", path(&folder), path(&disk));
     // The waiting run is stopped first; otherwise it might start working before it handles its own signal.
     for (signal, child, words) in
-        [("TERM", third, "while another run of shard 0/2 was at work"), ("USR1", first, "of 12 images are there")]
+        [("TERM", third, "while another run of shard 0/2 was at work"), ("USR1", first, "of 12 images are complete")]
     {
         send(signal, &child);
         let (code, said) = ended(child);
@@ -216,7 +216,7 @@ fn scripts_name_the_nodes_own_folder() {
     same(&files(&folder), &whole(4));
     for (order, words) in [
         (["--scheduler", "kubernetes", "--scratch", "/tmp/furrow"], "--scratch is for slurm and parallel"),
-        (["--scheduler", "slurm", "--scratch", "a\nb"], "is no folder"),
+        (["--scheduler", "slurm", "--scratch", "a\nb"], "is not a folder"),
     ] {
         let said = fail(verb("emit", &folder, &[&order[..], &["--shards", "2"]].concat()), 2);
         assert!(said.contains(words), "{said}");

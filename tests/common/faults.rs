@@ -76,7 +76,7 @@ pub fn moments(changes: u64, between: u64) -> Vec<u64> {
 /// Checks a program that could not write: exit code 1, a single error with a help line, and no temporary file left
 /// behind.
 pub fn failed_well(ended: &Ended, folder: &Path, at: u64) {
-    // A scene file with outdated keywords causes a warning before the error.
+    // Warnings may precede the error.
     let said: Vec<String> = ended.said().lines().filter(|l| !l.starts_with("warning: ")).map(str::to_owned).collect();
     let said = said.join("\n");
     let what = format!("change {at}, {}: {said}", ended.failed);

@@ -157,8 +157,8 @@ def numpy_basic_segnet(o, x):
     return o.conv(x, "head.conv")
 
 
-def numpy_decoder(o, x, skips, size):
-    for level in range(5):
+def numpy_decoder(o, x, skips, size, levels=5):
+    for level in range(levels):
         skip = skips.pop() if skips else None
         x = o.nearest(x, *(size if skip is None else skip.shape[2:]))
         if skip is not None:
@@ -166,6 +166,15 @@ def numpy_decoder(o, x, skips, size):
         for i in range(2):
             x = o.unit(x, f"dec{level}_{i}", bias=False)
     return o.conv(x, "head.conv")
+
+
+def numpy_tiny_unet(o, x):
+    size, skips = x.shape[2:], []
+    for level in range(2):
+        x = o.unit(x, f"enc{level}", bias=False)
+        skips.append(x)
+        x, _ = o.pool(x)
+    return numpy_decoder(o, x, skips, size, levels=2)
 
 
 def numpy_unet(o, x):
@@ -254,7 +263,7 @@ def numpy_vit_unet(o, x):
 
 def run_numpy(network, weights, images, classes):
     o = Arrays(weights)
-    walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet}
+    walk = {"segnet": numpy_segnet, "basic-segnet": numpy_basic_segnet, "unet": numpy_unet, "tiny-unet": numpy_tiny_unet}
     walk = (walk | {"lite-unet": numpy_lite_unet, "vit-unet": numpy_vit_unet})[network]
     scores = walk(o, images.astype(np.float64))
     learnt = sum(size for name, size in o.used.items() if "running" not in name)
@@ -416,6 +425,32 @@ def torch_networks():
             names += [f"dec{d}_{i}.{what}" for d in range(5) for i in range(2) for what in ("conv", "bn")]
             return names + ["head.conv"]
 
+    class TinyUNet(Base):
+        def __init__(self, bands, classes):
+            super().__init__()
+            def unit(inputs, outputs):
+                return nn.Sequential(nn.Conv2d(inputs, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU())
+
+            self.encoder = nn.ModuleList([unit(bands, 8), unit(8, 16)])
+            self.decoder = nn.ModuleList([DecoderBlock(16, 16, 16), DecoderBlock(16, 8, 8)])
+            self.segmentation_head = nn.Conv2d(8, classes, 3, padding=1)
+
+        def forward(self, x):
+            skips = []
+            for stage in self.encoder:
+                x = stage(x)
+                skips.append(x)
+                x = F.max_pool2d(x, 2)
+            for block in self.decoder:
+                skip = skips.pop()
+                x = block(x, skip, skip.shape[2:])
+            return self.segmentation_head(x)
+
+        def names(self):
+            names = [f"enc{level}.{what}" for level in range(2) for what in ("conv", "bn")]
+            names += [f"dec{level}_{i}.{what}" for level in range(2) for i in range(2) for what in ("conv", "bn")]
+            return names + ["head.conv"]
+
     class LiteUNet(Base):
         """The encoder is that of the package that publishes its initial weights."""
 
@@ -522,7 +557,7 @@ def torch_networks():
                 norm.load_state_dict({what: state["norm." + what] for what in ("weight", "bias")})
             self.vit.load_state_dict({name: array for name, array in state.items() if not name.startswith("norm.")})
 
-    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet, "lite-unet": LiteUNet, "vit-unet": VitUNet}
+    return {"segnet": SegNet, "basic-segnet": BasicSegNet, "unet": UNet, "tiny-unet": TinyUNet, "lite-unet": LiteUNet, "vit-unet": VitUNet}
 
 
 def write_vit(path):

@@ -338,7 +338,7 @@ impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { line, column, width, text } = self;
         let margin = line.to_string().len().max(4);
-        // Of a long line show only the part around the fault, without control characters.
+        // Shows only the part of a long line around the fault, without control characters.
         let hidden = if *column > WINDOW - 20 { column - WINDOW / 2 } else { 0 };
         let shown: String = text.chars().skip(hidden).take(WINDOW).map(visible).collect();
         let (before, after) =

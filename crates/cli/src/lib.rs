@@ -3,7 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`cli`] | exit codes, signals, shared arguments |
-//! | [`reference`] | the reference of scene, species and experiment files |
+//! | [`mod@reference`] | the reference of scene, species and experiment files |
 
 pub mod cli;
 pub mod reference;

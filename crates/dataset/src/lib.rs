@@ -1,32 +1,31 @@
-//! Datasets: from one field to a hundred thousand, each with every label, in the formats people use.
+//! Datasets: images of crop fields with all labels, from one to many thousands, in the formats of common tools.
 //!
-//! Image k is field k of the scene file: a function of scene file, seed and k, whichever process on whichever machine makes it, and in which
-//! order. So the work may be cut, killed, moved and gone on with anywhere.
+//! Image k depends on the scene file, the seed and k only. The process, the machine and the order of the images have no
+//! influence, so the work can be split, killed, moved and resumed anywhere.
 //!
 //! ```text
-//! dataset.json          the recipe: what decides every byte
-//! scene/                the scene file and everything that it reads, so that the folder stands alone
-//! images/000123/        one image: photographs, label maps, record.json
-//! packs/train-000000.tar  the same of a thousand images, where the recipe asks for it
-//! coco/ phenobench/ …   the same for other people's tools
-//! seals/000123.json     checksums: SHA-256 of each of its files; written last
-//! ledger/               timing log: when runs began and ended, how long each image took, which failed; one file a run: the only place with clock times
-//! jobs/                 what `emit` wrote for a scheduler, and its logs; belongs to no image
-//! manifest.json         everything above in one list, written when all images are there
-//! images.parquet, plants.parquet  what images and plants are chosen by
-//! report.html           what is in it, for people
+//! dataset.json          recipe: everything that affects a byte of the images
+//! scene/                the scene file and all files that it reads, so that the folder is self-contained
+//! images/000123/        one image: colour and near-infrared image, label maps, record.json
+//! packs/train-000000.tar  if the recipe has a pack size: archive of many images instead of their folders
+//! coco/ phenobench/ …   the same images in the formats of other tools
+//! seals/000123.json     checksum record: SHA-256 of each file of the image; written last
+//! ledger/               timing log, one file per run: start, end, time of each image, failures; the only clock times
+//! jobs/                 job files that `emit` wrote for a scheduler, and their logs; belong to no image
+//! manifest.json         list of everything above; written when all images are complete
+//! images.parquet, plants.parquet  tables for selecting images and plants
+//! report.html           summary of the dataset, one page
 //! ```
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`model`] | recipe, classes, splits; one image with all labels, its record, and the rules that it satisfies |
-//! | [`read`] | a dataset on disk: checksums, image folders, packs (archives of many images), images that remain to be made |
+//! | [`read`] | a dataset on disk: checksums, image folders, packs (archives of many images) |
 //! | [`index`] | tables of images and plants |
-//! | [`format`] | files in the formats of other tools |
+//! | [`mod@format`] | files in the formats of other tools |
 //! | [`report`] | one HTML page about a dataset |
-//! | [`pack`] | writes packs |
-//! | [`make`] | plan, render, finish; cost estimate and status |
-//! | [`deliver`] | streams, a node's own disk, job files for clusters |
+//! | [`mod@make`] | plan, render, write packs, finish; cost estimate and status |
+//! | [`deliver`] | tar streams, a node's own disk, job files for clusters |
 //! | [`check`] | verification |
 //! | [`import`] | images and labels from other tools |
 
@@ -37,7 +36,6 @@ pub mod import;
 pub mod index;
 pub mod make;
 pub mod model;
-pub mod pack;
 pub mod read;
 pub mod report;
 
@@ -54,8 +52,8 @@ pub use read::set::Set;
 /// A file of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct File {
-    /// Below the dataset's folder, with `/`.
+    /// Path relative to the dataset's folder, with `/` as separator.
     pub path: String,
-    /// What it holds.
+    /// Contents.
     pub bytes: Vec<u8>,
 }

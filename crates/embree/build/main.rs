@@ -1,4 +1,4 @@
-//! Finds Embree and links it; see `search.rs` for where it is looked for.
+//! Finds Embree and links it; see `search.rs` for the search path.
 #![allow(clippy::print_stdout, reason = "Cargo reads a build script's standard output")]
 
 mod search;
@@ -19,11 +19,11 @@ fn main() {
     println!("cargo::rerun-if-changed={}", file.display());
     println!("cargo::rustc-cfg=embree=\"{version}\"");
     println!("cargo::rustc-link-search=native={}", folder.display());
-    // By file name: libraries inside Python packages have no other name.
+    // Links by file name, since libraries in Python packages do not follow the pattern `libNAME.so`.
     println!("cargo::rustc-link-lib=dylib:+verbatim={name}");
     if own.is_some() {
         println!("cargo::rustc-link-arg=-Wl,--enable-new-dtags,-rpath,{}", folder.display());
-        // Link arguments do not pass to dependants: their build scripts read this as DEP_EMBREE_RPATH.
+        // Link arguments do not apply to dependent packages; their build scripts read this value as DEP_EMBREE_RPATH.
         println!("cargo::metadata=RPATH={}", folder.display());
     }
 }

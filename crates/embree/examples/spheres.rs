@@ -1,14 +1,15 @@
-//! Ray traces a sphere, instanced on a grid, to a portable graymap on standard output: `… --example spheres > spheres.pgm`.
+//! Ray traces a sphere, instanced on a grid, to a portable graymap on standard output: `… --example spheres >
+//! spheres.pgm`.
 
 use furrow_embree::{Device, Error, Everything, Geometry, Ray, Scene};
 use std::io::Write;
 use std::sync::Arc;
 
 const SIZE: usize = 400;
-/// Segments around the sphere's axis, and between its poles.
+/// Number of segments around the sphere's axis, and between its poles.
 const SEGMENTS: u32 = 64;
 
-/// Corners and triangles of a sphere of radius 0.45.
+/// Returns vertices and triangles of a sphere of radius 0.45.
 fn sphere() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let (mut corners, mut triangles) = (Vec::new(), Vec::new());
     let step = |i: u32| std::f32::consts::PI * i as f32 / SEGMENTS as f32;
@@ -41,11 +42,11 @@ fn main() -> Result<(), Error> {
         for x in 0..SIZE {
             let at = |pixel: usize| (pixel as f32 + 0.5) / SIZE as f32 * 4.0 - 2.0;
             let ray = Ray { origin: [at(x), -at(y), 2.0], direction: [0.0, 0.0, -1.0], t_max: f32::INFINITY };
-            // Brightness falls with distance: 1.55 is the nearest point of a sphere, 2 its equator.
+            // Brightness decreases with distance, from 1.55 at the nearest point of a sphere to 2 at its equator.
             image.push(scene.closest(&ray).map_or(0, |hit| (255.0 * (2.1 - hit.t) / 0.55) as u8));
         }
     }
     let mut out = std::io::stdout().lock();
-    let written = write!(out, "P5 {SIZE} {SIZE} 255\n").and_then(|()| out.write_all(&image));
+    let written = writeln!(out, "P5 {SIZE} {SIZE} 255").and_then(|()| out.write_all(&image));
     written.map_err(|_| Error::Unknown)
 }

@@ -15,7 +15,7 @@ pub enum Error {
     InvalidOperation,
     /// Memory ran out while a structure was built.
     OutOfMemory,
-    /// The processor lacks the instruction set that was asked for.
+    /// The processor lacks the requested instruction set.
     UnsupportedCpu,
     /// The build was cancelled by its flag.
     Cancelled,
@@ -24,7 +24,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The error with this number in `RTCError`.
+    /// Returns the error with this number in `RTCError`.
     fn from_code(code: u32) -> Self {
         match code {
             2 => Self::InvalidArgument,
@@ -54,10 +54,11 @@ impl std::error::Error for Error {}
 
 /// Makes the calling thread flush denormals to zero, as Embree requires of threads that trace rays.
 pub fn prepare_thread() {
-    // Bits of the control register MXCSR: flush to zero, denormals are zero. The others, such as the rounding mode, stay.
+    // Bits of the control register MXCSR: flush to zero, denormals are zero. Other bits, such as the rounding mode, are
+    // kept.
     const FTZ_DAZ: u32 = 0x8000 | 0x0040;
     let mut mxcsr: u32 = 0;
-    // SAFETY: both instructions touch that register and the four bytes that they are given, which live on this stack.
+    // SAFETY: both instructions access only MXCSR and the four bytes of `mxcsr`, which is a local variable.
     unsafe {
         std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut mxcsr, options(nostack, preserves_flags));
         mxcsr |= FTZ_DAZ;
@@ -74,14 +75,14 @@ unsafe impl Sync for Device {}
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: the pointer is `rtcNewDevice`'s, and this is the only release of it.
+        // SAFETY: the pointer comes from `rtcNewDevice` and is released only here.
         unsafe { sys::rtcReleaseDevice(self.0) }
     }
 }
 
 impl Device {
-    /// Creates a device with the kernels of instruction set `isa` (such as `"avx2"`) and `threads` build threads (0: one per core), and calls
-    /// [`prepare_thread`].
+    /// Creates a device with the kernels of instruction set `isa` (such as `"avx2"`) and `threads` build threads (0:
+    /// one per core), and calls [`prepare_thread`].
     pub fn new(isa: &str, threads: u32) -> Result<Self, Error> {
         prepare_thread();
         let config =
@@ -89,33 +90,33 @@ impl Device {
         // SAFETY: the text ends in a null character and outlives the call.
         let device = unsafe { sys::rtcNewDevice(config.as_ptr()) };
         if device.is_null() {
-            // SAFETY: without a device it is this thread's error that is read.
+            // SAFETY: with a null device, the call reads the error of this thread.
             return Err(Error::from_code(unsafe { sys::rtcGetDeviceError(null_mut()) }));
         }
         Ok(Self(device))
     }
 
-    /// Embree's version as one number: 31305 is 3.13.5.
+    /// Returns Embree's version as one number: 31305 is 3.13.5.
     pub fn version(&self) -> isize {
-        // SAFETY: the device lives, and has that property.
+        // SAFETY: the device is alive, and every device has this property.
         unsafe { sys::rtcGetDeviceProperty(self.0, sys::RTC_DEVICE_PROPERTY_VERSION) }
     }
 
-    /// The raw pointer; valid while `self` lives.
+    /// Returns the raw pointer, which is valid while `self` is alive.
     pub(super) fn handle(&self) -> *mut sys::RTCDevice {
         self.0
     }
 
     /// Returns and clears the first error of the calling thread since the last check.
     pub(super) fn check(&self) -> Result<(), Error> {
-        // SAFETY: the device lives.
+        // SAFETY: the device is alive.
         match unsafe { sys::rtcGetDeviceError(self.0) } {
             0 => Ok(()),
             code => Err(Error::from_code(code)),
         }
     }
 
-    /// Passes a non-null pointer through; a null pointer becomes the device's error.
+    /// Returns a non-null pointer unchanged, and the device's error for a null pointer.
     pub(super) fn made<T>(&self, pointer: *mut T) -> Result<*mut T, Error> {
         if !pointer.is_null() {
             return Ok(pointer);

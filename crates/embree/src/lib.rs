@@ -1,8 +1,8 @@
 //! Safe bindings to Embree 3 and 4 for ray tracing triangle meshes.
 //!
-//! Embree's C API is wrapped in three types: a [`Device`] (threads, instruction set), a [`Geometry`] (triangles with an optional hit
-//! filter, or an instance of a scene) and a [`Scene`] (a committed bounding volume hierarchy). A `Scene` is immutable, so it can be
-//! queried from any number of threads.
+//! Embree's C API is wrapped in three types: a [`Device`] (threads, instruction set), a [`Geometry`] (triangles with an
+//! optional hit filter, or an instance of a scene) and a [`Scene`] (a committed bounding volume hierarchy). A `Scene`
+//! is immutable, so it can be queried from any number of threads.
 //!
 //! ```
 //! use furrow_embree::{Device, Everything, Geometry, Ray, Scene};
@@ -17,20 +17,21 @@
 //! # Ok::<(), furrow_embree::Error>(())
 //! ```
 //!
-//! # Which Embree
+//! # Versions of Embree
 //!
-//! The build script links Embree 4 or 3, whichever it finds first in `EMBREE_DIR` or in the system's library folders (Debian and
-//! Ubuntu: `apt-get install libembree-dev`). Both have the same Rust API. Headers are not needed: `sys.rs` declares the functions
-//! that both versions share, `query3.rs` and `query4.rs` the ray queries of each.
+//! The build script links Embree 4 or 3, whichever it finds first in `EMBREE_DIR` or in the system's library folders
+//! (Debian and Ubuntu: `apt-get install libembree-dev`). Both have the same Rust API. Headers are not needed: `sys.rs`
+//! declares the functions that both versions share, `query3.rs` and `query4.rs` the ray queries of each.
 //!
 //! # Floating point
 //!
-//! Threads that trace rays must flush denormals to zero, as Embree's own threads do; otherwise the last bits of a hit depend on the
-//! thread. [`Device::new`] sets this for the calling thread, [`prepare_thread`] for any other.
+//! Threads that trace rays must flush denormals to zero, as Embree's own threads do; otherwise the last bits of a hit
+//! depend on the thread. [`Device::new`] sets this for the calling thread, [`prepare_thread`] for any other.
 //!
 //! # Limits
 //!
-//! One level of instances; no motion blur, curves, points or user geometry. Scenes are traversed in Embree's robust mode.
+//! One level of instances; no motion blur, curves, points or user geometry. Scenes are traversed in Embree's robust
+//! mode.
 #![allow(unsafe_code, reason = "calls a C library; each block states the contract that it relies on")]
 
 mod device;

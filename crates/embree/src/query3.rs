@@ -40,7 +40,8 @@ unsafe extern "C" {
 /// `scene` is committed and not modified during the call. The same holds for all functions of this file.
 #[inline]
 pub(super) unsafe fn intersect1(scene: *mut RTCScene, query: &mut RTCRayHit) {
-    // SAFETY: the caller guarantees the scene; the other arguments are initialised and outlive the call. So in all functions below.
+    // SAFETY: the caller guarantees the scene; the other arguments are initialised and outlive the call. The same holds
+    // in all functions below.
     unsafe { rtcIntersect1(scene, &mut RTCIntersectContext::new(INCOHERENT), query) }
 }
 

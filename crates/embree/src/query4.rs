@@ -1,10 +1,11 @@
-//! How Embree 4 is asked about rays: with arguments, whose context may be absent.
+//! Ray queries of Embree 4: each takes an arguments struct, whose context may be null.
 
 use super::sys::{Lanes, RTCFilterFunctionN, RTCRay, RTCRay8, RTCRayHit, RTCRayHit8, RTCScene};
 use std::ffi::{c_int, c_uint, c_void};
 use std::ptr::null_mut;
 
-/// How rays are traversed; `RTCIntersectArguments` and `RTCOccludedArguments` in C, which differ in the type of the last function alone.
+/// Arguments of a query: `RTCIntersectArguments` and `RTCOccludedArguments` in C, which differ only in the type of the
+/// last function pointer.
 #[repr(C)]
 struct RTCArguments {
     flags: c_uint,
@@ -36,7 +37,8 @@ unsafe extern "C" {
 /// `scene` is committed and not modified during the call. The same holds for all functions of this file.
 #[inline]
 pub(super) unsafe fn intersect1(scene: *mut RTCScene, query: &mut RTCRayHit) {
-    // SAFETY: the caller guarantees the scene; the other arguments are initialised and outlive the call. So in all functions below.
+    // SAFETY: the caller guarantees the scene; the other arguments are initialised and outlive the call. The same holds
+    // in all functions below.
     unsafe { rtcIntersect1(scene, query, &mut RTCArguments::new(INCOHERENT)) }
 }
 

@@ -3,14 +3,14 @@
 /// Number of rays in a packet.
 pub const PACKET: usize = 8;
 
-/// A ray. Hits count where 0 < t < `t_max`.
+/// A ray segment; only hits with 0 < t < `t_max` count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Start.
+    /// Start point.
     pub origin: [f32; 3],
-    /// Direction. Distances are in units of its length.
+    /// Direction, of any length; distances are in units of its length.
     pub direction: [f32; 3],
-    /// End, in units of the direction's length; may be infinite.
+    /// Largest distance, in units of the direction's length; may be infinite.
     pub t_max: f32,
 }
 
@@ -23,9 +23,9 @@ pub struct Hit {
     pub geometry: u32,
     /// Index of the triangle in its geometry.
     pub primitive: u32,
-    /// Barycentric coordinate of the second corner.
+    /// Barycentric coordinate of the second vertex.
     pub u: f32,
-    /// Barycentric coordinate of the third corner.
+    /// Barycentric coordinate of the third vertex.
     pub v: f32,
     /// Distance along the ray, in units of its direction's length.
     pub t: f32,

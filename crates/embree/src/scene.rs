@@ -10,7 +10,8 @@ use std::ptr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Decides which hits count, for alpha masks. A panic in it aborts the process, since it must not unwind through Embree.
+/// Decides which hits count, for alpha masks. A panic in it aborts the process, since it must not unwind through
+/// Embree.
 pub trait Filter: Send + Sync {
     /// Returns `true` if the surface exists at barycentric coordinates `u`, `v` of triangle `primitive`.
     fn keeps(&self, primitive: u32, u: f32, v: f32) -> bool;
@@ -29,7 +30,7 @@ impl Filter for Everything {
 /// A committed bounding volume hierarchy over geometries. Immutable.
 pub struct Scene<F> {
     handle: *mut sys::RTCScene,
-    /// Released after the scene, as their filters are. They hold the device.
+    /// Released after the scene, with their filters. They keep the device alive.
     geometries: Vec<Arc<Geometry<F>>>,
     device: Arc<Device>,
 }
@@ -40,7 +41,8 @@ unsafe impl<F: Send + Sync> Sync for Scene<F> {}
 
 impl<F> Drop for Scene<F> {
     fn drop(&mut self) {
-        // SAFETY: the pointer is `rtcNewScene`'s, this is its only release, and no query runs: they borrow the scene.
+        // SAFETY: the pointer comes from `rtcNewScene` and is released only here; no query runs, since queries borrow
+        // the scene.
         unsafe { sys::rtcReleaseScene(self.handle) }
     }
 }
@@ -48,8 +50,8 @@ impl<F> Drop for Scene<F> {
 impl<F: Filter> Scene<F> {
     /// Builds the hierarchy over `geometries`, which must belong to `device`.
     ///
-    /// With `quick`, the build takes a fraction of the time and queries are slower (`RTC_BUILD_QUALITY_LOW`, Morton codes). If `outdated`
-    /// becomes `true` while the hierarchy is built, the result is [`Error::Cancelled`].
+    /// With `quick`, the build takes a fraction of the time and queries are slower (`RTC_BUILD_QUALITY_LOW`, Morton
+    /// codes). If `outdated` becomes `true` while the hierarchy is built, the result is [`Error::Cancelled`].
     ///
     /// # Panics
     /// If a geometry belongs to another device.
@@ -61,24 +63,26 @@ impl<F: Filter> Scene<F> {
     ) -> Result<Self, Error> {
         assert!(geometries.iter().all(|g| Arc::ptr_eq(&g.device, device)), "a geometry of another Embree device");
         let quality = if quick { sys::RTC_BUILD_QUALITY_LOW } else { sys::RTC_BUILD_QUALITY_MEDIUM };
-        // SAFETY: the device lives.
+        // SAFETY: the device is alive.
         let handle = device.made(unsafe { sys::rtcNewScene(device.handle()) })?;
         let scene = Self { handle, geometries, device: device.clone() };
-        // SAFETY: the scene lives; both numbers are among the headers' values.
+        // SAFETY: the scene is alive; both numbers are constants of Embree's headers.
         unsafe {
             sys::rtcSetSceneFlags(handle, sys::RTC_SCENE_FLAG_ROBUST);
             sys::rtcSetSceneBuildQuality(handle, quality);
         }
         for geometry in &scene.geometries {
-            // SAFETY: geometry and scene live and are of one device; a geometry may be attached to several scenes, and none changes it.
+            // SAFETY: geometry and scene are alive and belong to one device; a geometry may be attached to several
+            // scenes, which do not modify it.
             unsafe { sys::rtcAttachGeometry(handle, geometry.handle) };
         }
         if let Some(outdated) = outdated {
             let flag = ptr::from_ref(outdated).cast_mut().cast::<c_void>();
-            // SAFETY: the scene lives; `wanted` reads an `AtomicBool` behind the pointer, which outlives the commit, and Embree forgets it below.
+            // SAFETY: the scene is alive; `wanted` reads an `AtomicBool` through the pointer, which outlives the commit
+            // and is reset below.
             unsafe { sys::rtcSetSceneProgressMonitorFunction(handle, Some(wanted), flag) };
         }
-        // SAFETY: the scene lives, and nothing else knows it yet.
+        // SAFETY: the scene is alive, and no other thread can access it yet.
         unsafe {
             sys::rtcCommitScene(handle);
             sys::rtcSetSceneProgressMonitorFunction(handle, None, ptr::null_mut());
@@ -87,12 +91,12 @@ impl<F: Filter> Scene<F> {
         Ok(scene)
     }
 
-    /// Device of the scene.
+    /// Returns the device of the scene.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
-    /// Geometries of the scene; a [`Hit`] holds indices into this slice.
+    /// Returns the geometries of the scene; a [`Hit`] contains indices into this slice.
     pub fn geometries(&self) -> &[Arc<Geometry<F>>] {
         &self.geometries
     }
@@ -107,9 +111,9 @@ unsafe extern "C" fn wanted(flag: *mut c_void, _: f64) -> bool {
 /// Triangles with an optional filter, or an instance of a scene. Immutable.
 pub struct Geometry<F> {
     handle: *mut sys::RTCGeometry,
-    /// User data of the filter callback: lives as long as the geometry and does not move.
+    /// User data of the filter callback, at a fixed address as long as the geometry exists.
     filter: Option<Arc<F>>,
-    /// The instanced scene: Embree counts references to it, and this keeps its filters alive.
+    /// The instanced scene. Embree holds its own reference to it; this one keeps its filters alive.
     _shared: Option<Arc<Scene<F>>>,
     /// Released after the geometry.
     device: Arc<Device>,
@@ -121,24 +125,24 @@ unsafe impl<F: Send + Sync> Sync for Geometry<F> {}
 
 impl<F> Drop for Geometry<F> {
     fn drop(&mut self) {
-        // SAFETY: the pointer comes from `rtcNewGeometry` and is released once. Scenes that attached it hold this struct, and count their own
-        // references.
+        // SAFETY: the pointer comes from `rtcNewGeometry` and is released only here. Scenes that attach it keep this
+        // struct alive and hold references of their own.
         unsafe { sys::rtcReleaseGeometry(self.handle) }
     }
 }
 
 impl<F: Filter> Geometry<F> {
-    /// Creates a triangle mesh. Without triangles it is one degenerate triangle, so that it still occupies an index.
+    /// Creates a triangle mesh. An empty mesh becomes one degenerate triangle, so that it still occupies an index.
     ///
     /// # Panics
-    /// If a triangle refers to a corner that does not exist.
+    /// If a triangle refers to a vertex that does not exist.
     pub fn new(
         device: &Arc<Device>,
         corners: impl ExactSizeIterator<Item = [f32; 3]>,
         triangles: impl ExactSizeIterator<Item = [u32; 3]>,
         filter: Option<F>,
     ) -> Result<Self, Error> {
-        // SAFETY: the device lives; the number is among the headers' values.
+        // SAFETY: the device is alive; the number is a constant of Embree's headers.
         let handle = unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_TRIANGLE) };
         let handle = device.made(handle)?;
         let mut geometry = Self { handle, filter: filter.map(Arc::new), _shared: None, device: device.clone() };
@@ -149,30 +153,33 @@ impl<F: Filter> Geometry<F> {
         let to = geometry.buffer(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, count)?;
         let there = |triangle: &[u32; 3]| triangle.iter().all(|corner| (*corner as usize) < known);
         fill(to, triangles.inspect(|triangle| assert!(there(triangle), "{triangle:?} of {known} corners")));
-        // SAFETY: the geometry lives; the number is among the headers' values.
+        // SAFETY: the geometry is alive; the number is a constant of Embree's headers.
         unsafe { sys::rtcSetGeometryBuildQuality(handle, sys::RTC_BUILD_QUALITY_MEDIUM) };
         if let Some(filter) = &geometry.filter {
             let data = Arc::as_ptr(filter).cast_mut().cast::<c_void>();
-            // SAFETY: the geometry lives. `confirm` reads an `F` behind the pointer, and `filter` keeps it while a scene can ask.
+            // SAFETY: the geometry is alive. `confirm` reads an `F` through the pointer, which `filter` keeps alive
+            // while scenes can call it.
             unsafe {
                 sys::rtcSetGeometryUserData(handle, data);
                 sys::rtcSetGeometryIntersectFilterFunction(handle, confirm::<F>);
                 sys::rtcSetGeometryOccludedFilterFunction(handle, confirm::<F>);
             }
         }
-        // SAFETY: the geometry lives.
+        // SAFETY: the geometry is alive.
         unsafe { sys::rtcCommitGeometry(handle) };
         device.check()?;
         Ok(geometry)
     }
 
-    /// Creates an instance of a scene. A point p of it is at `columns` · (p, 1) in the scene that attaches the instance.
+    /// Creates an instance of a scene. `columns` is its 3 × 4 transform: a point p is at `columns` · (p, 1) in the
+    /// scene that attaches the instance.
     pub fn instance(of: &Arc<Scene<F>>, columns: [[f32; 3]; 4]) -> Result<Self, Error> {
         let device = of.device.clone();
-        // SAFETY: the device lives; the number is among the headers' values.
+        // SAFETY: the device is alive; the number is a constant of Embree's headers.
         let handle = device.made(unsafe { sys::rtcNewGeometry(device.handle(), sys::RTC_GEOMETRY_TYPE_INSTANCE) })?;
         let geometry = Self { handle, filter: None, _shared: Some(of.clone()), device };
-        // SAFETY: geometry and scene live, are of one device, and the scene is committed. The format has 3 × 4 floats, which Embree copies.
+        // SAFETY: geometry and scene are alive and belong to one device, and the scene is committed. The format has 3 ×
+        // 4 floats, which Embree copies.
         unsafe {
             sys::rtcSetGeometryInstancedScene(handle, of.handle);
             let format = sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR;
@@ -183,31 +190,34 @@ impl<F: Filter> Geometry<F> {
         Ok(geometry)
     }
 
-    /// A new buffer of `count` triples, to be filled; its format has three values of four bytes, as `T` has.
+    /// Creates an uninitialised buffer of `count` triples; its format must have three values of four bytes, like `[T;
+    /// 3]`.
     fn buffer<T>(&mut self, kind: u32, format: u32, count: usize) -> Result<&mut [MaybeUninit<[T; 3]>], Error> {
         const { assert!(size_of::<T>() == 4 && align_of::<T>() == 4) };
         let stride = size_of::<[T; 3]>();
-        // SAFETY: the geometry lives; the numbers are among the headers' values.
+        // SAFETY: the geometry is alive; the numbers are constants of Embree's headers.
         let data = unsafe { sys::rtcSetNewGeometryBuffer(self.handle, kind, 0, format, stride, count) };
         let data = self.device.made(data)?.cast();
-        // SAFETY: Embree's buffer has that many triples, aligned to 16 bytes; it lives as long as the geometry, which nothing else changes meanwhile.
+        // SAFETY: Embree's buffer has `count` triples and is aligned to 16 bytes; it exists as long as the geometry,
+        // which is borrowed exclusively.
         Ok(unsafe { std::slice::from_raw_parts_mut(data, count) })
     }
 }
 
-/// Fills a buffer; with zeros where there are too few values.
+/// Fills a buffer, with zeros if there are too few values.
 fn fill<T: Copy + Default>(to: &mut [MaybeUninit<[T; 3]>], values: impl Iterator<Item = [T; 3]>) {
     for (to, value) in to.iter_mut().zip(values.chain(std::iter::repeat([T::default(); 3]))) {
         to.write(value);
     }
 }
 
-/// Clears the lanes whose hit does not count.
+/// Filter callback: clears the lanes whose hit is rejected.
 ///
 /// # Safety
-/// Embree calls it with arguments of `N` lanes; the geometry's pointer leads to an `F`.
+/// The arguments must have `N` lanes, and the geometry's user data must point to an `F`.
 unsafe extern "C" fn confirm<F: Filter>(arguments: *const sys::RTCFilterFunctionNArguments) {
-    // SAFETY: the caller's promise. The lanes are this call's alone, the filter is shared with other threads.
+    // SAFETY: the caller guarantees valid arguments. The lanes belong to this call; the filter is shared with other
+    // threads.
     let (arguments, filter, lanes) = unsafe {
         let arguments = &*arguments;
         let lanes = std::slice::from_raw_parts_mut(arguments.valid, arguments.N as usize);
@@ -215,7 +225,7 @@ unsafe extern "C" fn confirm<F: Filter>(arguments: *const sys::RTCFilterFunction
     };
     for lane in 0..lanes.len() {
         let at = |field: usize| field * lanes.len() + lane;
-        // SAFETY: hits are arrays of one value a lane: normal (3), u, v, primitive. A lane that is not valid is not read.
+        // SAFETY: hits are arrays with one value per lane: normal (3), u, v, primitive. Inactive lanes are not read.
         let keeps = |hit: *mut c_void| unsafe {
             let (u, v) = (*hit.cast::<f32>().add(at(3)), *hit.cast::<f32>().add(at(4)));
             filter.keeps(*hit.cast::<u32>().add(at(5)), u, v)
@@ -231,7 +241,7 @@ impl<F> Scene<F> {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut query = sys::RTCRayHit { ray: single(ray), hit: NO_HIT };
-        // SAFETY: a `Scene` is committed, and nothing changes it. So below.
+        // SAFETY: a `Scene` is committed and immutable. The same holds below.
         unsafe { query::intersect1(self.handle, &mut query) };
         let sys::RTCRayHit { ray, hit } = query;
         found([hit.instID[0], hit.geomID, hit.primID], hit.u, hit.v, ray.tfar)
@@ -307,10 +317,10 @@ fn single(ray: &Ray) -> sys::RTCRay {
     }
 }
 
-/// Converts rays to Embree's structure of arrays, with the mask of lanes that hold a ray.
+/// Converts rays to Embree's structure of arrays, with the mask of lanes that have a ray.
 #[inline]
 fn packet(rays: &[Option<Ray>; PACKET]) -> (sys::RTCRay8, Lanes) {
-    // Masked lanes are not traced.
+    // Placeholder for lanes without a ray, which are masked and not traced.
     let idle = Ray { origin: [0.0; 3], direction: [0.0, 0.0, 1.0], t_max: 0.0 };
     let lane = |i: usize| rays[i].as_ref().unwrap_or(&idle);
     let each = |value: fn(&Ray) -> f32| std::array::from_fn(|i| value(lane(i)));

@@ -1,7 +1,8 @@
-//! Declarations that the headers of Embree 3.13 and Embree 4 share, limited to those used here. Names are Embree's.
+//! Declarations used here that are common to the headers of Embree 3.13 and Embree 4. The names are those of Embree.
 //!
-//! Source: `rtcore_device.h`, `rtcore_common.h`, `rtcore_buffer.h`, `rtcore_geometry.h`, `rtcore_scene.h`, `rtcore_ray.h` of 3.13.5, 4.3.3
-//! and 4.4.0, built with one level of instances (`RTC_MAX_INSTANCE_LEVEL_COUNT`), as Debian, Ubuntu and PyPI's `embreex` do.
+//! Source: `rtcore_device.h`, `rtcore_common.h`, `rtcore_buffer.h`, `rtcore_geometry.h`, `rtcore_scene.h`,
+//! `rtcore_ray.h` of 3.13.5, 4.3.3 and 4.4.0, built with one level of instances (`RTC_MAX_INSTANCE_LEVEL_COUNT`), as
+//! Debian, Ubuntu and PyPI's `embreex` do.
 #![expect(non_snake_case, reason = "Embree's own names")]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -30,7 +31,8 @@ pub(super) const RTC_BUILD_QUALITY_LOW: c_uint = 0;
 pub(super) const RTC_BUILD_QUALITY_MEDIUM: c_uint = 1;
 pub(super) const RTC_SCENE_FLAG_ROBUST: c_uint = 1 << 2;
 
-/// A ray. It hits a geometry if their masks share a bit; a geometry's default mask has all bits (Embree 3) or the first one (Embree 4).
+/// A ray. It hits a geometry if their masks share a bit; a geometry's default mask has all bits (Embree 3) or the first
+/// one (Embree 4).
 #[repr(C, align(16))]
 pub(super) struct RTCRay {
     pub(super) org: [f32; 3],
@@ -94,7 +96,7 @@ pub(super) struct RTCRayHit8 {
 #[repr(C, align(32))]
 pub(super) struct Lanes(pub(super) [c_int; 8]);
 
-// Sizes that a C compiler gives for Embree 4's headers.
+// Sizes of the structs in C, compiled from Embree 4's headers.
 const _: () = assert!(size_of::<RTCRay>() == 48 && size_of::<RTCRayHit>() == 96);
 const _: () = assert!(size_of::<RTCRay8>() == 384 && size_of::<RTCRayHit8>() == 672);
 

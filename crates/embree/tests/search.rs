@@ -1,7 +1,8 @@
-//! Which Embree the build script takes.
+//! Selection of the Embree library by the build script.
 //!
-//! Rationale: Debian 12 has version 3, later systems version 4, Python's wheel one under another name. Expected: `EMBREE_DIR` wins wherever
-//! the library lies in it, then version 4, then 3; what is not there is told with what to install. Source: the names in those packages.
+//! Rationale: Debian 12 has version 3, later systems have version 4, and Python's wheel has a library with another
+//! name. Expected: `EMBREE_DIR` takes precedence, with the library in it or in its `lib` folders, then version 4, then
+//! 3; if none is found, the error states what to install. Source: the file names in those packages.
 
 #[path = "../build/search.rs"]
 #[allow(dead_code, clippy::print_stdout, reason = "the script's own call is Cargo's")]
@@ -11,7 +12,7 @@ use search::find;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A folder with empty files.
+/// Creates a folder with empty files.
 fn folder(root: &Path, files: &[&str]) -> PathBuf {
     for file in files {
         let path = root.join(file);
@@ -52,7 +53,7 @@ fn without_embree_the_build_says_what_to_install() {
     let other = folder(&keep.path().join("lib"), &["libembree.a", "libembree2.so", "libembree5.so"]);
     let words = find(None, std::slice::from_ref(&other)).expect_err("no Embree");
     assert!(words.contains("apt-get install libembree-dev") && words.contains("EMBREE_DIR"), "{words}");
-    // What was asked for is not replaced by what else is there.
+    // If EMBREE_DIR has no Embree, the system's library is not used instead.
     let system = folder(&keep.path().join("system"), &["libembree4.so"]);
     let words = find(Some(&other), &[system]).expect_err("no Embree there");
     assert!(words.contains(&other.display().to_string()), "{words}");

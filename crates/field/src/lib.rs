@@ -12,7 +12,6 @@ mod library;
 mod part_kind;
 mod pictures;
 mod poses;
-pub mod record;
 pub mod shipped;
 pub mod species_file;
 pub mod species_text;
@@ -22,7 +21,7 @@ use furrow_base::math::Vec3;
 use furrow_grow::plant::{Condition, LeafAxis, RigJoint};
 use furrow_render::scene::tag::Class;
 
-pub use assemble::Field;
+pub use assemble::{Field, record};
 pub use part_kind::PartKind;
 
 /// Ground truth of one plant: identity, species, position, growth stage, size, leaves and condition.

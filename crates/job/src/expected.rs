@@ -66,7 +66,6 @@ impl SceneFile {
     /// Estimates the plants in view of the first `count` fields (at most 64) from their densities, without building them. Fields with
     /// errors are left out; they are reported when their images are rendered. Returns `None` if no field is left, and if a field has
     /// several images.
-    #[doc(hidden)]
     pub fn plants_in_view(&self, count: u64) -> Option<ExpectedPlants> {
         if self.captures() > 1 {
             return None;

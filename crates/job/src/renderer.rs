@@ -93,7 +93,6 @@ impl Renderer {
 
     /// Renders a field progressively. `passes` are ascending numbers of samples per pixel; after each of them, `show` gets the film and the
     /// labels, which are computed once. Returns an interruption error if the request's watch stops it.
-    #[doc(hidden)]
     pub fn refine(
         &self,
         field: &Field,

@@ -36,7 +36,6 @@ impl SceneFile {
     }
 
     /// Opens a scene file from an untrusted source. Neither it nor the files that it names may be outside `scope`.
-    #[doc(hidden)]
     pub fn open_within(path: impl AsRef<Path>, edit: &'static Edit, scope: Scope) -> Result<Self> {
         let source = Arc::new(edit.open(path.as_ref(), scope)?);
         Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
@@ -44,7 +43,6 @@ impl SceneFile {
 
     /// Reads the scene file again from disk, or takes `text` instead. Species, textures and models that did not change are not decoded
     /// again.
-    #[doc(hidden)]
     pub fn reread(&self, text: Option<&str>) -> Result<Self> {
         Ok(Self { source: Arc::new(self.source.reread(text)?), ..self.clone() })
     }
@@ -107,7 +105,6 @@ impl SceneFile {
     }
 
     /// Sets the receiver of progress while fields are built.
-    #[doc(hidden)]
     #[must_use]
     pub fn progress(mut self, progress: &Arc<BuildProgress>) -> Self {
         self.options.progress = Arc::clone(progress);
@@ -116,7 +113,6 @@ impl SceneFile {
 
     /// Builds fields for preview: plant meshes are only as fine as the pixels, and unchanged parts of the previous field are reused. All
     /// random numbers are the same, so plants and labels are those of the full field except for their outlines.
-    #[doc(hidden)]
     #[must_use]
     pub fn preview(mut self, preview: &Preview) -> Self {
         self.options.preview = Some(preview.clone());
@@ -124,7 +120,6 @@ impl SceneFile {
     }
 
     /// Builds fields for labels only: the ground's textures are not baked. Shapes and records are bit-identical.
-    #[doc(hidden)]
     #[must_use]
     pub fn unlit(mut self, unlit: bool) -> Self {
         self.options.unlit = unlit;
@@ -132,7 +127,6 @@ impl SceneFile {
     }
 
     /// Builds fields for their records only: hash, files, warnings and plants do not change, but much of the ground is left out.
-    #[doc(hidden)]
     #[must_use]
     pub fn told_only(mut self) -> Self {
         self.options.told_only = true;
@@ -155,7 +149,6 @@ impl SceneFile {
     }
 
     /// Estimates memory and time of field `index` without building it.
-    #[doc(hidden)]
     pub fn estimate(&self, index: u64) -> Result<Estimate> {
         // Plants are largest on the last day.
         let day = self.options.day.or(self.seen_days().last().copied());
@@ -172,13 +165,11 @@ impl SceneFile {
 
     /// Returns the warnings of field `index` that can be found without building it. [`Field::warnings`](furrow_field::Field) of the built
     /// field repeats them.
-    #[doc(hidden)]
     pub fn foretold(&self, index: u64) -> Result<Vec<String>> {
         self.source.foretold(&Options { index, ..self.options.clone() })
     }
 
     /// Returns the cameras of field `index`, one for each image of a day in the order of the images, without building the field.
-    #[doc(hidden)]
     pub fn cameras(&self, index: u64) -> Result<Vec<CameraRecord>> {
         let day = self.options.day.or(self.seen_days().first().copied());
         self.source.cameras(&Options { index, day, ..self.options.clone() })

@@ -1,8 +1,8 @@
 //! Reports for users: numbers, tables, charts and HTML pages.
 //!
 //! A page is one self-contained file that needs no network: style, charts and images are embedded. The content of a
-//! page is defined by the module that writes it: [`compare`](furrow_compare),
-//! [`dataset::report`](furrow_dataset::report) and [`train::figure`](furrow_train::figure). All text passes through
+//! page is defined by the module that writes it: `furrow_compare`,
+//! `furrow_dataset::report` and `furrow_train::figure`. All text passes through
 //! `maud`, which escapes it.
 //!
 //! | file | idea |

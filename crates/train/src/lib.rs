@@ -41,38 +41,24 @@
 //! | `deploy` | a trained model as ONNX or TorchScript; predictions for photographs without labels |
 
 #[cfg(feature = "torch")]
-#[doc(hidden)]
 pub mod adapt;
-#[doc(hidden)]
 pub mod baseline;
-#[doc(hidden)]
 pub mod data;
-#[doc(hidden)]
 pub mod deploy;
-#[doc(hidden)]
+pub mod enlarge;
 pub mod ensemble;
-#[doc(hidden)]
 pub mod figure;
-#[doc(hidden)]
 pub mod fit;
-#[doc(hidden)]
 pub mod measure;
-#[doc(hidden)]
 pub mod memory;
-#[doc(hidden)]
 pub mod net;
-#[doc(hidden)]
 pub mod refine;
-#[doc(hidden)]
 pub mod run;
 #[cfg(feature = "torch")]
-#[doc(hidden)]
 pub mod session;
 pub mod table;
 #[cfg(feature = "torch")]
-#[doc(hidden)]
 pub mod torch;
-#[doc(hidden)]
 pub mod weights;
 pub mod zoo;
 

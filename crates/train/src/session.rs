@@ -1,7 +1,7 @@
 //! Training, calibration and evaluation: functions that read datasets and run folders and write run folders and reports.
 
 use super::data::{AugmentScale, Photos, Pick, Resize, Selection, Store, resize};
-use super::deploy::enlarge::classes_at;
+use super::enlarge::classes_at;
 use super::ensemble::Ensemble;
 use super::fit::calibrate::calibrate;
 use super::fit::checkpoint::Checkpoint;

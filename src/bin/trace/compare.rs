@@ -5,7 +5,7 @@ use crate::quality::threads;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs, gap};
-use furrow_dataset::pack::refuse_archives;
+use furrow_dataset::make::pack::refuse_archives;
 use furrow_render::render;
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -179,15 +179,15 @@ mod tests {
 
     #[test]
     fn every_picture_stands_below_its_words() {
-        let shot = |n: u8| Shot { words: format!("index {n}"), width: 100, pixels: vec![[n, 0, 0]; 100 * 40] };
+        let shot = |n: u8| Shot { words: format!("index {n}"), width: 120, pixels: vec![[n, 0, 0]; 120 * 40] };
         let sheet = compose(&[shot(1), shot(2), shot(3)], 2).unwrap();
         assert_eq!(
             (sheet.width, sheet.pixels.len() / sheet.width),
-            (GAP + 2 * (100 + GAP), GAP + 2 * (LINE + 40 + GAP))
+            (GAP + 2 * (120 + GAP), GAP + 2 * (LINE + 40 + GAP))
         );
         let at = |x: usize, y: usize| sheet.pixels[y * sheet.width + x];
         assert_eq!(at(GAP, GAP + LINE), [1, 0, 0]);
-        assert_eq!(at(2 * GAP + 100, GAP + LINE), [2, 0, 0]);
+        assert_eq!(at(2 * GAP + 120, GAP + LINE), [2, 0, 0]);
         assert_eq!(at(GAP, 2 * GAP + 2 * LINE + 40), [3, 0, 0]);
         assert!(sheet.pixels.iter().filter(|p| **p == INK).count() > 100);
     }

@@ -115,7 +115,7 @@ mod tests {
         let folder = folder().unwrap();
         assert_eq!(scene_file("field".into()), folder.join("scenes/field.ron"));
         assert_eq!(scene_file("field.ron".into()), folder.join("scenes/field.ron"));
-        // Not a bare name, not a scene file, or a folder of the repository, where unit tests run.
+        // Paths, unknown names, and names of folders (unit tests run in the repository) are returned unchanged.
         for other in ["scenes/field.ron", "./field", "no-such-field", "src", "", "."] {
             assert_eq!(scene_file(other.into()), Path::new(other));
         }

@@ -9,9 +9,9 @@
 use crate::pairs::{beside, beside_rgb, first, recipe_of, stem, told, walk};
 use crate::picture::{self, Picture};
 use furrow_base::{Error, Result};
+use furrow_dataset::make::pack::refuse_archives;
 use furrow_dataset::model::image_files::photograph_in;
 use furrow_dataset::model::recipe::FILE;
-use furrow_dataset::pack::refuse_archives;
 use furrow_dataset::read::native::Image;
 use furrow_dataset::read::set::Set;
 use std::collections::BTreeMap;

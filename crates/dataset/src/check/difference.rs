@@ -1,8 +1,8 @@
-//! How far apart two renderings of one image are.
+//! Difference of two renderings of the same image.
 //!
-//! Another version of Embree, or of the C library's sines beside it, may move a hit in its last bits. A ray that meets the very edge of a leaf
-//! then goes another way, so a few label pixels and a few paths differ; the images are still of one field. The files' bytes differ in any case,
-//! since label maps name the kernels that made them.
+//! Another version of Embree, or of the C library's sine and cosine, may change the last bits of a hit position. Rays
+//! at the edge of a leaf can then hit or miss it, so a few label pixels and a few paths differ, although the images
+//! show the same field. The files always differ, since label maps contain the name of the kernels that made them.
 
 use crate::model::sample::Sample;
 use std::fmt;
@@ -10,29 +10,29 @@ use std::fmt;
 /// The difference of two images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Share of the pixels whose class, species, plant, leaf or distance is another.
+    /// Fraction of the pixels whose class, species, plant, leaf or depth differs.
     pub labels: f64,
-    /// Mean absolute difference of the photographs' values, of 255.
+    /// Mean absolute difference of the image values, on a scale to 255.
     pub color: f64,
 }
 
 impl Difference {
-    /// None at all.
+    /// No difference.
     pub const NONE: Self = Self { labels: 0.0, color: 0.0 };
-    /// The most that is put down to other kernels. Between Embree 3.13.5 and 4.4.0 nothing was measured, to 4.3.3 on another system 0.023 in
-    /// colour and no label; `docs/results/tests-and-build.md` has the table.
+    /// Largest difference that is attributed to other kernels. Measured: none between Embree 3.13.5 and 4.4.0; 0.023 in
+    /// colour and no label to 4.3.3 on another system; `docs/results/tests-and-build.md` has the table.
     pub const ALLOWED: Self = Self { labels: 1e-3, color: 0.5 };
-    /// Distances that differ by less, relative to themselves, count as the same.
+    /// Largest relative difference of two depths that count as equal.
     const SAME_DEPTH: f32 = 1e-3;
 
-    /// Between two images; all of it where they are not of one size.
+    /// Computes the difference of two images; the maximum if their sizes differ.
     pub fn between(a: &Sample, b: &Sample) -> Self {
         if a.size() != b.size() || a.nir.len() != b.nir.len() || a.depth.len() != b.depth.len() {
             return Self { labels: 1.0, color: 255.0 };
         }
         let label = |s: &Sample, i: usize| (s.semantics[i], s.species.get(i).copied(), s.plants[i], s.leaves[i]);
         let near = |i: usize| match (a.depth.get(i), b.depth.get(i)) {
-            // Where nothing is hit, both are infinite.
+            // Depths of pixels without a hit are infinite and compare equal.
             (Some(a), Some(b)) => a == b || (a - b).abs() <= Self::SAME_DEPTH * a.abs(),
             _ => true,
         };
@@ -44,13 +44,13 @@ impl Difference {
         Self { labels: other as f64 / pixels.max(1) as f64, color: apart as f64 / a.len().max(1) as f64 }
     }
 
-    /// The larger of each.
+    /// Returns the larger value of each measure.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self { labels: self.labels.max(other.labels), color: self.color.max(other.color) }
     }
 
-    /// Whether neither number is above the other's.
+    /// Returns `true` if neither measure exceeds that of `most`.
     pub fn within(self, most: Self) -> bool {
         self.labels <= most.labels && self.color <= most.color
     }
@@ -104,15 +104,16 @@ mod tests {
         }
     }
 
-    /// Rationale: the bounds decide whether a dataset is what it says. Expected: a pixel counts once, whatever of its label is another;
-    /// colour is the mean over all values; an image of another size is another image. Source: counted by hand.
+    /// Rationale: the limits decide whether a dataset passes verification. Expected: a pixel counts once, however many
+    /// of its labels differ; colour is the mean over all values; images of different sizes differ by the maximum.
+    /// Source: counted by hand.
     #[test]
     fn labels_are_counted_by_pixel_and_colours_by_value() {
         let a = sample(50, 40);
         assert_eq!(Difference::between(&a, &sample(50, 40)), Difference::NONE);
         let mut b = sample(50, 40);
         (b.plants[3], b.leaves[3], b.semantics[4], b.species[5], b.leaves[6]) = (8, 1, 2, 2, 0);
-        // A finger's breadth, and a hair's.
+        // Depth differences of 1 cm, which counts, and 0.1 mm, which does not.
         (b.depth[7], b.depth[8]) = (1.01, 1.0001);
         b.rgb[0] = [120, 100, 90];
         b.nir[9] = 150;

@@ -1,7 +1,8 @@
-//! What a dataset's manifest lists, and what of it is not so.
+//! Comparison of a dataset's manifest with its files.
 //!
-//! The manifest is written when all images are there. Where some are missing, it is of before: what belongs to no image is still what it lists,
-//! and so are images that are there, as long as the recipe is the same. What only all images together can tell is left out.
+//! The manifest is written when all images are complete. If images are missing, it is from an earlier state: its
+//! entries for files of no image are still valid, and so are those of existing images if the recipe is unchanged.
+//! Checks that need all images are skipped.
 
 use crate::make::finish::of_image;
 use crate::model::recipe::{FILE, MANIFEST, Recipe};
@@ -13,16 +14,16 @@ use furrow_base::{Error, Result};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What was found of it.
+/// Result of checking the manifest.
 #[derive(Default)]
 pub(crate) struct Listed {
-    /// What is wrong, one sentence each.
+    /// Faults, one sentence each.
     pub(crate) faults: Vec<String>,
-    /// What could not be looked at for want of images.
+    /// Description of the checks that were skipped because images are missing.
     pub(crate) unchecked: Option<String>,
 }
 
-/// A manifest, as far as it is checked.
+/// The fields of a manifest that are checked.
 #[derive(Deserialize)]
 struct Manifest {
     #[serde(default)]
@@ -30,7 +31,7 @@ struct Manifest {
     files: BTreeMap<String, Checksum>,
 }
 
-/// Looks at everything that the manifest lists; `missing` are the images that are not there, or not whole.
+/// Checks all files that the manifest lists. `missing` contains the indices of missing or incomplete images.
 pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
     let whole = missing.is_empty();
     let only = |fault: String| Ok(Listed { faults: vec![fault], unchecked: None });
@@ -40,7 +41,7 @@ pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
             return only(format!("{MANIFEST} is missing: `trace dataset finish {}` writes it", set.folder.display()));
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            let of_all = format!("scene, lists and tables, for {MANIFEST} is written when all images are there");
+            let of_all = format!("scene, lists and tables, because {MANIFEST} is written when all images are complete");
             return Ok(Listed { faults: Vec::new(), unchecked: Some(of_all) });
         }
         other => other.map_err(Error::io(&path))?,
@@ -68,44 +69,45 @@ pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
     let mut faults = Vec::new();
     for (path, sum) in &manifest.files {
         match sealed.remove(path) {
-            // Looked at with its image.
+            // The file itself is checked with its image.
             Some(checksums) if before || checksums == *sum => {}
-            Some(_) => faults.push(format!("{path} is another file than {MANIFEST} lists")),
+            Some(_) => faults.push(format!("{path} differs from the file that {MANIFEST} lists")),
             None if before && path == FILE => {}
             None => match below(&set.folder, path) {
                 Ok(full) => {
                     let fault = sum.fault(&full).filter(|_| whole || !absent.have(path));
                     faults.extend(fault.map(|fault| format!("{path} {fault}")));
                 }
-                Err(_) => faults.push(format!("{path} does not lie in the dataset's folder")),
+                Err(_) => faults.push(format!("{path} is outside the dataset's folder")),
             },
         }
     }
     if !before && !sealed.is_empty() {
-        faults.push(format!("{MANIFEST} lacks {} files: `trace dataset finish` writes it anew", sealed.len()));
+        faults.push(format!("{MANIFEST} lacks {} files: `trace dataset finish` rewrites it", sealed.len()));
     }
-    let unlike = format!("{FILE} and images by {MANIFEST}, which tells of another recipe until all images are there");
+    let unlike = format!("{FILE} and images by {MANIFEST}, which is of another recipe until all images are complete");
     Ok(Listed { faults, unchecked: before.then_some(unlike) })
 }
 
-/// Images of which not even checksums are there, so that only names tell which files are theirs.
+/// Images without a checksum record; their files can only be recognised by name.
 #[derive(Default)]
 struct Absent {
     names: BTreeSet<String>,
-    /// What the files of other images are called.
+    /// Path patterns of other images' files, as [`shape`] returns them.
     shapes: BTreeSet<String>,
 }
 
 impl Absent {
-    /// Whether a file is one of theirs: it bears the number of one where files of other images bear theirs.
+    /// Returns `true` if a file belongs to one of these images: its path has the image's number in the same place as
+    /// the files of other images.
     fn have(&self, path: &str) -> bool {
         let mut numbers = path.split(|c: char| !c.is_ascii_digit()).filter(|run| self.names.contains(*run));
-        // Where no image has checksums, nothing tells files of images from those of fields.
+        // If no image has a checksum record, files of images cannot be distinguished from those of fields.
         numbers.any(|name| self.shapes.is_empty() || self.shapes.contains(&shape(path, name)))
     }
 }
 
-/// The path of an image's file whatever its number and its split.
+/// Replaces the image's number and the split in a path, so that equal files of different images have equal patterns.
 fn shape(path: &str, name: &str) -> String {
     let is_split = |part: &str| Split::ALL.iter().any(|split| split.name() == part);
     let parts: Vec<&str> = path.split('/').map(|part| if is_split(part) { "split" } else { part }).collect();
@@ -116,7 +118,8 @@ fn shape(path: &str, name: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Expected: files of an image that is gone are told by those of another one, in whichever split; those of fields and of all images are not theirs.
+    /// Expected: files of a missing image are recognised by the paths of another image's files, in any split; files of
+    /// fields and of the whole dataset are not.
     #[test]
     fn files_of_absent_images_are_told_by_their_names() {
         let absent = Absent {

@@ -1,21 +1,21 @@
-//! Whether a dataset is whole and is what it says it is.
+//! Verification that a dataset is complete and consistent with its recipe and checksums.
 
 use crate::check::difference::Difference;
 use crate::check::listed::{Listed, listed};
 use crate::make::finish::{lacks, ranges};
+use crate::make::pack::store;
 use crate::make::push;
 use crate::make::render::{LastField, RenderedSample, render, scene_file};
+use crate::make::task::{Task, remaining};
 use crate::make::timing_log;
 use crate::model::image_files::{NAMES, belongs};
 use crate::model::invariants;
 use crate::model::split::Split;
-use crate::pack::store;
 use crate::read::native;
 use crate::read::native::Files;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::set::{Set, in_parallel};
-use crate::read::task::{Task, remaining};
 use crate::{File, format};
 use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
@@ -25,36 +25,36 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;
 
-/// What was found.
+/// Result of a verification.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
-    /// Images that are not there, or not whole.
+    /// Indices of missing or incomplete images.
     pub missing: Vec<u64>,
-    /// What is wrong, one sentence each.
+    /// Faults, one sentence each.
     pub faults: Vec<String>,
-    /// What was not checked for want of images; nothing where none is missing.
+    /// Description of the checks that were skipped because images are missing; `None` if no image is missing.
     pub unchecked: Option<String>,
-    /// Images that were checked.
+    /// Number of images that were checked.
     pub checked: u64,
-    /// Images that were rendered again and came out the same, or nearly so where that was done by other kernels.
+    /// Number of images that were rendered again and are identical, or nearly identical with other ray tracing kernels.
     pub rendered: u64,
-    /// Whether other ray tracing kernels rendered them again than made them.
+    /// The kernels and the difference, if images were rendered again with other ray tracing kernels.
     pub kernels: Option<OtherKernels>,
 }
 
-/// Ray tracing kernels that make other bytes of the same images.
+/// Comparison of images that were made with different ray tracing kernels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OtherKernels {
-    /// Those that made the dataset.
+    /// Kernels that made the dataset.
     pub there: String,
-    /// Those of this program.
+    /// Kernels of this program.
     pub here: String,
-    /// How far the images differ at most.
+    /// Largest difference of an image.
     pub most: Difference,
 }
 
 impl OtherKernels {
-    /// Nothing where the renderer has the dataset's kernels.
+    /// Returns `None` if the renderer has the dataset's kernels.
     pub fn of(set: &Set, renderer: &Renderer) -> Result<Option<Self>> {
         let (there, here) = (set.recipe.rendering()?.kernels.clone(), renderer.kernels().to_owned());
         Ok((there != here).then_some(Self { there, here, most: Difference::NONE }))
@@ -62,7 +62,8 @@ impl OtherKernels {
 }
 
 impl Findings {
-    /// Everything that was found in one error, or nothing; `shards` is how many the dataset is made in, where that is known.
+    /// Returns an error that lists all faults and missing images, if there are any. `shards` is the dataset's number of
+    /// shards, if known; the error then lists the incomplete shards.
     pub fn verdict(&self, set: &Set, shards: Option<u64>) -> Result<()> {
         const MOST: usize = 20;
         let mut words: Vec<String> = self.faults.iter().take(MOST).cloned().collect();
@@ -76,18 +77,19 @@ impl Findings {
     }
 }
 
-/// What is rendered anew.
+/// Settings for rendering images again.
 #[derive(Clone, Copy, Default)]
 pub struct Again<'a> {
-    /// How many images.
+    /// Number of images to render.
     pub images: u64,
-    /// What renders them; none of imported ones.
+    /// The renderer; `None` for imported images.
     pub renderer: Option<&'a Renderer>,
-    /// Most bytes of memory that a field may take, where not the usual.
+    /// Memory limit of a field, bytes; `None` for the default.
     pub memory: Option<u64>,
 }
 
-/// Checks every file and every invariant, and renders images anew.
+/// Checks all files and invariants of a dataset, and renders some images again for comparison. `done` is called with
+/// the index of each checked image; raising `stop` ends the verification with an error.
 pub fn verify(
     set: &Set,
     again: &Again<'_>,
@@ -102,7 +104,7 @@ pub fn verify(
         if stop.load(std::sync::atomic::Ordering::Relaxed) {
             return Err(Error::stopped("stopped before all images were checked; nothing was changed"));
         }
-        // What is wrong with its archive is told once.
+        // The fault of a truncated archive is reported once, not for each image.
         let looked = if store::lies_in(set, &cut, index) { Looked::MISSING } else { look(set, index)? };
         done(index);
         Ok(looked)
@@ -120,14 +122,14 @@ pub fn verify(
     found.faults.extend(shared_between_splits(set, &looked));
     found.faults.extend(made_differently(set)?);
     let Listed { mut faults, unchecked } = listed(set, &found.missing)?;
-    // An archive may have been told of already.
+    // Removes faults of archives that were already reported.
     let told: BTreeSet<&String> = found.faults.iter().collect();
     faults.retain(|fault| !told.contains(fault));
-    // Those of images may be so many that the last are not told.
+    // Faults of images come last, because only the first faults are printed.
     faults.append(&mut found.faults);
     found.faults = faults;
     if !found.missing.is_empty() {
-        let photographs = "whether missing photographs are in two splits".to_owned();
+        let photographs = "whether missing images are in two splits".to_owned();
         found.unchecked = Some(unchecked.into_iter().chain([photographs]).collect::<Vec<_>>().join("; "));
     }
     let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
@@ -151,11 +153,11 @@ pub fn verify(
     Ok(found)
 }
 
-/// What was seen of one image.
+/// Result of checking one image.
 struct Looked {
     missing: bool,
     faults: Vec<String>,
-    /// SHA-256 of its photograph.
+    /// SHA-256 of its colour image.
     photograph: Option<String>,
 }
 
@@ -173,7 +175,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     let mut missing = !faults.is_empty();
     if !missing && remaining(set, &checksums)? != Task::Done {
         missing = true;
-        faults.push(format!("image {name}: it was made by another recipe, or lacks a format"));
+        faults.push(format!("image {name}: it was made with another recipe, or lacks a format"));
     }
     faults.extend(strays(set, &name));
     if !missing {
@@ -190,7 +192,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     Ok(Looked { missing, faults, photograph })
 }
 
-/// Files that lie beside an image though its dataset goes without them, each with what is wrong with it: nobody reads them.
+/// Returns a fault for each file of an image that the recipe omits; such files are never read.
 fn strays(set: &Set, name: &str) -> Vec<String> {
     let others = NAMES.iter().filter(|file| !belongs(&set.recipe, file));
     let paths = others.map(|file| format!("{}/{file}", native::folder(name)));
@@ -198,7 +200,7 @@ fn strays(set: &Set, name: &str) -> Vec<String> {
     there.map(|path| format!("{path} does not belong here: the recipe leaves it out; remove it")).collect()
 }
 
-/// Archives of images that were changed, or are not written yet.
+/// Returns a fault for each archive that was changed or is not written yet.
 fn in_archives(set: &Set) -> Vec<String> {
     let Some(packing) = Packing::of(&set.recipe) else { return Vec::new() };
     let all: Vec<Id> = packing.all().collect();
@@ -213,7 +215,7 @@ fn in_archives(set: &Set) -> Vec<String> {
     all.par_iter().filter_map(fault).collect()
 }
 
-/// Photographs that are in two splits.
+/// Returns a fault if identical colour images are in two splits.
 fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
     let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
     for (index, looked) in looked.iter().enumerate() {
@@ -222,10 +224,10 @@ fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
         }
     }
     let twice = places.values().filter(|splits| splits.len() > 1).count();
-    if twice == 0 { Vec::new() } else { vec![format!("{twice} photographs are in two splits")] }
+    if twice == 0 { Vec::new() } else { vec![format!("{twice} images are in two splits")] }
 }
 
-/// Images that two runs made differently.
+/// Returns a fault if two runs made different files for the same image.
 fn made_differently(set: &Set) -> Result<Vec<String>> {
     let mut images: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
     for row in timing_log::rows(&set.folder)? {
@@ -235,10 +237,10 @@ fn made_differently(set: &Set) -> Result<Vec<String>> {
     if several.is_empty() {
         return Ok(Vec::new());
     }
-    Ok(vec![format!("two runs made different files of the images {}: are all machines alike?", ranges(&several))])
+    Ok(vec![format!("two runs made different files for images {}: do the machines differ?", ranges(&several))])
 }
 
-/// Which images are rendered again: spread over the dataset, the same ones every time.
+/// Returns the indices of the images to render again: a reproducible pseudo-random choice of `again` images.
 fn drawn(count: u64, again: u64) -> Vec<u64> {
     let mut all: Vec<u64> = (0..count).collect();
     all.sort_by_key(|k| mix(*k));
@@ -247,7 +249,7 @@ fn drawn(count: u64, again: u64) -> Vec<u64> {
     all
 }
 
-/// The files of an image that come out otherwise.
+/// Returns a fault if files of an image differ after rendering it again.
 fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
     let mut files = native::files(&set.recipe, &made.sample, &made.text)?;
     for (_, format) in format::all(&set.recipe)? {
@@ -255,17 +257,17 @@ fn other_bytes(set: &Set, made: &RenderedSample) -> Result<Option<String>> {
     }
     let differs = |file: &&File| set.contents(&file.path).ok().as_ref() != Some(&file.bytes);
     let wrong: Vec<&str> = files.iter().filter(differs).map(|f| f.path.as_str()).collect();
-    Ok((!wrong.is_empty()).then(|| format!("rendered again, these come out otherwise: {}", wrong.join(", "))))
+    Ok((!wrong.is_empty()).then(|| format!("rendered again, these files differ: {}", wrong.join(", "))))
 }
 
-/// That an image comes out further away than other kernels explain.
+/// Returns a fault if an image that was rendered again differs by more than [`Difference::ALLOWED`].
 fn too_far(set: &Set, made: &RenderedSample, kernels: &mut OtherKernels) -> Result<Option<String>> {
     let name = &made.sample.record.name;
     let difference = Difference::between(&set.sample(made.sample.record.index)?, &made.sample);
     kernels.most = kernels.most.max(difference);
     let fault = || {
         format!(
-            "image {name}: rendered again by {}, it differs in {difference}; other kernels explain {} at most",
+            "image {name}: rendered again by {}, it differs in {difference}; other kernels explain at most {}",
             kernels.here,
             Difference::ALLOWED
         )

@@ -1,4 +1,4 @@
-//! Running elsewhere: as a stream to a training program, on a node's own disk, on clusters.
+//! Other ways to make images: as a stream to a training program, on a node's local disk, on clusters.
 
 pub mod cluster;
 pub mod scratch;

@@ -1,26 +1,28 @@
-//! Makes the images of a shard on a node's own disk, and brings them home as they are finished: a shared folder then gets whole images and
-//! archives, and none of the temporary files that making them takes.
+//! Makes the images of a shard on a node's local disk (`--scratch`) and copies them to the dataset's folder, called
+//! home, as they are finished. The shared folder thus receives complete images and archives, and no temporary files.
 //!
-//! A run works in a copy of the dataset that holds recipe and scene alone. What is at home is not made again. What is finished, an image or a
-//! pack, is copied home, pushed from there where that is asked for, and removed here. Images of a pack that is not full when the run ends come
-//! home in folders of their own, and the next run goes on with them on whatever node. The timing log is written at home. So home holds what it
-//! would hold had the run worked there.
+//! A run works in a local copy of the dataset that contains only the recipe and the scene. Images that are complete at
+//! home are not made again. Each finished unit, an image or a pack, is copied home, pushed from there if requested, and
+//! removed locally. Images of a pack that is incomplete at the end of the run are copied home as folders, and the next
+//! run on any node continues with them. The timing log is written at home. Home therefore has the same contents as
+//! after a run without `--scratch`.
 //!
-//! Of several runs of one shard in one place, one works at a time: a second waits for its lock, then makes what the first has left.
+//! If several runs of one shard use the same local folder, one works at a time; the others wait for its lock and then
+//! make the remaining images.
 
 use crate::File;
 use crate::deliver::cluster::quoted;
 use crate::make::begin::write_changed;
 use crate::make::generate::{Callbacks, Delivery, OpenPacks, Shard, Work, generate_for};
+use crate::make::pack::store;
 use crate::make::push::{Push, Unit, free};
-use crate::pack::store;
+use crate::make::task::{Task, task};
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::{ChecksumRecord, write_files};
 use crate::read::native;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::set::Set;
-use crate::read::task::{Task, task};
 use furrow_base::error::Kind;
 use furrow_base::input::{self, below};
 use furrow_base::{Error, Result};
@@ -32,8 +34,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Makes what is missing of a shard, as [`generate`](crate::make::generate::generate()) does, in a folder of its own below `place`. That folder is
-/// removed when all of the shard is at home. While another run works there it waits, which is told as a warning.
+/// Makes the missing images of a shard like [`generate`](crate::make::generate::generate()), but works in a separate
+/// folder below `place`. The folder is removed when the whole shard is at home. If another run works there, waits for
+/// its end and issues a warning.
 pub fn generate(home: &Set, place: &Path, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     let folder = own_folder(home, place, work.shard)?;
     let done = lock(&folder, work.shard, callbacks).and_then(|_lock| generate_there(home, &folder, work, callbacks));
@@ -43,15 +46,15 @@ pub fn generate(home: &Set, place: &Path, work: &Work<'_>, callbacks: &Callbacks
     })
 }
 
-/// What goes on with a run that was stopped.
+/// Returns the help text of a stopped run: the command that continues it.
 fn go_on(home: &Set, place: &Path, shard: Shard) -> String {
     let [home, place] = [home.folder.as_path(), place].map(|path: &Path| quoted(&path.to_string_lossy()));
     let Shard { number, of } = shard;
     let command = format!("trace dataset render {home} --shard {number}/{of} --scratch {place}");
-    format!("`{command}` goes on with it; give it what else this run was given")
+    format!("`{command}` continues the shard; add the other options of this run")
 }
 
-/// Waits until no other run of the shard works in the folder, and keeps others out.
+/// Waits until no other run of the shard works in the folder, and locks the folder.
 fn lock(folder: &Path, shard: Shard, callbacks: &Callbacks<'_>) -> Result<Lock> {
     let Shard { number, of } = shard;
     let waits = || {
@@ -65,7 +68,7 @@ fn lock(folder: &Path, shard: Shard, callbacks: &Callbacks<'_>) -> Result<Lock> 
         .ok_or_else(|| Error::stopped(format!("stopped while another run of shard {number}/{of} was at work")))
 }
 
-/// Makes what is missing of a shard in this folder.
+/// Makes the missing images of a shard in the local folder.
 fn generate_there(home: &Set, folder: &Path, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     work.push.map_or(Ok(()), |push| push.clear(home))?;
     let here = copy(home, folder)?;
@@ -79,14 +82,15 @@ fn generate_there(home: &Set, folder: &Path, work: &Work<'_>, callbacks: &Callba
     let rest = run.bring_rest();
     made?;
     rest?;
-    // One that was asked to stop may not have looked at all that is finished here.
+    // A stopped run may leave finished units that it has not copied yet.
     if !callbacks.soon.load(Ordering::Relaxed) {
         remove(std::fs::remove_dir_all(&run.here.folder), &run.here.folder)?;
     }
     Ok(())
 }
 
-/// A folder in `place` that belongs to this dataset and shard alone.
+/// Returns the folder below `place` for this dataset and shard; its name contains a hash of the dataset's path and
+/// recipe.
 fn own_folder(home: &Set, place: &Path, shard: Shard) -> Result<PathBuf> {
     home.recipe.rendering()?;
     let full = std::path::absolute(&home.folder).map_err(Error::io(&home.folder))?;
@@ -95,7 +99,7 @@ fn own_folder(home: &Set, place: &Path, shard: Shard) -> Result<PathBuf> {
     Ok(place.join(format!("{}-{}-of-{}", &own[..16], shard.number, shard.of)))
 }
 
-/// The dataset's recipe and scene in this folder.
+/// Copies the dataset's recipe and scene to `folder` and opens the copy.
 fn copy(home: &Set, folder: &Path) -> Result<Set> {
     let paths = Unit::Recipe.contents(home)?.map(|(paths, _)| paths).unwrap_or_default();
     let read = |path: String| -> Result<File> {
@@ -106,7 +110,7 @@ fn copy(home: &Set, folder: &Path) -> Result<Set> {
     Set::open(folder)
 }
 
-/// A run that works here for a dataset at home.
+/// A run that works in the local dataset `here` for the dataset `home`.
 struct Run<'a> {
     home: &'a Set,
     here: Set,
@@ -116,7 +120,8 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// The images of the shard that lack nothing at home. Those that lack a format or their pack alone are fetched.
+    /// Returns the images of the shard that are complete at home. Copies images that only lack formats or their pack to
+    /// the local folder.
     fn at_home(&self) -> Result<BTreeSet<u64>> {
         let recipe = &self.home.recipe;
         let open = OpenPacks::of(self.home, self.shard)?;
@@ -136,12 +141,12 @@ impl Run<'_> {
         held.into_par_iter().filter_map(|index| look(index).transpose()).collect()
     }
 
-    /// The images of the shard.
+    /// Returns the indices of the shard's images.
     fn held(&self) -> impl Iterator<Item = u64> + '_ {
         (0..self.home.recipe.count).filter(move |index| self.shard.holds(self.home.recipe.unit_of(*index)))
     }
 
-    /// Takes an image from home, as far as it is whole there, unless it is here.
+    /// Copies the undamaged files of an image from home, unless the image is already in the local folder.
     fn fetch(&self, index: u64) -> Result<()> {
         let Some(image) = ChecksumRecord::read(&self.home.folder, index) else { return Ok(()) };
         if task(&self.here, index)? != Task::All {
@@ -152,7 +157,7 @@ impl Run<'_> {
         image.write(&self.here.folder)
     }
 
-    /// Pushes what is at home and was not pushed.
+    /// Pushes the units that are complete at home and were not pushed.
     fn push_again(&self, there: &BTreeSet<u64>, soon: &AtomicBool) -> Result<()> {
         let unit = |index: &u64| Unit::of(self.home, *index);
         let units: BTreeMap<String, Unit> = there.iter().map(unit).map(|unit| (unit.name(), unit)).collect();
@@ -164,10 +169,10 @@ impl Run<'_> {
         self.push.map_or(Ok(()), |push| push.unit(self.home, unit, self.stop))
     }
 
-    /// Brings home what is finished here, and pushes it.
+    /// Copies a finished unit home, and pushes it.
     fn deliver(&self, unit: Unit) -> Result<()> {
         match self.bring(unit) {
-            // Another run of the same shard has brought it meanwhile.
+            // Another run of the same shard has copied the unit in the meantime.
             Err(e) if e.is_not_found() && unit.contents(self.home).is_ok_and(|found| found.is_some()) => {}
             other => other?,
         }
@@ -181,7 +186,7 @@ impl Run<'_> {
             Unit::Pack(id) => self.bring_pack(id)?,
             Unit::Recipe | Unit::Whole => return Ok(()),
         }
-        // First what says that it is whole.
+        // The checksum record is removed first, so that a kill cannot leave a record without its files.
         for seal in files.iter().filter(|file| file.starts_with("seals/")) {
             let path = below(&self.here.folder, seal)?;
             remove(std::fs::remove_file(&path), &path)?;
@@ -214,7 +219,7 @@ impl Run<'_> {
         store::clear(&self.home.folder, &record)
     }
 
-    /// Brings home the images of packs that are not full: another node may go on with them.
+    /// Copies the images of incomplete packs home, so that another node can continue with them.
     fn bring_rest(&self) -> Result<()> {
         let Some(packing) = Packing::of(&self.home.recipe) else { return Ok(()) };
         for index in self.held() {
@@ -228,7 +233,8 @@ impl Run<'_> {
     }
 }
 
-/// Copies those files of an image that lie in folders and are asked for. What was changed since it was made is an error.
+/// Copies the files of an image that are stored in folders and for which `which` returns `true`. Returns an error if a
+/// file differs from its checksum.
 fn carry(from: &Set, to: &Set, image: &ChecksumRecord, which: impl Fn(&str) -> bool) -> Result<()> {
     let read = |(path, sum): (&String, &Checksum)| -> Result<File> {
         let file = below(&from.folder, path)?;
@@ -236,13 +242,13 @@ fn carry(from: &Set, to: &Set, image: &ChecksumRecord, which: impl Fn(&str) -> b
         if sum.is_of(&bytes) {
             return Ok(File { path: path.clone(), bytes });
         }
-        Err(Error::damaged("it was changed since it was made").in_file(file))
+        Err(Error::damaged("it was changed after it was made").in_file(file))
     };
     let files = image.files.iter().filter(|(path, _)| which(path)).map(read).collect::<Result<Vec<File>>>()?;
     write_files(&to.folder, &files)
 }
 
-/// What became of a removal; what is gone already is well.
+/// Returns the result of a removal; a file that did not exist is no error.
 fn remove(done: std::io::Result<()>, path: &Path) -> Result<()> {
     match done {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path)(e)),

@@ -1,8 +1,8 @@
-//! The images of a dataset that is never written: as a tar archive, one after another, for a program that reads them as they are made.
+//! Streams images to another program as a tar archive while they are rendered, without writing a dataset.
 //!
-//! Files are named as in a dataset's [packs](crate::read::packs).
-//! Images are made by several workers and leave in the order of their indices. Those that are finished before their turn wait, and no
-//! worker begins another while so many are under way or waiting: the reader decides how fast.
+//! Files are named as in a dataset's [packs](crate::read::packs). Several workers make images, which are written in the
+//! order of their indices. Images that are finished early wait in a bounded queue, and workers pause while it is full,
+//! so the reader determines the speed.
 
 use crate::File;
 use crate::make::generate::{Shard, Work, fitting, share, together};
@@ -27,33 +27,34 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// How a stream is watched and stopped.
+/// Callbacks for warnings and progress of a stream, and a flag that stops it.
 pub struct Listener<'a> {
-    /// Told what the user should know, while images are made.
+    /// Called with each warning while images are made.
     pub warn: &'a (dyn Fn(&str) + Sync),
-    /// Told of every image that was written.
+    /// Called with the index of each written image.
     pub done: &'a dyn Fn(u64),
-    /// Set it to stop at once.
+    /// Set to `true` to stop at once.
     pub stop: &'a AtomicBool,
 }
 
-/// Images that are ready to be made. Its scene is copied as a dataset's is, so that nobody changes it meanwhile.
+/// A prepared stream. Its scene is copied to a temporary folder like that of a dataset, so that later changes of the
+/// scene file have no effect.
 pub struct ImageStream {
-    /// Removed with it.
+    /// Temporary folder of the copied scene, removed with the stream.
     _keep: TempDir,
     set: Set,
-    /// The scene file that was copied.
+    /// The original scene file.
     scene: PathBuf,
     indices: Range<u64>,
-    /// What the user should know before the first image.
+    /// Warnings for the user before the first image.
     pub warnings: Vec<String>,
 }
 
 impl ImageStream {
-    /// Images from `first` on: so many as `order` counts. Formats other than the native one are not written.
+    /// Prepares a stream of `order.count` images, starting with image `first`. Only the native format is written.
     pub fn begin(order: &Order, first: u64) -> Result<Self> {
         let end = first.checked_add(order.count).filter(|end| *end <= MOST_IMAGES).ok_or_else(|| {
-            Error::misuse(format!("{} images from number {first} on lead past the last one", order.count))
+            Error::misuse(format!("{} images from number {first} on lead past the last image", order.count))
                 .help(format!("the last image of a dataset is number {}", MOST_IMAGES - 1))
         })?;
         let keep = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
@@ -62,9 +63,11 @@ impl ImageStream {
         Ok(Self { _keep: keep, set, scene: order.scene, indices: first..end, warnings })
     }
 
-    /// Makes the images of a shard and writes them to `out`; returns how many were written. That nobody reads them any longer is no
-    /// failure. Fields that cannot be made are left out: told when it happens, and as the error at the end. After
-    /// [`MOST_LEFT_OUT`] in a row it ends. Stopped, it returns [`Kind::Interrupted`].
+    /// Makes the images of a shard and writes them to `out`. Returns the number of written images, also if the reader
+    /// closes the pipe early.
+    ///
+    /// Fields that cannot be built are skipped, with a warning at once and an error at the end; [`MOST_LEFT_OUT`] of
+    /// them in a row end the stream. A stopped stream returns [`Kind::Interrupted`].
     pub fn write(&self, work: &Work<'_>, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
         let set = &self.set;
         let Some(renderer) = renderer(set)? else { return Ok(0) };
@@ -74,7 +77,7 @@ impl ImageStream {
         let queue = Arc::new(Queue::new(self.wanted(work.shard), 2 * workers.len()));
         let (tell, told) = channel();
         let to_write = Arc::clone(&queue);
-        // Not one of the scope's: the reader of a pipe may keep it waiting for ever, and a stop does not wait for it.
+        // Not a scoped thread: the reader of a pipe may block it forever, and a stop must not wait for it.
         let write = move || {
             let ended = archive(&to_write, out, &tell);
             to_write.end();
@@ -95,7 +98,7 @@ impl ImageStream {
                 }
             }
             let ends = listen(&told, listener, &queue, &stop);
-            // Whoever still works works for nobody.
+            // Stops the workers, whose images are no longer needed.
             stop.store(true, Ordering::Relaxed);
             ends
         });
@@ -108,7 +111,7 @@ impl ImageStream {
             None => {
                 let next = written.last.map_or(self.indices.start, |last| last + 1);
                 Err(Error::stopped(format!("stopped: {} images were written", written.images))
-                    .help(format!("--first {next} goes on with the stream")))
+                    .help(format!("--first {next} continues the stream")))
             }
             Some(Err(e)) if e.kind() == ErrorKind::BrokenPipe => Ok(written.images),
             Some(Err(e)) => Err(Error::io(Path::new("stdout"))(e)),
@@ -117,7 +120,7 @@ impl ImageStream {
         }
     }
 
-    /// The threads, shared out among the images under way at once.
+    /// Divides the threads among the images that are in progress at the same time.
     fn workers(&self, work: &Work<'_>, scene: &SceneFile) -> Result<Vec<Threads>> {
         let threads = Threads::new(work.threads)?.count();
         let (first, _) = self.set.recipe.field_of(self.indices.start);
@@ -129,7 +132,7 @@ impl ImageStream {
         (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect()
     }
 
-    /// Makes images, one after another, until nobody wants another.
+    /// Makes images one after another until the queue has no more.
     fn serve(
         &self,
         queue: &Queue,
@@ -139,7 +142,8 @@ impl ImageStream {
         failures: &Mutex<BTreeMap<u64, Error>>,
     ) {
         let _guard = EndOnPanic(queue);
-        // Each grows a field of several images for itself: waiting for another worker to do so would take as long.
+        // Each worker builds the field of its images itself; waiting for another worker to build it would take the same
+        // time.
         let mut kept = LastField::default();
         while let Some(index) = queue.begin() {
             match threads.install(|| source.image(index, threads, &mut kept)) {
@@ -158,13 +162,13 @@ impl ImageStream {
         }
     }
 
-    /// The indices of a shard.
+    /// Returns the indices of the images of a shard.
     fn wanted(&self, shard: Shard) -> impl Iterator<Item = u64> + Send + use<> {
         let captures = self.set.recipe.captures_a_day();
         self.indices.clone().filter(move |k| shard.holds(k / captures))
     }
 
-    /// An error about the copied scene file, said of the one that was named.
+    /// Replaces the copied scene file by the original in an error's location.
     fn as_asked(&self, error: Error) -> Error {
         let copy = self.set.recipe.rendering().map(|rendering| self.set.folder.join(&rendering.scene));
         match (error.place(), copy) {
@@ -177,7 +181,7 @@ impl ImageStream {
     }
 }
 
-/// What images are made from.
+/// Scene and renderer of the images.
 struct Source<'a> {
     set: &'a Set,
     scene: SceneFile,
@@ -186,7 +190,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The files of an image, as the dataset would hold them.
+    /// Makes an image and returns its files as in a dataset.
     fn image(&self, index: u64, threads: &Threads, kept: &mut LastField) -> Result<Vec<File>> {
         let watch = Watch { done: &|_| (), stop: self.stop };
         let made = render(self.set, &self.scene.clone().threads(threads), index, &self.renderer, watch, kept)?;
@@ -195,31 +199,32 @@ impl Source<'_> {
     }
 }
 
-/// Fields in a row that may be left out; a scene file of which so many fail will hardly give another.
+/// Number of consecutive skipped images after which the stream ends, since the scene file probably never gives a valid
+/// field.
 pub const MOST_LEFT_OUT: usize = 20;
 
-/// How far an image is.
+/// State of an image in the queue.
 enum State {
     UnderWay,
     Made(Vec<File>),
     LeftOut,
 }
 
-/// Images on their way from the workers to the archive, by their indices.
+/// Queue of images from the workers to the archive, ordered by index.
 struct Queue {
     inside: Mutex<Inside>,
     changed: Condvar,
-    /// Most images that are under way or wait.
+    /// Largest number of images that are in progress or waiting.
     most: usize,
 }
 
 struct Inside {
-    /// Those that nobody has begun.
+    /// Indices of images that no worker has started.
     wanted: Box<dyn Iterator<Item = u64> + Send>,
     images: BTreeMap<u64, State>,
-    /// Whether all have been begun, or nobody wants more.
+    /// Whether no further image may be started: all are started, or the stream ends.
     ended: bool,
-    /// Whether nobody wants even those that have been made.
+    /// Whether waiting images are discarded too, because the stream ends.
     left: bool,
 }
 
@@ -229,7 +234,7 @@ impl Queue {
         Self { inside: Mutex::new(inside), changed: Condvar::new(), most }
     }
 
-    /// The next image to be made, as soon as there is room for it; `None` where there is none.
+    /// Waits for room in the queue and returns the next image to make; `None` if there is none.
     fn begin(&self) -> Option<u64> {
         let full = |inside: &mut Inside| !inside.ended && inside.images.len() >= self.most;
         let mut inside = self.changed.wait_while(lock(&self.inside), full).unwrap_or_else(PoisonError::into_inner);
@@ -242,13 +247,13 @@ impl Queue {
         next
     }
 
-    /// An image that was begun has come so far.
+    /// Sets the state of an image that is made or left out.
     fn finish(&self, index: u64, state: State) {
         lock(&self.inside).images.insert(index, state);
         self.changed.notify_all();
     }
 
-    /// The next image in the order of indices, as soon as it is there; `None` after the last.
+    /// Waits for the next image by index and removes it from the queue; returns `None` after the last.
     fn take(&self) -> Option<(u64, State)> {
         let waits = |inside: &mut Inside| {
             !inside.left
@@ -263,7 +268,7 @@ impl Queue {
         next
     }
 
-    /// Nobody wants any more.
+    /// Ends the stream: no image is started or written any more.
     fn end(&self) {
         let mut inside = lock(&self.inside);
         (inside.ended, inside.left) = (true, true);
@@ -271,7 +276,7 @@ impl Queue {
     }
 }
 
-/// Ends the stream where a worker panics: its image would be waited for.
+/// Ends the stream if a worker panics; otherwise the archive would wait for its image forever.
 struct EndOnPanic<'a>(&'a Queue);
 
 impl Drop for EndOnPanic<'_> {
@@ -286,28 +291,29 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the thread that writes tells.
+/// Message of the writing thread.
 enum Said {
     /// An image was written.
     Written(u64),
-    /// Nothing more comes.
+    /// The thread has ended.
     Ended(io::Result<()>),
 }
 
-/// What was written.
+/// Number of written images and index of the last one.
 #[derive(Default)]
 struct Written {
     images: u64,
     last: Option<u64>,
 }
 
-/// Between two looks at the flag that stops.
+/// Polling interval for the stop flag.
 const EVERY: Duration = Duration::from_millis(50);
 
-/// How long a stop waits for the image that is being written.
+/// Time that a stop waits for the image that is being written.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Listens to the thread that writes until it ends, or until the stop has waited for it long enough: `None` where it was stopped.
+/// Receives messages of the writing thread until it ends, or until [`PATIENCE`] has passed since a stop. The second
+/// result is `None` after a stop.
 fn listen(
     told: &Receiver<Said>,
     listener: &Listener<'_>,
@@ -340,7 +346,7 @@ fn listen(
     }
 }
 
-/// Writes images as a tar archive until there are no more.
+/// Writes the images of the queue as a tar archive.
 fn archive(queue: &Queue, out: impl Write, tell: &Sender<Said>) -> io::Result<()> {
     let mut archive = tar::Builder::new(out);
     let mut left_out = 0;

@@ -1,7 +1,8 @@
-//! What all formats for Ultralytics share: `images/SPLIT/NAME.png`, `labels/SPLIT/NAME.txt` with a row a plant, and `data.yaml`.
+//! Code shared by all formats for Ultralytics: `images/SPLIT/NAME.png`, `labels/SPLIT/NAME.txt` with one row per plant,
+//! and `data.yaml`.
 //!
-//! `data.yaml` has no `path`: Ultralytics then takes the file's own folder, and would look for a relative one elsewhere. A split
-//! without images is not named.
+//! `data.yaml` has no `path`: Ultralytics then uses the folder of the file, whereas it would search for a relative path
+//! elsewhere. Splits without images are not listed.
 
 use super::{Whole, picture};
 use crate::File;
@@ -15,21 +16,22 @@ use crate::read::set::Set;
 use furrow_base::Result;
 use std::fmt::Write;
 
-/// A class as rows have it: its place among those that plants may have, such as 0 crop, 1 weed.
+/// Returns the number of a class in rows: its index among the classes that plants can have, such as 0 crop, 1 weed.
 pub(super) fn number(labels: &Labels<'_>, class: u8) -> usize {
     labels.of_plants().iter().take_while(|of| **of != class).count()
 }
 
-/// Places in the image, pixels, as a row has them: shares of its width and height, as finely as readers with single precision have them.
+/// Appends positions, in pixels, to a row as fractions of the image's width and height, with the digits of single
+/// precision.
 pub(super) fn shares(row: &mut String, sample: &Sample, places: impl IntoIterator<Item = (f64, f64)>) {
     let (width, height) = sample.size();
     for (x, y) in places {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(row, " {:.8} {:.8}", x / f64::from(width), y / f64::from(height));
     }
 }
 
-/// A plant's row up to its box: number of the class, then the box's middle, width and height.
+/// Returns the row of a plant up to its box: number of the class, then centre, width and height of the box.
 pub(super) fn row(sample: &Sample, number: usize, Box2([x, y, w, h]): Box2) -> String {
     let mut row = number.to_string();
     let [x, y, w, h] = [x, y, w, h].map(f64::from);
@@ -37,11 +39,11 @@ pub(super) fn row(sample: &Sample, number: usize, Box2([x, y, w, h]): Box2) -> S
     row
 }
 
-/// An image's photograph and rows.
+/// Returns the image file and the label file of an image.
 pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Vec<File>> {
     let Record { name, split, .. } = &sample.record;
     let split = split.name();
-    // Nothing to see is not the same as a file that got lost.
+    // An empty line distinguishes an image without plants from a truncated file.
     let text = if rows.is_empty() { "\n".to_owned() } else { rows.iter().flat_map(|row| [row, "\n"]).collect() };
     Ok(vec![
         picture::photograph(sample, &format!("{folder}/images/{split}/{name}"))?,
@@ -49,7 +51,7 @@ pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Ve
     ])
 }
 
-/// What the user should know before the images are made.
+/// Returns a warning if Ultralytics cannot open the dataset because a split has no image.
 pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
     let lacks = |split: &Split| !(0..recipe.count).any(|k| recipe.split_of(k) == *split);
     let lacking: Vec<&str> = [Split::Train, Split::Val].into_iter().filter(lacks).map(Split::name).collect();
@@ -57,10 +59,10 @@ pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
         return Vec::new();
     }
     let lacking = lacking.join(" and no image in ");
-    vec![format!("no image in {lacking}: Ultralytics opens no such dataset; give another --split or make more images")]
+    vec![format!("no image in {lacking}: Ultralytics cannot open it; give another --split or make more images")]
 }
 
-/// `data.yaml`, with `more` behind the splits.
+/// Writes `data.yaml`, with `more` after the splits.
 pub(super) fn data(folder: &str, set: &Set, out: &mut Whole<'_>, more: &str) -> Result<()> {
     out.file(&format!("{folder}/data.yaml"), |w| {
         for split in Split::ALL {
@@ -75,7 +77,7 @@ pub(super) fn data(folder: &str, set: &Set, out: &mut Whole<'_>, more: &str) -> 
         let labels = Labels::of(&set.recipe)?;
         for class in labels.of_plants() {
             w.put(format!("  {}: ", number(&labels, class)))?;
-            // JSON texts are YAML texts.
+            // JSON strings are valid YAML.
             w.json(&labels.classes()[usize::from(class)].name)?;
             w.put("\n")?;
         }

@@ -1,16 +1,19 @@
-//! The layout of Cityscapes: `leftImg8bit/SPLIT/CITY/CITY_SSSSSS_FFFFFF_leftImg8bit.png` and
-//! `gtFine/SPLIT/CITY/…_gtFine_{labelIds,labelTrainIds,instanceIds,color}.png`; torchvision, mmsegmentation and datumaro read it.
+//! Layout of Cityscapes: `leftImg8bit/SPLIT/CITY/CITY_SSSSSS_FFFFFF_leftImg8bit.png` and
+//! `gtFine/SPLIT/CITY/…_gtFine_{labelIds,labelTrainIds,instanceIds,color}.png`; torchvision, mmsegmentation and
+//! datumaro read it.
 //!
-//! The city is the scene file's name, the sequence and frame are the image's number. `labelIds` and `labelTrainIds` are the same:
-//! 0 soil, 1 crop, 2 weed, or the classes that the dataset was given; 255 no label. `instanceIds`, 16 bit, are class · 1000 + k for the k-th plant of its class in the image,
-//! k from 0, and the class alone where there is no plant. `label_colors.txt` tells datumaro the classes, which it would else take for
-//! streets'; it reads classes from `labelTrainIds`, since it knows no instances.
+//! The city is the scene file's name; sequence and frame are the image's number. `labelIds` and `labelTrainIds` are
+//! equal: 0 soil, 1 crop, 2 weed, or the dataset's own classes; 255 no label. `instanceIds`, 16 bit, are class · 1000 +
+//! k for the k-th plant of its class in the image, k from 0, and the class alone where there is no plant.
 //!
-//! Three digits number 1000 plants of a class. Where an image shows more, the smallest of them have the class alone, which is
-//! how Cityscapes marks groups that nobody told apart; `groups.json` lists them.
+//! `label_colors.txt` lists the classes for datumaro, which otherwise assumes those of street scenes. It reads classes
+//! from `labelTrainIds`, since it does not support instances.
 //!
-//! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (whose evaluation knows streets only: this is the
-//! layout, not the benchmark).
+//! Three digits can number 1000 plants of a class. If an image shows more, the smallest of them have the class alone,
+//! which is how Cityscapes marks groups of objects that are not separated; `groups.json` lists them.
+//!
+//! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (its evaluation supports street
+//! scenes only: this is the layout, not the benchmark).
 
 use super::{Format, Whole, picture};
 use furrow_base::Result;
@@ -28,7 +31,7 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "cityscapes";
 
-/// Plants of a class that three digits number.
+/// Maximum number of plants of a class that three digits can number.
 const MOST: usize = 1000;
 
 impl Format for Writer {
@@ -39,7 +42,7 @@ impl Format for Writer {
         let at = |kind: &str, suffix: &str| path(recipe, record, kind, suffix);
         let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&classes));
         let numbers = numbers(&of_set, record);
-        // A pixel may be of another class than its plant, where organs have classes.
+        // A pixel can have another class than its plant if there are classes of organs.
         let instance = |(class, plant): (&u8, &u32)| match numbers.get(plant) {
             Some((of, k)) if of == class => u16::from(*class) * MOST as u16 + k,
             _ => u16::from(*class),
@@ -77,14 +80,15 @@ impl Format for Writer {
     }
 }
 
-/// A file of an image; `kind` is the folder, `suffix` ends the name.
+/// Returns the path of a file of an image; `kind` is the folder, `suffix` the end of the name.
 fn path(recipe: &Recipe, record: &Record, kind: &str, suffix: &str) -> String {
     let (city, split) = (city(recipe), record.split.name());
     let (sequence, frame) = (record.index / 1_000_000, record.index % 1_000_000);
     format!("{FOLDER}/{kind}/{split}/{city}/{city}_{sequence:06}_{frame:06}_{suffix}.png")
 }
 
-/// The scene file's name, or the format that images were imported from, in letters and digits: a `_` would end it.
+/// Returns the scene file's name, or the format that images were imported from, reduced to letters and digits, since
+/// `_` would end it.
 fn city(recipe: &Recipe) -> String {
     let name = match &recipe.made {
         Made::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),
@@ -94,7 +98,7 @@ fn city(recipe: &Recipe) -> String {
     if letters.is_empty() { "field".into() } else { letters.to_ascii_lowercase() }
 }
 
-/// The plants of a class that an image shows, the largest first where they are too many to be numbered, else by number.
+/// Returns the visible plants of a class, the largest first if they exceed [`MOST`], otherwise by number.
 fn ordered<'r>(labels: &Labels<'_>, record: &'r Record, class: u8) -> Vec<&'r Plant> {
     let mut plants: Vec<&Plant> = labels.plants(record).filter(|(_, of)| *of == class).map(|(plant, _)| plant).collect();
     if plants.len() > MOST {
@@ -103,7 +107,7 @@ fn ordered<'r>(labels: &Labels<'_>, record: &'r Record, class: u8) -> Vec<&'r Pl
     plants
 }
 
-/// The class of each plant and its place among those of its class; plants beyond [`MOST`] have none.
+/// Returns the class of each plant and its index among the plants of that class, without plants beyond [`MOST`].
 fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u32, (u8, u16)> {
     let mut all = BTreeMap::new();
     for class in labels.of_plants() {
@@ -114,7 +118,7 @@ fn numbers(labels: &Labels<'_>, record: &Record) -> BTreeMap<u32, (u8, u16)> {
     all
 }
 
-/// The plants of each class that have no number.
+/// Returns the plants of each class that have no number.
 fn groups(labels: &Labels<'_>, record: &Record) -> Vec<serde_json::Value> {
     let of_class = |class: u8| {
         let rest: Vec<u32> = ordered(labels, record, class).iter().skip(MOST).map(|p| p.number).collect();
@@ -131,7 +135,7 @@ mod tests {
     use crate::model::record::Seen;
     use crate::model::split::Split;
 
-    /// An image with this many weeds, each a pixel larger than the one before.
+    /// Returns an image with `count` weeds, each a pixel larger than the one before.
     fn weeds(count: u32) -> Record {
         let weed = |number: u32| Plant {
             number,

@@ -1,20 +1,25 @@
-//! COCO instances and keypoints: `annotations/instances_SPLIT.json` of plants, `annotations/leaves_SPLIT.json` of leaves, and
-//! `images/SPLIT/NAME.png` (`.jpg` of a dataset with such photographs); `pycocotools.coco.COCO` reads them.
+//! COCO instances and keypoints: `annotations/instances_SPLIT.json` for plants, `annotations/leaves_SPLIT.json` for
+//! leaves, and `images/SPLIT/NAME.png` (`.jpg` if the dataset stores JPEG); `pycocotools.coco.COCO` reads them.
 //!
-//! Categories are 1 crop and 2 weed, or the classes that the dataset was given, and in the file of leaves the next, leaf. Every plant and every leaf that an image shows is an annotation:
-//! `segmentation` is a compressed run-length mask with `iscrowd` 0, for leaves have holes and parts that polygons cannot hold; `area` is its
-//! number of pixels; ids begin at 1, for `COCOeval` takes a match with id 0 for none. Leaves have a file of their own, for `COCOeval` looks at
-//! the hundred best answers of an image unless it is told otherwise, and an image may show hundreds of leaves.
+//! Categories are 1 crop and 2 weed, or the dataset's own classes; in the file of leaves, the next number is leaf.
+//! Every visible plant and every visible leaf is an annotation. `segmentation` is a compressed run-length mask with
+//! `iscrowd` 0, because leaves have holes and separate parts that polygons cannot represent; `area` is its number of
+//! pixels. Ids start at 1, because `COCOeval` treats a match with id 0 as none.
 //!
-//! Keypoints: the stem of a plant, base and tip of a leaf. A point in sight has 2, a hidden one 1, one outside the image `0 0 0`. Points are in
-//! the coordinates of the boxes, where the first pixel's centre is (0.5, 0.5).
+//! Leaves are in a separate file, because `COCOeval` evaluates the hundred best predictions of an image by default, and
+//! an image may show hundreds of leaves.
 //!
-//! `attributes`, which `pycocotools` passes over and datumaro and CVAT read, tell the number in `plants.png` and `leaves.png`, the
-//! species, and how much is visible.
+//! Keypoints: the stem of a plant, base and tip of a leaf. A visible point has the flag 2, an occluded one 1; one
+//! outside the image is `0 0 0`. Points are in the coordinates of the boxes, where the first pixel's centre is (0.5,
+//! 0.5).
 //!
-//! Of drives, rigs and days, files have the keys of data sets of videos: a list of `videos`, one for each camera of each field; of images
-//! `video_id`, `frame_id` from 0 in the order of time, and `camera`; of annotations `video_id`, and the identity of the plant or leaf, which stays the same
-//! in all images of its field, as `instance_id` (MMTracking's CocoVID), as `track_id` (TAO) and as `track_id` among the attributes.
+//! `attributes`, which `pycocotools` ignores and datumaro and CVAT read, contain the number in `plants.png` and
+//! `leaves.png`, the species, and the visible fractions.
+//!
+//! For drives, rigs and days, files have the keys of video datasets: a list of `videos`, one for each camera of each
+//! field; for images `video_id`, `frame_id` from 0 in the order of time, and `camera`; for annotations `video_id` and
+//! the identity of the plant or leaf, which is the same in all images of its field: as `instance_id` (MMTracking's
+//! CocoVID), as `track_id` (TAO) and as `track_id` in the attributes.
 //!
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
@@ -66,7 +71,7 @@ impl Format for Writer {
     }
 }
 
-/// What COCO files of all kinds begin with: where they come from, their licence, their videos where there are some, their images.
+/// Writes the start of a COCO file of any kind: origin, licence, videos if there are any, images.
 pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split, videos: Option<&Videos>) -> Result<()> {
     let recipe = &set.recipe;
     let info = json!({ "description": "Crop fields rendered by Furrow", "version": recipe.furrow });
@@ -84,7 +89,7 @@ pub(super) fn head(w: &mut Stream<'_>, set: &Set, split: Split, videos: Option<&
     w.put("],\n")
 }
 
-/// The id of an image, from 1.
+/// Returns the id of an image, from 1.
 pub(super) fn image_id(record: &Record) -> u64 {
     record.index + 1
 }
@@ -105,17 +110,17 @@ fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
     Ok(image)
 }
 
-/// The category of a class: its place among those that plants may have, from 1.
+/// Returns the category of a class: its index among the classes that plants can have, from 1.
 pub(super) fn category(labels: &Labels<'_>, class: u8) -> u32 {
     labels.of_plants().iter().take_while(|of| **of != class).count() as u32 + 1
 }
 
-/// The category of leaves, behind those of plants.
+/// Returns the category of leaves, the number after those of plants.
 pub(super) fn leaf_category(labels: &Labels<'_>) -> u32 {
     labels.of_plants().len() as u32 + 1
 }
 
-/// Categories of plants.
+/// Returns the categories of plants.
 fn plant_categories(labels: &Labels<'_>) -> Vec<Value> {
     let about = |class: u8| {
         let (id, name) = (category(labels, class), &labels.classes()[usize::from(class)].name);
@@ -124,13 +129,14 @@ fn plant_categories(labels: &Labels<'_>) -> Vec<Value> {
     labels.of_plants().into_iter().map(about).collect()
 }
 
-/// The category of leaves: the blade runs from its first keypoint to its second.
+/// Returns the category of leaves. Its skeleton connects the first keypoint, the base of the blade, with the second,
+/// the tip.
 fn about_leaves(labels: &Labels<'_>) -> Value {
     let id = leaf_category(labels);
     json!({ "id": id, "name": "leaf", "supercategory": "organ", "keypoints": ["base", "tip"], "skeleton": [[1, 2]] })
 }
 
-/// A plant or a leaf.
+/// Annotation of a plant or a leaf.
 #[derive(Serialize)]
 struct Annotation {
     id: u64,
@@ -152,7 +158,7 @@ struct Annotation {
 }
 
 impl Annotation {
-    /// The same of a plant or a leaf that has this identity in all images of its field.
+    /// Adds the video, and the identity of the plant or leaf, which is the same in all images of its field.
     fn in_video(self, video: u64, identity: Option<u32>) -> Self {
         let mut attributes = self.attributes;
         attributes["track_id"] = identity.into();
@@ -160,10 +166,10 @@ impl Annotation {
     }
 }
 
-/// What of an image a file tells, each with its identity.
+/// Function that returns the annotations of an image for one file, each with its identity.
 type OfImage = fn(&Set, &Labels<'_>, &Record) -> Vec<(Annotation, Option<u32>)>;
 
-/// All annotations of a split, image by image.
+/// Returns all annotations of a split, image by image.
 fn annotations<'a>(
     set: &'a Set,
     labels: &'a Labels<'a>,
@@ -191,7 +197,7 @@ fn annotations<'a>(
     set.records(split).flat_map(of_image).enumerate().map(numbered)
 }
 
-/// The plants.
+/// Returns the annotations of plants.
 fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
     let of_plant = |(plant, class): (&Plant, u8)| {
         (annotation(record, category(labels, class), &plant.seen, &[plant.stem], about(set, plant)), plant.id)
@@ -199,7 +205,7 @@ fn plants(set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, O
     labels.plants(record).map(of_plant).collect()
 }
 
-/// The leaves.
+/// Returns the annotations of leaves.
 fn leaves(_set: &Set, labels: &Labels<'_>, record: &Record) -> Vec<(Annotation, Option<u32>)> {
     let mut all = Vec::new();
     for plant in record.seen() {
@@ -245,7 +251,7 @@ fn annotation(
     }
 }
 
-/// x, y, and 2 in sight, 1 behind something; `None` outside the image.
+/// Returns x, y, and 2 if the point is visible or 1 if it is occluded; `None` outside the image.
 fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
     let Keypoint { x, y, state } = point?;
     let v = match state {
@@ -253,7 +259,7 @@ fn keypoint(point: Option<Keypoint>) -> Option<[Value; 3]> {
         PointState::Hidden => 1,
         PointState::Outside => return None,
     };
-    // A hundredth of a pixel; more digits say nothing.
+    // A hundredth of a pixel is precise enough.
     let rounded = |x: f32| Value::from((f64::from(x) * 100.0).round() / 100.0);
     Some([rounded(x), rounded(y), v.into()])
 }

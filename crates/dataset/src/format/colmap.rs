@@ -1,11 +1,12 @@
-//! COLMAP's text models, one a field: `FIELD/cameras.txt`, `FIELD/images.txt`, `FIELD/points3D.txt`; `pycolmap`, and programs of NeRFs and
-//! Gaussian splats read them.
+//! COLMAP text models, one per field: `FIELD/cameras.txt`, `FIELD/images.txt`, `FIELD/points3D.txt`; `pycolmap`, and
+//! programs for NeRFs and Gaussian splats read them.
 //!
-//! Cameras are `FULL_OPENCV`: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6, where the first pixel's centre is (0.5, 0.5) as here. Images hold the
-//! rotation w x y z and the shift from the world to the camera (x right, y down, z forward), in metres. Their names are paths below the
-//! dataset's `images/`, so nothing is copied: `image_path=DATASET/images`. There are no points: no feature was matched.
+//! Cameras are `FULL_OPENCV`: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6, where the first pixel's centre is (0.5, 0.5) as
+//! here. Images have the rotation w x y z and the translation from the world to the camera (x right, y down, z
+//! forward), in metres. Their names are paths relative to the dataset's `images/`, so nothing is copied:
+//! `image_path=DATASET/images`. There are no points, since no features are matched.
 //!
-//! A rolling shutter cannot be told; poses are those of the middle row.
+//! The format cannot represent a rolling shutter; poses are those of the middle row.
 //!
 //! Source: COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.
 
@@ -40,7 +41,7 @@ impl OfFields for Writer {
     }
 }
 
-/// One row a camera, numbered from 1 in the order of their names.
+/// Returns one row per camera, numbered from 1 in the order of their names.
 fn cameras(images: &[Taken]) -> String {
     let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
     for (number, of) in (1..).zip(drives::by_camera(images).values()) {
@@ -55,7 +56,7 @@ fn cameras(images: &[Taken]) -> String {
     text
 }
 
-/// Two rows an image: its pose, and its points, of which there are none.
+/// Returns two rows per image: its pose, and an empty row for its points.
 fn poses(set: &Set, images: &[Taken]) -> String {
     let numbers: Vec<&str> = drives::by_camera(images).into_keys().collect();
     let mut text = "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n".to_owned();

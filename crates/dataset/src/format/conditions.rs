@@ -1,4 +1,4 @@
-//! What a record's conditions come down to: the few numbers that lists of images tell.
+//! Summary values of a record's conditions, for the lists of images in formats.
 
 use crate::model::record::Record;
 use furrow_base::math::Spectrum;
@@ -6,7 +6,8 @@ use furrow_field::record::Conditions;
 use furrow_grow::soil::SoilRecord;
 use furrow_optics::light::LightRecord;
 
-/// Light, soil and camera of an image in short; `None` where the scene file or an imported image says nothing of it.
+/// Summary of light, soil and camera of an image. Values are `None` if the scene file does not define them, and for
+/// imported images.
 pub(super) struct Brief<'a> {
     conditions: Option<&'a Conditions>,
 }
@@ -20,27 +21,27 @@ impl<'a> Brief<'a> {
         self.conditions?.soil.as_ref()
     }
 
-    /// Mean moisture of the soil, 0 air-dry to 1 saturated.
+    /// Returns the mean moisture of the soil, 0 (air-dry) to 1 (saturated).
     pub(super) fn moisture(&self) -> Option<f64> {
         Some(self.soil()?.moisture.mean.into())
     }
 
-    /// Clods longer than 5 mm on a square metre.
+    /// Returns the number of clods longer than 5 mm per square metre.
     pub(super) fn clods_per_m2(&self) -> Option<f64> {
         Some(self.soil()?.clods.over_5mm_per_m2.into())
     }
 
-    /// Root mean square height of the ground's noise, mm.
+    /// Returns the root mean square height of the ground's noise, mm.
     pub(super) fn relief_mm(&self) -> Option<f64> {
         Some(self.soil()?.relief.rms_mm.into())
     }
 
-    /// Share of the ground under straw.
+    /// Returns the fraction of the ground that straw covers.
     pub(super) fn straw(&self) -> Option<f64> {
         Some(self.soil()?.litter.straw_cover.into())
     }
 
-    /// The soil's layers by name, the one with the largest share first.
+    /// Returns the names of the soil's layers, the one with the largest share first.
     pub(super) fn layers(&self) -> Vec<&'a str> {
         let mut all: Vec<_> = self.soil().into_iter().flat_map(|soil| &soil.layers).collect();
         all.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -51,12 +52,12 @@ impl<'a> Brief<'a> {
         self.conditions.map_or(&[], |c| &c.lights)
     }
 
-    /// The kinds of light: `daylight`, `overcast`, `constant`, `environment`, `lamp`.
+    /// Returns the kinds of light: `daylight`, `overcast`, `constant`, `environment`, `lamp`.
     pub(super) fn kinds_of_light(&self) -> Vec<&'a str> {
         self.lights().iter().map(LightRecord::kind).collect()
     }
 
-    /// Elevation and azimuth of the sun (degrees) and turbidity of the first daylight.
+    /// Returns elevation and azimuth of the sun (degrees) and the turbidity of the first daylight.
     fn daylight(&self) -> Option<[f64; 3]> {
         self.lights().iter().find_map(|light| match light {
             LightRecord::Daylight { sun_elevation_deg, sun_azimuth_deg, turbidity, .. } => {
@@ -66,22 +67,22 @@ impl<'a> Brief<'a> {
         })
     }
 
-    /// The sun above the horizon, degrees.
+    /// Returns the elevation of the sun above the horizon, degrees.
     pub(super) fn sun_elevation_deg(&self) -> Option<f64> {
         self.daylight().map(|of| of[0])
     }
 
-    /// The sun clockwise from north, degrees.
+    /// Returns the azimuth of the sun, clockwise from north, degrees.
     pub(super) fn sun_azimuth_deg(&self) -> Option<f64> {
         self.daylight().map(|of| of[1])
     }
 
-    /// Haze.
+    /// Returns the turbidity of the atmosphere (haze).
     pub(super) fn turbidity(&self) -> Option<f64> {
         self.daylight().map(|of| of[2])
     }
 
-    /// Share of the visible irradiance of the ground that comes straight from the sun.
+    /// Returns the fraction of the ground's visible irradiance that comes directly from the sun.
     pub(super) fn sun_share(&self) -> Option<f64> {
         let (mut sun, mut all) = (0.0, 0.0);
         for light in self.lights() {
@@ -97,13 +98,13 @@ impl<'a> Brief<'a> {
         (all > 0.0).then(|| sun / all)
     }
 
-    /// Height of the lens over the world's ground plane, metres.
+    /// Returns the height of the camera above the ground plane of the world, metres.
     pub(super) fn camera_height_m(&self) -> Option<f64> {
         Some(self.conditions?.camera.position_m[2])
     }
 }
 
-/// Sum of the bands R, G, B.
+/// Returns the sum of the bands R, G and B.
 fn visible(spectrum: Spectrum) -> f64 {
     spectrum.to_array().into_iter().take(3).map(f64::from).sum()
 }

@@ -1,18 +1,20 @@
-//! CropAndWeed: `images/NAME.jpg`, `bboxes/CropAndWeed/NAME.csv`, `labelIds/CropAndWeed/NAME.png`, `params/NAME.csv`, with
-//! NAME = `ave-SSSS-IIII`: session and image, which together are the image's number.
+//! CropAndWeed: `images/NAME.jpg`, `bboxes/CropAndWeed/NAME.csv`, `labelIds/CropAndWeed/NAME.png`, `params/NAME.csv`,
+//! with NAME = `ave-SSSS-IIII`: session and image, which together are the image's number.
 //!
-//! A row of `bboxes` is a plant: left, top, right, bottom, label, stem x, stem y, whole pixels and no head, as the dataset's own
-//! scripts read it. Right and bottom are the first column and row beyond the plant. A stem outside the image keeps its place there;
-//! −1, −1 is one that nobody knows.
+//! A row of `bboxes` is a plant: left, top, right, bottom, label, stem x, stem y, in whole pixels and without a header
+//! row, as the dataset's own scripts read it. Right and bottom are the first column and row beyond the plant. A stem
+//! outside the image keeps its position; −1, −1 is an unknown stem.
 //!
-//! Labels are those of CropAndWeed where it has the species, found by its EPPO code; maize and sugar beet by their leaves, which
-//! BBCH 12 to 19 count. Other species get labels from 100 on, 255 is a plant of no species. `labels.json` tells them all. In
-//! `labelIds` a plant's pixels have its label, soil and pixels without a label have 0.
+//! Labels are those of CropAndWeed if it has the species, found by its EPPO code. For maize and sugar beet they depend
+//! on the number of leaves, given by BBCH 12 to 19. Other species have labels from 100; 255 is a plant without a
+//! species. `labels.json` describes all of them. In `labelIds` the pixels of a plant have its label; soil and pixels
+//! without a label have 0.
 //!
-//! Images are JPEG, because the original's are and its scripts look for that name; unless the dataset's own are JPEG, other formats have them without loss.
+//! Images are JPEG, because the original's are and its scripts search for that extension. Unless the dataset stores
+//! JPEG, other formats have lossless images.
 //!
-//! `params` are what annotators judged by eye; here numbers decide, as `labels.json` tells. `train.txt`, `val.txt` and `test.txt` list the names
-//! of each split, for which the original has no folders.
+//! In the original, annotators estimated `params` by eye; here they are computed, as `labels.json` describes.
+//! `train.txt`, `val.txt` and `test.txt` list the names of each split, for which the original has no folders.
 //!
 //! Source: Steininger et al. 2023, "The CropAndWeed Dataset", and its repository, `cnw/utilities/datasets.py`,
 //! `cnw/map_dataset.py`.
@@ -36,7 +38,7 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "cropandweed";
 
-/// Images of a session: four digits.
+/// Number of images in a session: four digits.
 const SESSION: u64 = 10_000;
 
 /// Quality of the JPEG images, of 100.
@@ -54,10 +56,10 @@ const LABELS: &[(&str, u8)] = &[
     ("VERHE", 64), ("VICFX", 27), ("VIOTR", 82), ("ZEAMX", 1),
 ];
 
-/// Species whose label is followed by those of their leaf stages.
+/// Species whose label is followed by the labels of their leaf stages.
 const STAGED: [&str; 2] = ["ZEAMX", "BEAVX"];
 
-/// The stages behind such a species' label: the least BBCH, and its name.
+/// Leaf stages of such a species: smallest BBCH, and name.
 const STAGES: [(u32, &str); 5] = [
     (12, "two-leaf stage"),
     (14, "four-leaf stage"),
@@ -69,7 +71,7 @@ const STAGES: [(u32, &str); 5] = [
 /// Labels of species that CropAndWeed does not have.
 const OWN: std::ops::Range<u16> = 100..255;
 
-/// A plant of no species.
+/// Label of a plant without a species.
 const VEGETATION: u8 = 255;
 
 impl Format for Writer {
@@ -121,8 +123,8 @@ impl Format for Writer {
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         let lossless = recipe.photo() == Photo::Png;
-        let photographs = "photographs are JPEG, as its scripts expect; the other formats have them without loss";
-        let labels = "its labels are CropAndWeed's own, whatever --classes says";
+        let photographs = "images are JPEG, as its scripts expect; the other formats have lossless images";
+        let labels = "its labels are CropAndWeed's own, independent of --classes";
         let all = [(lossless, photographs), (recipe.labelling.classes.is_some(), labels)];
         all.into_iter().filter(|(told, _)| *told).map(|(_, words)| words.to_owned()).collect()
     }
@@ -132,7 +134,7 @@ fn name(index: u64) -> String {
     format!("ave-{:04}-{:04}", index / SESSION, index % SESSION)
 }
 
-/// Left, top, right, bottom, label, stem across and down (−1 without a stem) of a plant; `None` where nothing of it is seen.
+/// Returns left, top, right, bottom, label, stem x, stem y (−1 without a stem) of a plant; `None` if it is not visible.
 fn row(plant: &Plant, label: u8) -> Option<[i64; 7]> {
     let [x, y, w, h] = plant.seen.bounds?.0.map(i64::from);
     let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor() as i64, p.y.floor() as i64));
@@ -143,7 +145,7 @@ fn failed(e: &dyn std::fmt::Display) -> Error {
     Error::failed(format!("cannot write a table of CropAndWeed: {e}"))
 }
 
-/// The label of each species of a recipe, by its number less one.
+/// Label of each species of a recipe, by its number minus one.
 struct Labels(Vec<u8>);
 
 impl Labels {
@@ -163,7 +165,7 @@ impl Labels {
         label + STAGES.iter().filter(|(least, _)| grown.bbch >= *least).count() as u8
     }
 
-    /// What each label means.
+    /// Returns the descriptions of all labels.
     fn told(&self, recipe: &Recipe) -> Vec<serde_json::Value> {
         let mut all = vec![json!({ "label": 0, "name": "soil" })];
         for (species, label) in recipe.species.iter().zip(&self.0) {
@@ -185,11 +187,11 @@ impl Labels {
 }
 
 fn too_many() -> Error {
-    Error::input(format!("the scene file has more than {} species that CropAndWeed has no labels for, more than 8 bits number", OWN.len())).help(format!("make two scene files of it, or \
-         leave out --format {FOLDER}"))
+    Error::input(format!("the scene file has more than {} species without a label in CropAndWeed, which exceeds 8 bits", OWN.len())).help(format!("split it into two scene files, or \
+         omit --format {FOLDER}"))
 }
 
-/// An image's circumstances in the steps of CropAndWeed; empty where they are not known.
+/// Conditions of an image in the steps of CropAndWeed; empty cells for unknown ones.
 struct Params([(&'static str, Option<u8>); 4]);
 
 impl Params {
@@ -211,7 +213,7 @@ impl Params {
         ])
     }
 
-    /// A head and a row.
+    /// Returns a header row and a row of values.
     fn csv(&self) -> Result<Vec<u8>> {
         let mut rows = csv::Writer::from_writer(Vec::new());
         rows.serialize(self.0.map(|(name, _)| name)).map_err(|e| failed(&e))?;
@@ -220,7 +222,8 @@ impl Params {
     }
 }
 
-/// Share of the plants' pixels within the frame that nothing hides; `None` where it is not known, 1 without plants.
+/// Returns the fraction of the plants' pixels within the frame that is not occluded; `None` if unknown, 1 without
+/// plants.
 fn visible(record: &Record) -> Option<f64> {
     let (mut seen, mut all) = (0_u64, 0_u64);
     for plant in &record.plants {

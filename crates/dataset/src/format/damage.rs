@@ -1,13 +1,13 @@
-//! What is wrong with leaves: `damage/SPLIT/MAP/NAME.png`, 8 bits of grey, exact at each pixel's centre.
+//! Damage of leaves: `damage/SPLIT/MAP/NAME.png`, 8-bit grey, exact at each pixel's centre.
 //!
-//! | map | holds, of 255 |
+//! | map | contents, of 255 |
 //! |---|---|
-//! | `chlorosis` | degree to which living tissue has lost its green, times its share |
-//! | `necrosis` | share of dead tissue and of the rims of spots; with chlorosis at most 255 |
-//! | `dust` | share under dust or splashed soil, on the side that is seen |
+//! | `chlorosis` | degree of chlorophyll loss in living tissue, times the fraction of living tissue |
+//! | `necrosis` | fraction of dead tissue and of the rims of spots; the sum with chlorosis is at most 255 |
+//! | `dust` | fraction covered by dust or splashed soil, on the visible side |
 //! | `edges` | 255 within the rim, 0.35 mm wide, of a hole, a bite or a tear |
 //!
-//! All are 0 where nothing of this is, and on what is no leaf.
+//! All are 0 without damage, and outside leaves.
 
 use super::{Format, picture};
 use furrow_base::Result;
@@ -21,10 +21,10 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "damage";
 
-/// What a map holds of a place, from 0 to 1.
+/// Value of a map at a point, from 0 to 1.
 type Share = fn(&Damage) -> f32;
 
-/// The maps: their names, and what they hold of a place.
+/// Names of the maps, and their values at a point.
 const MAPS: [(&str, Share); 4] = [
     ("chlorosis", |damage| damage.chlorosis),
     ("necrosis", |damage| damage.necrosis),

@@ -1,4 +1,4 @@
-//! The images of a field with their cameras: what formats of poses and tracks are made of.
+//! Images of a field with their cameras, from which formats for poses and tracks are made.
 
 use super::{Format, Whole};
 use crate::model::recipe::Recipe;
@@ -17,22 +17,22 @@ pub(super) struct Taken {
     pub(super) capture: CaptureRecord,
 }
 
-/// A format that is written field by field, of its images' cameras and records alone.
+/// A format that is written field by field, from cameras and records alone.
 pub(super) trait OfFields: Sync {
-    /// Whether each day of a field is one of its own: images that show one and the same thing.
+    /// Returns whether each day of a field has files of its own, so that all images in them show the same scene.
     fn by_day(&self) -> bool {
         false
     }
 
-    /// The files of a field of this name.
+    /// Writes the files of the field with this name.
     fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
 
-    /// As [`Format::names_photographs`].
+    /// See [`Format::names_photographs`].
     fn names_photographs(&self) -> bool {
         false
     }
 
-    /// As [`Format::has_one_pose`].
+    /// See [`Format::has_one_pose`].
     fn has_one_pose(&self) -> bool {
         false
     }
@@ -80,7 +80,7 @@ impl<T: OfFields> Format for T {
     }
 }
 
-/// The images of a field that the dataset has, in their order.
+/// Returns the images of a field that are in the dataset, in order.
 fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
     let captures = set.recipe.captures();
     let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
@@ -89,8 +89,8 @@ fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
 
 fn taken(mut record: Record) -> Result<Taken> {
     let camera = record.conditions.take().map(|conditions| conditions.camera).ok_or_else(|| {
-        Error::misuse(format!("image {} was imported, and nothing tells its camera", record.name))
-            .help("formats of poses are of rendered images")
+        Error::misuse(format!("image {} was imported and has no camera data", record.name))
+            .help("formats with poses need rendered images")
     })?;
     let capture = record.capture.clone().unwrap_or_else(|| CaptureRecord {
         field: record.index,
@@ -102,7 +102,7 @@ fn taken(mut record: Record) -> Result<Taken> {
     Ok(Taken { record, camera, capture })
 }
 
-/// Images by the name of their camera.
+/// Groups images by the name of their camera.
 pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
     let mut all: BTreeMap<&str, Vec<&Taken>> = BTreeMap::new();
     for image in images {
@@ -111,23 +111,24 @@ pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
     all
 }
 
-/// The photograph of an image, below `images/`.
+/// Returns the path of the colour image, relative to `images/`.
 pub(super) fn photograph(set: &Set, image: &Taken) -> String {
     format!("{}/rgb.{}", image.record.name, set.recipe.photo().ending())
 }
 
-/// The camera's axes right, down and forward in the world, as columns; and its place, metres.
+/// Returns the right, down and forward axes of the camera in world space, as columns, and its position, metres.
 pub(super) fn camera_to_world(camera: &CameraRecord) -> (DMat3, DVec3) {
     let [right, down, forward] = camera.world_to_camera.map(DVec3::from_array);
     (DMat3::from_cols(right, down, forward), DVec3::from_array(camera.position_m))
 }
 
-/// A rotation as a quaternion x, y, z, w.
+/// Converts a rotation to a quaternion x, y, z, w.
 pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
     DQuat::from_mat3(axes).normalize().to_array()
 }
 
-/// A warning for formats that tell of several images of a field, where there is one: on each day, or on all of them together.
+/// Returns a warning if a format for several images of a field gets only one: on each day with `by_day`, otherwise on
+/// all days together.
 fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
     let (images, words) = if by_day {
         (recipe.captures_a_day(), "each field has one image a day; `drive` in a scene file takes several")
@@ -143,7 +144,8 @@ mod tests {
     use furrow_base::math::vec3;
     use furrow_optics::sensor::{Camera, Distortion, Pose};
 
-    /// Expected: what a pose's quaternion and place put in front of the camera is what the camera itself sees there.
+    /// Expected: a point that a pose's quaternion and position place in front of the camera is where the camera itself
+    /// sees it.
     #[test]
     fn quaternions_turn_as_the_camera_does() {
         for (yaw, pitch, roll) in [(0.0, 0.0, 0.0), (30.0, 8.0, -5.0), (200.0, -20.0, 40.0), (90.0, 60.0, 0.0)] {

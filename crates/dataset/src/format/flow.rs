@@ -1,16 +1,16 @@
 //! Exact optical flow and disparity: `NAME.exr`, in single precision.
 //!
-//! | channels | hold |
+//! | channels | contents |
 //! |---|---|
-//! | `next.x`, `next.y` | from a pixel's centre to where its point lies in the next frame of the same camera, pixels right and down |
-//! | `next.visible` | 1 where that frame shows the point, 0 where it lies outside of it or something hides it |
-//! | `CAMERA.x`, `.y`, `.visible` | the same to the other cameras of the same frame; of a stereo pair side by side, disparity is −x |
+//! | `next.x`, `next.y` | displacement of the point at a pixel's centre in the next frame of the same camera, pixels right and down |
+//! | `next.visible` | 1 if that frame shows the point, 0 if the point is outside the frame or occluded |
+//! | `CAMERA.x`, `.y`, `.visible` | the same for the other cameras of the same frame; for a side-by-side stereo pair, disparity is −x |
 //!
-//! Values are not numbers (NaN) where a pixel shows nothing, or what lies behind the other lens. A field's last frame has no `next`, and an
-//! image that leads to no other has one channel, `none`, of zeros. Where each field has one image a day there are no files. Lens distortion and rolling
-//! shutters of both images are in it.
+//! Values are NaN where a pixel shows nothing, or a point behind the other camera. A field's last frame has no `next`,
+//! and an image without flow to any other has one channel, `none`, of zeros. If each field has one image per day, there
+//! are no files. Lens distortion and rolling shutter of both images are included.
 //!
-//! Source: the surface at each pixel's centre, as labels have it, and the cameras; nothing is matched.
+//! Source: the surface at each pixel's centre, as in the labels, and the cameras; nothing is matched.
 
 use super::Format;
 use crate::model::recipe::Recipe;
@@ -54,7 +54,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let words = "each field has one image a day, so it leads nowhere and has no files; `drive` in a scene file takes several";
+        let words = "each field has one image a day, so there is no flow; `drive` in a scene file takes several";
         if self.has_images(recipe) { Vec::new() } else { vec![words.to_owned()] }
     }
 }

@@ -1,11 +1,12 @@
-//! Hugging Face ImageFolder: `SPLIT/metadata.jsonl` with one line an image, and a dataset card; `datasets.load_dataset("DIR/imagefolder")`
-//! reads the pictures named by `file_name` and every `…_file_name`, all other keys as columns.
+//! Hugging Face ImageFolder: `SPLIT/metadata.jsonl` with one line per image, and a dataset card.
+//! `datasets.load_dataset("DIR/imagefolder")` reads the images named by `file_name` and every `…_file_name`, and all
+//! other keys as columns.
 //!
-//! The reader takes a column's type from a split's first lines and refuses splits whose types differ. So a number that some image
-//! lacks is null there, and one that a whole split lacks is no column at all. Label maps that images go without are no columns either.
+//! The reader takes a column's type from a split's first lines and refuses splits whose types differ. So a number that
+//! an image lacks is null, and one that a whole split lacks is no column. Omitted label maps are no columns either.
 //!
-//! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset cards"; read with
-//! datasets 5.2.0, in which 16-bit masks keep their numbers, and those of three bytes.
+//! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset
+//! cards"; read with datasets 5.2.0, which preserves the numbers in 16-bit masks and in masks of three bytes.
 
 use super::conditions::Brief;
 use super::{Format, Whole, picture};
@@ -35,7 +36,7 @@ impl Format for Writer {
         let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, below(kind) + ".png", picture);
         let mut files = vec![
             picture::photograph(sample, &below("images"))?,
-            // Numbers, not palette colours: a reader that turns pictures into RGB would lose them.
+            // Grey values instead of palette indices, which a reader that converts images to RGB would lose.
             file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
         ];
         if !recipe.omits(Omitted::Plants) {
@@ -71,7 +72,7 @@ impl Format for Writer {
     }
 }
 
-/// The columns of which every split knows something.
+/// Returns the columns that have values in every split.
 fn known(set: &Set, splits: &[Split]) -> Result<BTreeSet<&'static str>> {
     let mut all: Option<BTreeSet<&str>> = None;
     for split in splits {
@@ -84,7 +85,7 @@ fn known(set: &Set, splits: &[Split]) -> Result<BTreeSet<&'static str>> {
     Ok(all.unwrap_or_default())
 }
 
-/// One image's columns.
+/// Returns the columns of one image.
 fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     let Record { name, split, .. } = record;
     let photo = set.recipe.photo().ending();
@@ -97,7 +98,7 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     let count = |class: Class| record.seen().filter(|p| p.class == class).count();
     let species: BTreeSet<&str> = record.seen().filter_map(|p| set.recipe.species_name(p.kind)).collect();
     let brief = Brief::of(record);
-    // Texts are never null: an empty text has a type.
+    // Texts are never null, since an empty text has a type.
     let list = |words: Vec<&str>| json!(words.join(", "));
     vec![
         ("file_name", json!(format!("images/{name}.{photo}"))),
@@ -128,13 +129,13 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Licences that Hugging Face knows by identifier, as far as people give datasets such.
+/// Licences common for datasets that Hugging Face has identifiers for.
 const LICENCES: [&str; 14] = [
     "apache-2.0", "mit", "cc0-1.0", "cc-by-2.0", "cc-by-3.0", "cc-by-4.0", "cc-by-sa-3.0", "cc-by-sa-4.0", "cc-by-nc-4.0",
     "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "cc-by-nd-4.0", "odbl", "pddl",
 ];
 
-/// The licence as the head of a dataset card has it.
+/// Returns the licence for the header of a dataset card.
 fn licence(words: &str) -> String {
     let id = words.to_lowercase();
     if LICENCES.contains(&id.as_str()) {
@@ -142,12 +143,12 @@ fn licence(words: &str) -> String {
     } else if words == "not stated" {
         "license: unknown\n".into()
     } else {
-        // JSON texts are YAML texts.
+        // JSON strings are valid YAML.
         format!("license: other\nlicense_name: {}\n", Value::from(words))
     }
 }
 
-/// Hugging Face's name of a split.
+/// Returns Hugging Face's name of a split.
 fn split_name(split: Split) -> &'static str {
     match split {
         Split::Val => "validation",
@@ -155,7 +156,7 @@ fn split_name(split: Split) -> &'static str {
     }
 }
 
-/// The dataset card: a head that programs read, then words for people.
+/// Writes the dataset card: a header for programs, then text for people.
 fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
     let recipe = &set.recipe;
     w.put("---\n")?;
@@ -189,7 +190,7 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
     Ok(())
 }
 
-/// What the columns hold, but for label maps that images go without.
+/// Returns the description of the columns, without omitted label maps.
 fn columns_told(recipe: &Recipe) -> String {
     let there = |line: &&str| {
         !Omitted::NAMED.iter().any(|(name, map, _)| recipe.omits(*map) && line.starts_with(&format!("| `{name}` |")))

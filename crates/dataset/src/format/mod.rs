@@ -1,6 +1,7 @@
-//! Formats of other people's tools: one file each, made of a [`Sample`] and of records.
+//! Formats of other tools, each in a file of its own. They are made from a [`Sample`] or from records.
 //!
-//! A format is a file here that implements [`Format`], and one line in `formats!`. The tests find it unasked.
+//! A format is a file here that implements [`Format`], and one line in `formats!`. The tests then cover it without
+//! further changes.
 
 use crate::File;
 use crate::model::keep::Kept;
@@ -9,64 +10,70 @@ use crate::model::sample::Sample;
 use crate::read::set::{Set, Whole};
 use furrow_base::{Error, Result};
 
-/// A way to write a dataset down. Paths of files are relative to the dataset's folder and begin with the format's name.
+/// A file format for datasets. Paths of files are relative to the dataset's folder and start with the format's name.
 pub trait Format: Sync {
-    /// The files that belong to one image.
+    /// Returns the files that belong to one image.
     fn image(&self, _recipe: &Recipe, _sample: &Sample) -> Result<Vec<File>> {
         Ok(Vec::new())
     }
 
-    /// Whether [`Self::image`] makes files at all of the images of this recipe.
+    /// Returns whether [`Self::image`] returns any files for images of this recipe.
     fn has_images(&self, _recipe: &Recipe) -> bool {
         true
     }
 
-    /// The files that belong to all images together, for [`Whole::file`] to write. Called when every image is there.
+    /// Writes the files that belong to all images, with [`Whole::file`]. Called when every image is complete.
     fn whole(&self, _set: &Set, _out: &mut Whole<'_>) -> Result<()> {
         Ok(())
     }
 
-    /// Whether it is made of what only the renderer knows ([`Sample::film`]), so that adding it renders anew.
+    /// Returns whether the format needs results of the renderer ([`Sample::film`]), so that adding it renders the
+    /// images again.
     fn needs_film(&self) -> bool {
         false
     }
 
-    /// Maps of the images that it cannot do without.
+    /// Returns the maps of images that the format needs.
     fn needs_maps(&self) -> &'static [Kept] {
         &[]
     }
 
-    /// Whether it holds photographs, or names them, so that images which are labels alone cannot be written in it.
+    /// Returns whether the format contains or names rendered images, so that it cannot be written for labels-only
+    /// images.
     fn needs_photograph(&self) -> bool {
         true
     }
 
-    /// Whether it names the photographs in `images/`, which it does not copy.
+    /// Returns whether the format names the image files in `images/` instead of copying them.
     fn names_photographs(&self) -> bool {
         false
     }
 
-    /// Whether it tells of cameras, which imported images do not.
+    /// Returns whether the format contains camera data, which imported images do not have.
     fn needs_camera(&self) -> bool {
         false
     }
 
-    /// Whether it tells one pose for all rows of an image, and cannot tell a rolling shutter.
+    /// Returns whether the format has a single pose for all rows of an image, so that it cannot represent a rolling
+    /// shutter.
     fn has_one_pose(&self) -> bool {
         false
     }
 
-    /// Whether it holds [`Rendered::flows`](crate::model::sample::Rendered::flows), which are worked out for it alone.
+    /// Returns whether the format contains [`Rendered::flows`](crate::model::sample::Rendered::flows), which are
+    /// computed only if needed.
     fn needs_flow(&self) -> bool {
         false
     }
 
-    /// Whether it holds [`Rendered::damage`](crate::model::sample::Rendered::damage), which is worked out for it alone.
+    /// Returns whether the format contains [`Rendered::damage`](crate::model::sample::Rendered::damage), which is
+    /// computed only if needed.
     fn needs_damage(&self) -> bool {
         false
     }
 
-    /// What it cannot hold, or what its readers expect otherwise: one sentence each, told once.
+    /// Returns a sentence about each loss of information, and about each property that readers of the format do not
+    /// expect. Each is printed once.
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
         Vec::new()
     }
@@ -84,13 +91,13 @@ macro_rules! formats {
     ($($name:literal => $file:ident: $words:literal, $read:literal;)*) => {
         $(pub mod $file;)*
 
-        /// Every format: its name and what it is, in the order of their names.
+        /// Names and descriptions of all formats, sorted by name.
         pub const NAMES: &[(&str, &str)] = &[$(($name, $words),)*];
 
-        /// How each is read in Python, from the dataset's folder, in the same order.
+        /// Python code that reads each format from the dataset's folder, in the same order.
         pub const READ: &[(&str, &str)] = &[$(($name, $read),)*];
 
-        /// The format of this name.
+        /// Returns the format with this name.
         pub fn named(name: &str) -> Option<&'static dyn Format> {
             match name {
                 $($name => Some(&$file::Writer),)*
@@ -101,23 +108,23 @@ macro_rules! formats {
 }
 
 formats! {
-    "cityscapes" => cityscapes: "Cityscapes' layout: label and instance maps by split and city",
+    "cityscapes" => cityscapes: "Cityscapes layout: label and instance maps by split and city",
         r#"datumaro.Dataset.import_from("cityscapes", "cityscapes")"#;
-    "coco" => coco: "COCO instances and keypoints of plants, and of leaves in a file of their own, for `pycocotools`",
+    "coco" => coco: "COCO instances and keypoints of plants, and of leaves in separate files, for `pycocotools`",
         r#"COCO("coco/annotations/instances_train.json")"#;
-    "colmap" => colmap: "COLMAP's text models: cameras and poses of each field's images, for `pycolmap` and NeRF programs",
+    "colmap" => colmap: "COLMAP text models: cameras and poses of each field's images, for `pycolmap` and NeRF programs",
         r#"pycolmap.Reconstruction("colmap/000000")"#;
     "cropandweed" => cropandweed: "CropAndWeed: boxes with stems as CSV, label maps, parameters",
         r#"csv.reader(open("cropandweed/bboxes/CropAndWeed/ave-0000-0000.csv"))"#;
-    "damage" => damage: "Maps of chlorosis, necrosis, dust and edges of holes on leaves, exact shares at pixel centres",
+    "damage" => damage: "Maps of chlorosis, necrosis, dust and edges of holes on leaves, exact values at pixel centres",
         r#"numpy.array(PIL.Image.open("damage/train/necrosis/000000.png"))"#;
-    "flow" => flow: "OpenEXR: exact optical flow to the next frame and disparity to the other cameras, with what is hidden there",
+    "flow" => flow: "OpenEXR: exact optical flow to the next frame and disparity to the other cameras, with visibility there",
         r#"OpenEXR.File("flow/000000.exr").channels()["next.x"].pixels"#;
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",
         r#"datasets.load_dataset("imagefolder")["train"][0]["plants"]"#;
-    "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file an image",
+    "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file per image",
         r#"OpenEXR.File("layers/train/000000.exr").channels()"#;
-    "mots" => mots: "MOTS: masks of plants whose numbers stay the same over a drive, a text file for each camera",
+    "mots" => mots: "MOTS: masks of plants with the same numbers over a drive, one text file per camera",
         r#"[line.split() for line in open("mots/000000-camera.txt")]"#;
     "nerf" => nerf: "transforms.json of each field: cameras and poses, for nerfstudio and instant-ngp",
         r#"json.load(open("nerf/000000/transforms.json"))["frames"]"#;
@@ -127,7 +134,7 @@ formats! {
         r#"numpy.array(PIL.Image.open("parts/train/000000.png"))"#;
     "phenobench" => phenobench: "PhenoBench: semantics, plants, leaves and visibility, for `phenobench`",
         r#"PhenoBench("phenobench", "train", target_types=["semantics", "plant_instances", "leaf_instances"])[0]"#;
-    "ply" => ply: "Point clouds: place, normal, colour, NIR, class, part, plant and leaf of each pixel's surface",
+    "ply" => ply: "Point clouds: position, normal, colour, NIR, class, part, plant and leaf of each pixel's surface",
         r#"plyfile.PlyData.read("ply/train/000000.ply")["vertex"]"#;
     "skeletons" => skeletons: "Joints of each leaf's kinematic tree, in the world and in the image, as JSON",
         r#"json.load(open("skeletons/train/000000.json"))["plants"]"#;
@@ -137,15 +144,15 @@ formats! {
         r#"numpy.loadtxt("tum/000000-camera.txt")"#;
     "voc" => voc: "Pascal VOC: boxes as XML, masks of classes and objects, for `torchvision` and `supervision`",
         r#"torchvision.datasets.VOCSegmentation("voc", year="2012", image_set="train")[0]"#;
-    "yolo" => yolo: "YOLO segmentation: a polygon a plant, with what is lost by it, for Ultralytics and `supervision`",
+    "yolo" => yolo: "YOLO segmentation: one polygon per plant, with its loss of accuracy, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
-    "yolo-detect" => yolo_detect: "YOLO detection: a box a plant, for Ultralytics and `supervision`",
+    "yolo-detect" => yolo_detect: "YOLO detection: one box per plant, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo-detect/images/train", "yolo-detect/labels/train", "yolo-detect/data.yaml")"#;
-    "yolo-pose" => yolo_pose: "YOLO pose: a box a plant with its stem and the tips of its leaves, for Ultralytics",
+    "yolo-pose" => yolo_pose: "YOLO pose: one box per plant with its stem and the tips of its leaves, for Ultralytics",
         r#"ultralytics.data.dataset.YOLODataset(img_path="yolo-pose/images/train", data=data, task="pose")"#;
 }
 
-/// The formats that a recipe names.
+/// Returns the formats in a recipe, with their names; an error for an unknown name.
 pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
     let mut all = Vec::new();
     for name in &recipe.formats {
@@ -159,24 +166,24 @@ pub fn all(recipe: &Recipe) -> Result<Vec<(&str, &'static dyn Format)>> {
     Ok(all)
 }
 
-/// An error where a format, or a class of its labels, needs a map that the images of this recipe do not have.
+/// Returns an error if a format, or a class in its labels, needs a map that the images of this recipe do not have.
 pub fn check_maps(recipe: &Recipe) -> Result<()> {
     for (format, writer) in all(recipe)? {
         if recipe.labels_only() && writer.needs_photograph() {
             let known = NAMES.iter().filter(|(name, _)| named(name).is_some_and(|format| !format.needs_photograph()));
             let known: Vec<&str> = known.map(|(name, _)| *name).collect();
             return Err(Error::misuse(format!(
-                "--format {format} holds photographs, and these images are labels alone"
+                "--format {format} holds rendered images, and this dataset has labels only"
             ))
             .help(format!(
-                "leave --labels-only or this format out; without photographs there are {}",
+                "omit --labels-only or this format; formats without rendered images are {}",
                 known.join(", ")
             )));
         }
         let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
         if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
             return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))
-                .help(format!("begin a dataset with {name} among --keep, or leave --format {format} out")));
+                .help(format!("create a dataset with {name} in --keep, or omit --format {format}")));
         }
     }
     recipe.labelling.classes.as_ref().map_or(Ok(()), |classes| recipe.check_parts(classes))

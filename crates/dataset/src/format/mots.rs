@@ -1,7 +1,8 @@
-//! Tracks of plants: `FIELD-CAMERA.txt` in the text format of MOTS, one mask a line: frame, track, class, height, width, mask.
+//! Tracks of plants: `FIELD-CAMERA.txt` in the text format of MOTS, one mask per line: frame, track, class, height,
+//! width, mask.
 //!
-//! A track is a plant's identity, which stays the same over all frames and cameras of a field. Classes are 1 crop, 2 weed. Masks are
-//! compressed run lengths as pycocotools writes them. A plant that a frame does not show has no line there.
+//! A track is a plant's identity, which is the same in all frames and cameras of a field. Classes are 1 crop, 2 weed.
+//! Masks are compressed run lengths as in pycocotools. A plant that is not visible in a frame has no line for it.
 //!
 //! Source: Voigtlaender et al. 2019, "MOTS: Multi-object tracking and segmentation"; mots_tools, "txt format".
 
@@ -29,7 +30,7 @@ impl OfFields for Writer {
                     let _ = writeln!(text, "{frame} {id} {class} {height} {width} {}", mask.counts);
                 }
             }
-            // Of a camera that sees no plant there is no file: readers take an empty one for a broken one.
+            // A camera that sees no plant has no file, because readers treat an empty file as damaged.
             if !text.is_empty() {
                 out.file(&format!("{FOLDER}/{name}-{camera}.txt"), |w| w.put(text))?;
             }

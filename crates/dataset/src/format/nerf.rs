@@ -1,10 +1,11 @@
-//! `FIELD/transforms.json`, as instant-ngp introduced it and nerfstudio reads it: cameras and poses of a field's images.
+//! `FIELD/transforms.json`, introduced by instant-ngp and read by nerfstudio: cameras and poses of a field's images.
 //!
-//! `transform_matrix` takes the camera's frame of OpenGL (x right, y up, z back) to the world (metres, z up). Intrinsics stand with each
-//! image, for a rig may have several cameras, and at the top for readers that know one: those of the first image. File paths lead to the
-//! dataset's own `images/`, so nothing is copied. `time` is in seconds; `camera` and `frame` are further keys, which readers pass over.
+//! `transform_matrix` maps OpenGL's camera frame (x right, y up, z back) to world space (metres, z up). Each image has
+//! intrinsics, since a rig may have several cameras. Those of the first image are also at the top, for readers that
+//! support a single camera. File paths lead to the dataset's own `images/`, so nothing is copied. `time` is in seconds;
+//! `camera` and `frame` are additional keys, which readers ignore.
 //!
-//! A rolling shutter and k3 cannot be told; poses are those of the middle row.
+//! The format cannot represent a rolling shutter and k3; poses are those of the middle row.
 //!
 //! Source: nerfstudio documentation, "Data conventions".
 
@@ -53,7 +54,7 @@ fn intrinsics(image: &Taken) -> Map<String, Value> {
 
 fn frame(set: &Set, image: &Taken) -> Value {
     let (axes, place) = drives::camera_to_world(&image.camera);
-    // Rows of the matrix; OpenGL's y and z point the other way.
+    // Rows of the matrix; OpenGL's y and z axes have the opposite direction.
     let row = |i: usize| [axes.x_axis[i], -axes.y_axis[i], -axes.z_axis[i], place[i]];
     let mut all = intrinsics(image);
     all.insert("file_path".into(), format!("../../images/{}", drives::photograph(set, image)).into());

@@ -1,41 +1,47 @@
-//! A mask as one closed polygon, with holes and parts joined by cuts, and the mask that readers make of it again.
+//! A mask as one closed polygon, with holes and separate parts joined by cuts, and the mask that readers restore from
+//! it.
 //!
-//! The polygon runs along the borders of pixels, so its area and its box are those of the mask. Ultralytics cuts the digits of corners off,
-//! fills the polygon and paints its edges too (OpenCV's `fillPoly`, even-odd): corners lie a hundredth of a pixel within the mask, so that what is
-//! left of each is a pixel of the mask, and a part with all its holes comes back exactly. Parts and holes are joined by cuts that go there and
-//! back over the same places. A cut has no area, but its pixels are painted; it goes over pixels of the mask as far as it can, and over as few
-//! others as there must be. Those are all that is lost. Corners of cuts lie in the middle of pixels: Ultralytics puts more corners between those
-//! of a polygon when it trains, and none of them may fall into a pixel beside. supervision rounds corners, and paints one pixel more to the right
-//! and below.
+//! The polygon runs along the borders of pixels, so its area and its box are those of the mask. Ultralytics truncates
+//! the coordinates of corners, fills the polygon and paints its edges too (OpenCV's `fillPoly`, even-odd). So corners
+//! are a hundredth of a pixel inside the mask: each truncated corner is then a pixel of the mask, and a connected part
+//! with all its holes is restored exactly.
 //!
-//! Sources: edges between pixels that are followed with the mask on their right, known as crack codes, Rosenfeld and Kak 1982, "Digital Picture
-//! Processing"; cuts, Dijkstra's shortest path on which pixels of the mask are free.
+//! Parts and holes are joined by cuts, which lead there and back over the same points. A cut has no area, but its
+//! pixels are painted. It uses pixels of the mask where possible, and as few others as necessary; only these are wrong
+//! in the restored mask.
+//!
+//! Corners of cuts are at pixel centres: Ultralytics inserts corners between those of a polygon in training, and none
+//! of them may fall into a neighbouring pixel. supervision rounds corners, and paints one more pixel to the right and
+//! below.
+//!
+//! Sources: edges between pixels that are followed with the mask on their right, known as crack codes, Rosenfeld and
+//! Kak 1982, "Digital Picture Processing"; cuts, Dijkstra's shortest path with zero cost for pixels of the mask.
 
 use crate::model::rle::Box2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A pixel, column and row; or the place where its left and its upper border meet.
+/// Column and row of a pixel; also the point at its upper left corner.
 pub(super) type Pixel = (i32, i32);
 
-/// How far within the mask corners lie, pixels.
+/// Distance of corners from the pixel borders, towards the inside of the mask, pixels.
 const WITHIN: f64 = 0.01;
 
-/// A corner of the polygon.
+/// Corner of the polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Corner {
-    /// Where four pixels meet.
+    /// Point where four pixels meet.
     at: Pixel,
-    /// That one of the four in which it lies.
+    /// The one of these four pixels that contains the corner.
     pixel: Pixel,
-    /// Whether the polygon runs straight on, so that it may be left out.
+    /// Whether the polygon continues straight on, so that the corner can be omitted.
     straight: bool,
-    /// Whether it is one of a cut, in the middle of its pixel.
+    /// Whether the corner is on a cut, at the centre of its pixel.
     cut: bool,
 }
 
 impl Corner {
-    /// Its place in the image: 0, 0 is the upper left corner of the upper left pixel.
+    /// Returns the position in the image; (0, 0) is the upper left corner of the upper left pixel.
     pub(super) fn place(&self) -> (f64, f64) {
         if self.cut {
             return (f64::from(self.pixel.0) + 0.5, f64::from(self.pixel.1) + 0.5);
@@ -45,22 +51,22 @@ impl Corner {
     }
 }
 
-/// The mask of one thing in its box, with a margin of one pixel about it.
+/// Mask of one object in its box, with a margin of one pixel.
 pub(super) struct Mask {
-    /// Column and row of the image where the box begins.
+    /// First column and row of the margin in the image.
     origin: Pixel,
     width: i32,
     height: i32,
     inside: Vec<bool>,
 }
 
-/// The eight neighbours.
+/// Offsets of the eight neighbours of a pixel.
 const AROUND: [Pixel; 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 /// Steps along borders: right, down, left, up.
 const STEPS: [Pixel; 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
-/// From where such a step begins to the pixel on its right, which is in the mask.
+/// Offsets from the start of each step to the pixel on its right, which is in the mask.
 const RIGHT: [Pixel; 4] = [(0, 0), (-1, 0), (-1, -1), (0, -1)];
-/// From there to the pixel on its left, which is not.
+/// Offsets from the start of each step to the pixel on its left, which is not in the mask.
 const LEFT: [Pixel; 4] = [(0, -1), (0, 0), (-1, 0), (-1, -1)];
 
 fn plus(a: Pixel, b: Pixel) -> Pixel {
@@ -68,7 +74,7 @@ fn plus(a: Pixel, b: Pixel) -> Pixel {
 }
 
 impl Mask {
-    /// The pixels in `bounds` for which `inside(x, y)` holds.
+    /// Returns the mask of the pixels in `bounds` for which `inside(x, y)` holds.
     pub(super) fn new(bounds: Box2, inside: impl Fn(u32, u32) -> bool) -> Self {
         let [x0, y0, w, h] = bounds.0.map(|n| n as i32);
         let mut mask = Self {
@@ -90,7 +96,7 @@ impl Mask {
         (y * self.width + x) as usize
     }
 
-    /// Whether a pixel lies in the box, the margin left out.
+    /// Returns whether a pixel is in the box, without the margin.
     fn in_box(&self, (x, y): Pixel) -> bool {
         (1..self.width - 1).contains(&x) && (1..self.height - 1).contains(&y)
     }
@@ -99,12 +105,13 @@ impl Mask {
         self.in_box((x, y)) && self.inside[self.at((x, y))]
     }
 
-    /// Whether the step in direction `d` from a place runs along a border, the mask on its right.
+    /// Returns whether the step in direction `d` from a point runs along a border, with the mask on its right.
     fn borders(&self, at: Pixel, d: usize) -> bool {
         self.holds(plus(at, RIGHT[d])) && !self.holds(plus(at, LEFT[d]))
     }
 
-    /// Borders of the parts and of their holes, each a closed chain of steps. Pixels that touch at a corner alone are parts of their own.
+    /// Returns the borders of all parts and holes, each a closed chain of steps. Pixels that touch only at a corner are
+    /// separate parts.
     fn loops(&self) -> Vec<Vec<Corner>> {
         let mut met = vec![[false; 4]; self.inside.len()];
         let mut all = Vec::new();
@@ -120,18 +127,19 @@ impl Mask {
         all
     }
 
-    /// Follows the border that begins with a step.
+    /// Follows the border that starts with the step from `start` in the direction `first`.
     fn follow(&self, start: Pixel, first: usize, met: &mut [[bool; 4]]) -> Vec<Corner> {
         let mut corners = Vec::new();
         let (mut at, mut d) = (start, first);
         loop {
             met[self.at(at)][d] = true;
             at = plus(at, STEPS[d]);
-            // To the right first: it stays with its pixel where another one touches it at this corner.
+            // Right turns are tried first: at a corner where two pixels touch, the border stays with its own pixel.
             let right = (d + 1) % 4;
             let next = [right, d, (d + 3) % 4].into_iter().find(|next| self.borders(at, *next)).unwrap_or(right);
             let pixel = if next == (d + 3) % 4 {
-                // Opposite to the one pixel here that is not in the mask, on the left of the step that has led here.
+                // At a left turn, one of the four pixels is not in the mask: the one on the left of both steps. The
+                // corner is in the opposite pixel.
                 let (x, y) = LEFT[(d + 3) % 4];
                 plus(at, (-1 - x, -1 - y))
             } else {
@@ -145,7 +153,7 @@ impl Mask {
         }
     }
 
-    /// One closed chain of steps along all borders; empty for an empty mask. In the box's coordinates.
+    /// Returns one closed chain of steps along all borders, in the coordinates of the box; empty for an empty mask.
     fn chain(&self) -> Vec<Corner> {
         let mut loops = self.loops();
         let mut touching: Vec<Vec<usize>> = vec![Vec::new(); self.inside.len()];
@@ -159,7 +167,7 @@ impl Mask {
         let mut search = Search::new(self);
         search.begin(chain.iter().map(|corner| corner.at));
         let mut fresh: Vec<Pixel> = chain.iter().map(|corner| corner.at).collect();
-        // A border that is joined already has been taken.
+        // Borders that are joined already are empty.
         let waiting =
             |loops: &[Vec<Corner>], at: Pixel| touching[self.at(at)].iter().copied().find(|k| !loops[*k].is_empty());
         loop {
@@ -180,13 +188,15 @@ impl Mask {
         }
     }
 
-    /// The polygon's corners in the image, none that lie on a straight line between their neighbours; none of an empty mask.
+    /// Returns the polygon's corners in the image, without those on a straight line between their neighbours; none for
+    /// an empty mask.
     pub(super) fn polygon(&self) -> Vec<Corner> {
         let corners = self.chain().into_iter().filter(|corner| !corner.straight);
         corners.map(|c| Corner { at: plus(c.at, self.origin), pixel: plus(c.pixel, self.origin), ..c }).collect()
     }
 
-    /// Intersection over union of the mask and what Ultralytics paints for the polygon; 1 where nothing is lost.
+    /// Returns the intersection over union of the mask and the pixels that Ultralytics paints for the polygon; 1 if
+    /// both are equal.
     pub(super) fn overlap(&self, polygon: &[Corner]) -> f64 {
         let local: Vec<Pixel> =
             polygon.iter().map(|c| (c.pixel.0 - self.origin.0, c.pixel.1 - self.origin.1)).collect();
@@ -196,10 +206,11 @@ impl Mask {
         if any == 0 { 1.0 } else { both as f64 / any as f64 }
     }
 
-    /// The pixels of a polygon's edges, which run along rows, columns and diagonals, and those that it goes around an odd number of times.
+    /// Returns the pixels of the polygon's edges, which run along rows, columns and diagonals, and those that it
+    /// encloses an odd number of times.
     fn paint(&self, polygon: &[Pixel]) -> Vec<bool> {
         let mut edge = vec![false; self.inside.len()];
-        // Whether an edge leads from a pixel to the row below.
+        // Whether an odd number of edges leads from a pixel to the row below.
         let mut crosses = vec![false; self.inside.len()];
         for (i, from) in polygon.iter().enumerate() {
             let to = polygon[(i + 1) % polygon.len()];
@@ -221,7 +232,7 @@ impl Mask {
             let mut odd = false;
             for x in 0..self.width {
                 let at = self.at((x, row));
-                // On an edge the question is already answered.
+                // Pixels on an edge are painted in any case.
                 painted[at] = edge[at] || odd;
                 odd ^= crosses[at];
             }
@@ -230,7 +241,8 @@ impl Mask {
     }
 }
 
-/// Inserts a border into a closed chain: along a path that begins on the chain and ends on the border, around it, and back.
+/// Inserts a border into a closed chain: along a path that starts on the chain and ends on the border, around the
+/// border, and back.
 fn splice(chain: &mut Vec<Corner>, path: &[Pixel], border: &[Corner]) {
     let (Some(from), Some(to)) = (path.first(), path.last()) else { return };
     let here = chain.iter().position(|corner| corner.at == *from);
@@ -240,7 +252,7 @@ fn splice(chain: &mut Vec<Corner>, path: &[Pixel], border: &[Corner]) {
     let back = chain[here];
     let end = Corner { straight: false, ..border[there] };
     let (cut, mut home): (Vec<Corner>, Vec<Corner>) = if path.len() == 1 {
-        // Between pixels that touch at this corner alone, each from the corner into the middle of the other.
+        // Between pixels that touch only at this corner, each way leads through the centre of the pixel that it enters.
         let diagonal = back.pixel.0 != end.pixel.0 && back.pixel.1 != end.pixel.1;
         let into = |pixel: Pixel| diagonal.then_some(Corner { at: pixel, pixel, straight: false, cut: true });
         (into(end.pixel).into_iter().collect(), into(back.pixel).into_iter().collect())
@@ -259,14 +271,15 @@ fn splice(chain: &mut Vec<Corner>, path: &[Pixel], border: &[Corner]) {
     chain.extend(detour.into_iter().chain(rest));
 }
 
-/// Corner `i` of a cut.
+/// Returns corner `i` of a cut.
 fn on_cut(path: &[Pixel], i: usize) -> Corner {
     let step = |a: Pixel, b: Pixel| (b.0 - a.0, b.1 - a.1);
     let straight = i > 0 && i + 1 < path.len() && step(path[i - 1], path[i]) == step(path[i], path[i + 1]);
     Corner { at: path[i], pixel: path[i], straight, cut: true }
 }
 
-/// Ways from what is joined to what is not, over the upper left corners of pixels: those of the mask cost nothing, others one each.
+/// Search for paths from joined borders to others, over the upper left corners of pixels. Pixels of the mask cost
+/// nothing, others one each.
 struct Search<'a> {
     mask: &'a Mask,
     cost: Vec<u32>,
@@ -280,7 +293,7 @@ impl<'a> Search<'a> {
         Self { mask, cost: vec![u32::MAX; n], before: vec![None; n], queue: BinaryHeap::new() }
     }
 
-    /// Ways may begin at these places.
+    /// Adds starting points of paths.
     fn begin(&mut self, places: impl Iterator<Item = Pixel>) {
         for place in places.filter(|place| self.mask.in_box(*place)) {
             let (at, cost) = (self.mask.at(place), u32::from(!self.mask.holds(place)));
@@ -290,7 +303,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The cheapest way to a pixel that is wanted, from where it begins; `None` where there is none.
+    /// Returns the cheapest path to a pixel for which `wanted` holds, from its start; `None` if there is none.
     fn nearest(&mut self, wanted: impl Fn(Pixel) -> bool) -> Option<Vec<Pixel>> {
         while let Some(Reverse((cost, pixel))) = self.queue.pop() {
             if cost > self.cost[self.mask.at(pixel)] {
@@ -326,7 +339,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// `#` is inside.
+    /// Returns the mask of a drawing; `#` is inside.
     fn mask(rows: &[&str]) -> Mask {
         let bounds = Box2([3, 5, rows[0].len() as u32, rows.len() as u32]);
         Mask::new(bounds, |x, y| rows[y as usize - 5].as_bytes()[x as usize - 3] == b'#')
@@ -352,7 +365,7 @@ mod tests {
         parts
     }
 
-    /// Area within the polygon's borders, as it is gone around.
+    /// Returns the signed area within the polygon's borders.
     fn area(polygon: &[Corner]) -> i32 {
         let next = polygon.iter().cycle().skip(1);
         polygon.iter().zip(next).map(|(a, b)| a.at.0 * b.at.1 - b.at.0 * a.at.1).sum::<i32>() / 2
@@ -384,7 +397,7 @@ mod tests {
         let ring = mask(&["#######", "#.....#", "#.....#", "#.....#", "#######"]);
         assert_eq!(ring.overlap(&ring.polygon()), 1.0);
         let island = mask(&["#######", "#.....#", "#..#..#", "#.....#", "#######"]);
-        // One pixel lies between them at the nearest.
+        // The shortest cut crosses one pixel outside the mask.
         assert_eq!(island.overlap(&island.polygon()), 21.0 / 22.0);
     }
 
@@ -392,7 +405,7 @@ mod tests {
     fn a_cut_is_as_short_as_can_be() {
         let two = mask(&["###......", "###....##", "......###"]);
         assert_eq!(two.overlap(&two.polygon()), 11.0 / 14.0);
-        // Nor does it leave the box, beyond which there may be no image.
+        // Cuts do not leave the box, since there may be no image outside it.
         let apart = mask(&["##.##", "##.##"]);
         assert_eq!(apart.overlap(&apart.polygon()), 8.0 / 9.0);
         assert!(apart.polygon().iter().all(|c| (3..8).contains(&c.pixel.0) && (5..7).contains(&c.pixel.1)));
@@ -419,7 +432,7 @@ mod tests {
             // Cuts and holes have no area.
             prop_assert_eq!(area(&polygon) as usize, inside.iter().filter(|inside| **inside).count());
             let painted = mask.paint(&polygon.iter().map(|c| plus(c.pixel, (1, 1))).collect::<Vec<_>>());
-            // As OpenCV draws them, edges run along rows, columns and diagonals.
+            // OpenCV paints edges between truncated corners, which must run along rows, columns and diagonals.
             let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
             let steps = edges.map(|(a, b)| ((b.pixel.0 - a.pixel.0).abs(), (b.pixel.1 - a.pixel.1).abs()));
             prop_assert!(steps.into_iter().all(|(x, y)| x == 0 || y == 0 || x == y));

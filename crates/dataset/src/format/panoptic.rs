@@ -1,12 +1,16 @@
-//! COCO panoptic: `annotations/panoptic_SPLIT.json`, `annotations/panoptic_SPLIT/NAME.png`, `images/SPLIT/NAME.png`; datumaro and
-//! panopticapi read it.
+//! COCO panoptic: `annotations/panoptic_SPLIT.json`, `annotations/panoptic_SPLIT/NAME.png`, `images/SPLIT/NAME.png`;
+//! datumaro and panopticapi read it.
 //!
-//! A pixel's segment is R + 256 G + 65536 B, 0 for none. A plant's segment is its number in `plants.png`; what belongs to no plant is
-//! 65536 + category: soil, and crop or weed that an imported mask gives no plant or that is too small to be listed, which is a crowd. In an
-//! image that shows plants above 65535 it is the greatest of their numbers + 1 + category. Soil is stuff, plants are things. Categories are those of COCO instances, and 4 for soil, for 0 is no category.
+//! A pixel's segment is R + 256 G + 65536 B, 0 for none. The segment of a plant is its number in `plants.png`. Pixels
+//! without a plant have 65536 + category: soil, and crop or weed that an imported mask assigns to no plant or whose
+//! plant is too small to be listed, which is a crowd. In an image with plant numbers above 65535, their maximum + 1
+//! replaces 65536.
 //!
-//! Boxes of segments without a plant stand in no record, so each image's `segments_info` is written with the image, to
-//! `segments/SPLIT/NAME.json`, and gathered in the end.
+//! In COCO's terms, soil is stuff and plants are things. Categories are those of COCO instances, and 4 for soil, since
+//! 0 is no category.
+//!
+//! The boxes of segments without a plant are not in the record. So each image's `segments_info` is written with the
+//! image, to `segments/SPLIT/NAME.json`, and collected in the end.
 //!
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
@@ -30,7 +34,7 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "panoptic";
 
-/// Segments without a plant begin here, behind numbers of plants of 16 bits.
+/// Segments without a plant are numbered from here, above 16-bit plant numbers.
 const STUFF: u32 = 1 << 16;
 
 impl Format for Writer {
@@ -73,7 +77,8 @@ fn segments_path(split: &str, name: &str) -> String {
     format!("{FOLDER}/segments/{split}/{name}.json")
 }
 
-/// The category of a class: those of plants as in COCO instances, others behind the leaves' there.
+/// Returns the category of a class: that of COCO instances for classes of plants; the others follow the category of
+/// leaves.
 fn category(labels: &Labels<'_>, class: u8) -> u32 {
     let things = labels.of_plants();
     if things.contains(&class) {
@@ -89,7 +94,7 @@ fn categories(labels: &Labels<'_>) -> Value {
     let colors = labels.colors();
     let category = |class: u8| {
         let thing = things.contains(&class);
-        // Soil is black in our masks; here black is void.
+        // Soil is black in the other masks, but black means void here.
         let color = Some(colors[usize::from(class)]).filter(|color| *color != [0; 3]).unwrap_or([120, 85, 60]);
         json!({
             "id": category(labels, class),
@@ -102,8 +107,8 @@ fn categories(labels: &Labels<'_>) -> Value {
     things.iter().copied().chain(others).map(category).collect()
 }
 
-/// The segment of each pixel, and what is known of each segment. A pixel is of its plant's class where it has one, and of its own where that is no
-/// plant's, such as an organ's.
+/// Returns the segment of each pixel, and the `segments_info` of the image. A pixel has the class of its plant, unless
+/// its own class is one that plants cannot have, such as that of an organ.
 fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
     let width = sample.record.width;
     let things = labels.of_plants();
@@ -111,8 +116,8 @@ fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
     let stuff = STUFF.max(most + 1);
     let last = (0..labels.classes().len() as u8).map(|class| stuff + category(labels, class)).max();
     if last.is_some_and(|last| last > MOST_PLANTS) {
-        let words = format!("image {} has a plant of number {most}; segments of COCO panoptic have 24 bits", sample.record.name);
-        return Err(Error::input(words).help(format!("sow fewer plants, or leave out --format {FOLDER}")));
+        let words = format!("image {} has a plant with the number {most}; segments of COCO panoptic have 24 bits", sample.record.name);
+        return Err(Error::input(words).help(format!("sow fewer plants, or omit --format {FOLDER}")));
     }
     let of_plant: BTreeMap<u32, u8> = labels.plants(&sample.record).map(|(plant, class)| (plant.number, class)).collect();
     let mut ids = Vec::with_capacity(sample.pixels());
@@ -144,7 +149,7 @@ fn annotation(set: &Set, record: &Record) -> Result<Value> {
     let path = set.folder.join(segments_path(record.split.name(), &record.name));
     let bytes = furrow_base::input::contents(&path).map_err(Error::reading(&path))?;
     let segments: Value = serde_json::from_slice(&bytes)
-        .map_err(|e| Error::damaged(format!("these are no segments: {e}")).in_file(path))?;
+        .map_err(|e| Error::damaged(format!("these are not segments: {e}")).in_file(path))?;
     let file = format!("{}.png", record.name);
     Ok(json!({ "image_id": coco::image_id(record), "file_name": file, "segments_info": segments }))
 }

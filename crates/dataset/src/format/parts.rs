@@ -1,7 +1,8 @@
-//! Organs and ground: `parts/SPLIT/NAME.png`, what each pixel's centre shows: soil, stone, straw, blade, petiole, stem and so on.
+//! Organs and ground: `parts/SPLIT/NAME.png`, the part at each pixel's centre: soil, stone, straw, blade, petiole, stem
+//! and so on.
 //!
-//! 8 bits of index with a palette; `parts/names.json` names the numbers. 0 is where nothing is: the sky. Models that the scene file names have
-//! numbers from 101 on, in the order of their names there.
+//! Values are 8-bit indices with a palette; `parts/names.json` names them. 0 is the sky. Models that the scene file
+//! names are numbered from 101, in the order of their names in the file.
 
 use super::{Format, Whole, picture};
 use crate::model::recipe::Recipe;
@@ -45,7 +46,8 @@ impl Format for Writer {
     }
 }
 
-/// The number of what each pixel shows; an error that names `format` for an image that was not rendered.
+/// Returns the part number of each pixel; an error that names `format` for an image that was not rendered by this
+/// process.
 pub(super) fn numbers(format: &str, sample: &Sample) -> Result<Vec<u8>> {
     let rendered = sample.rendered(format)?;
     Ok(part_numbers(&rendered.labels, &rendered.kinds))

@@ -1,20 +1,22 @@
-//! PhenoBench: `SPLIT/{images,semantics,plant_instances,…}/NAME.png`, read by the `phenobench` package and judged by `phenobench-eval`.
+//! PhenoBench: `SPLIT/{images,semantics,plant_instances,…}/NAME.png`, read by the `phenobench` package and evaluated by
+//! `phenobench-eval`.
 //!
-//! | folder | holds |
+//! | folder | contents |
 //! |---|---|
-//! | `images` | the photograph; `test` has nothing else, as in the original |
-//! | `semantics` | 16 bit: 0 soil, 1 crop, 2 weed, 3 and 4 the same of partial plants, 255 no label |
-//! | `plant_instances` | 16 bit: number of the plant, unique over crop and weed; 0 for none. An image that shows a plant above 65535 counts its plants from 1 |
-//! | `leaf_instances` | 16 bit: number of the crop leaf, unique in the image; weeds' leaves have none, as in the original |
-//! | `plant_visibility`, `leaf_visibility` | 8 bit, one value an instance: share of it within the frame, of 255 |
+//! | `images` | the colour image; `test` has nothing else, as in the original |
+//! | `semantics` | 16 bit: 0 soil, 1 crop, 2 weed, 3 and 4 for crop and weed that are partial, 255 no label |
+//! | `plant_instances` | 16 bit: number of the plant, unique over crop and weed; from 1 if a number exceeds 65535; 0 for none |
+//! | `leaf_instances` | 16 bit: number of the crop leaf, unique in the image; leaves of weeds have none, as in the original |
+//! | `plant_visibility`, `leaf_visibility` | 8 bit, one value per instance: fraction of it within the frame, of 255 |
 //!
-//! A plant is partial where less than half of its pixels lie within the frame. The original was cut from larger pictures, and its
-//! visibility is what the cut left of an instance: the evaluation takes instances of 0.5 and less for partial and asks nothing of
-//! them. So visibility here is [`Seen::inside_fraction`] as well; what *others* hide is another matter and stands in `record.json`.
-//! Rounding keeps the two alike: a share of a half or more rounds to 128 or more, and 128/255 is more than a half.
+//! A plant is partial if less than half of its pixels are within the frame. The original was cropped from larger
+//! images, and its visibility is the fraction of an instance that remained: the evaluation treats instances of 0.5 and
+//! less as partial and ignores them. So visibility is [`Seen::inside_fraction`] here as well. Occlusion by other plants
+//! does not count; it is in `record.json`. Rounding keeps both consistent: a fraction of one half or more rounds to 128
+//! or more, and 128/255 is more than one half.
 //!
-//! Source: Weyler et al. 2024, "PhenoBench", and its loader and evaluation, version 0.1.0. The loader's `make_unique_ids` changes a
-//! copy and so nothing: numbers are unique before it.
+//! Source: Weyler et al. 2024, "PhenoBench", and its loader and evaluation, version 0.1.0. The loader's
+//! `make_unique_ids` changes a copy and so has no effect: numbers are unique without it.
 
 use super::{Format, picture};
 use crate::model::recipe::{Recipe, Rendering};
@@ -31,10 +33,10 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "phenobench";
 
-/// Pixels across and down that `phenobench-eval` takes for granted where it judges boxes.
+/// Width and height in pixels that `phenobench-eval` assumes when it evaluates boxes.
 const SIZE: u32 = 1024;
 
-/// Share of a plant within the frame below which it is partial.
+/// Fraction within the frame below which a plant is partial.
 const PARTIAL: f64 = 0.5;
 
 impl Format for Writer {
@@ -68,30 +70,30 @@ impl Format for Writer {
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         let mut all = Vec::new();
         if recipe.labelling.classes.is_some() {
-            all.push("classes are soil, crop and weed, as `phenobench-eval` has them".into());
+            all.push("classes are soil, crop and weed, as `phenobench-eval` expects".into());
         }
         if (0..recipe.count).any(|k| recipe.split_of(k) == Split::Test) {
-            all.push("images of the split test have no labels, as in the original; `images/` and other formats have them".into());
+            all.push("images of the test set have no labels, as in the original; `images/` and other formats have them".into());
         }
         if let Ok(Rendering { width, height, .. }) = recipe.rendering()
             && (*width, *height) != (SIZE, SIZE)
         {
             all.push(format!(
-                "`phenobench-eval` judges boxes on {SIZE} × {SIZE} pixels, these images have {width} × {height}; the loader and the other \
-                 tasks do not mind"
+                "`phenobench-eval` evaluates boxes on {SIZE} × {SIZE} pixels, these images have {width} × {height}; the loader and \
+                 the other tasks accept any size"
             ));
         }
         all
     }
 }
 
-/// A crop leaf as the pictures tell it.
+/// Values of a crop leaf in the images.
 struct CropLeaf {
     number: u16,
     visibility: u8,
 }
 
-/// The crop leaves that the image shows by plant and leaf, numbered from 1.
+/// Returns the visible crop leaves by plant and leaf number, numbered from 1.
 fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u32, u16), CropLeaf>> {
     let mut all = BTreeMap::new();
     for (plant, leaf) in sample.record.leaves().filter(|(p, _)| p.class == Class::Crop) {
@@ -101,7 +103,8 @@ fn crop_leaves(sample: &Sample) -> Result<BTreeMap<(u32, u16), CropLeaf>> {
     Ok(all)
 }
 
-/// The plants' numbers as they are where 16 bits hold them, else counted from 1 in their order.
+/// Returns the plant number of each pixel: unchanged if all fit into 16 bits, otherwise renumbered from 1 in the same
+/// order.
 fn plant_numbers(sample: &Sample) -> Result<Vec<u16>> {
     let own: Option<Vec<u16>> = sample.plants.iter().map(|plant| u16::try_from(*plant).ok()).collect();
     if let Some(own) = own {
@@ -114,7 +117,7 @@ fn plant_numbers(sample: &Sample) -> Result<Vec<u16>> {
 }
 
 fn too_many(name: &str, what: &str) -> Error {
-    Error::input(format!("image {name} shows more than the {} {what} that PhenoBench's 16 bits number", u16::MAX)).help(format!("sow fewer plants, or leave out \
+    Error::input(format!("image {name} shows more than {} {what}, the maximum for the 16 bits of PhenoBench", u16::MAX)).help(format!("sow fewer plants, or omit \
          --format {FOLDER}"))
 }
 

@@ -1,22 +1,22 @@
-//! Pictures as formats store them: without a comment, so that equal pixels are equal bytes in every format.
+//! Image files of formats. They have no comment, so that equal pixels are equal bytes in every format.
 
 use crate::model::photo::Jpegs;
 use crate::{File, Sample};
 use furrow_base::Result;
 use furrow_output::Picture;
 
-/// A picture of a sample's size as a file.
+/// Returns an image of a sample's size as a PNG file.
 pub(super) fn file(sample: &Sample, path: String, picture: &Picture<'_>) -> Result<File> {
     let (width, height) = sample.size();
     Ok(File { path, bytes: furrow_output::encode_png(width, height, picture, "")? })
 }
 
-/// The photograph as it is stored in `images/`, PNG or JPEG; the path goes without the ending.
+/// Returns the colour image as it is stored in `images/`, PNG or JPEG; `path` has no extension.
 pub(super) fn photograph(sample: &Sample, path: &str) -> Result<File> {
     stored(sample, path, |jpeg| &jpeg.rgb, &Picture::Rgb(&sample.rgb))
 }
 
-/// The same of near infrared.
+/// Returns the near-infrared image in the same way.
 pub(super) fn near_infrared(sample: &Sample, path: &str) -> Result<File> {
     stored(sample, path, |jpeg| &jpeg.nir, &Picture::Gray(&sample.nir))
 }
@@ -28,12 +28,12 @@ fn stored(sample: &Sample, path: &str, of: impl Fn(&Jpegs) -> &Vec<u8>, picture:
     }
 }
 
-/// The photograph as PNG, however it is stored, for readers that know nothing else.
+/// Returns the colour image as PNG, for readers that support nothing else.
 pub(super) fn photograph_as_png(sample: &Sample, path: String) -> Result<File> {
     file(sample, path, &Picture::Rgb(&sample.rgb))
 }
 
-/// The photograph as JPEG: as it is stored, where it is; else of this quality.
+/// Returns the colour image as JPEG: as it is stored if it is a JPEG, otherwise encoded with this quality.
 pub(super) fn photograph_as_jpeg(sample: &Sample, path: String, quality: u8) -> Result<File> {
     let (width, height) = sample.size();
     let bytes = match &sample.jpeg {

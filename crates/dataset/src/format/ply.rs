@@ -1,16 +1,16 @@
-//! Point clouds: `ply/SPLIT/NAME.ply`, a point for each pixel that shows a surface, with colour and labels.
+//! Point clouds: `ply/SPLIT/NAME.ply`, one point for each pixel that shows a surface, with colour and labels.
 //!
-//! | property | type | is |
+//! | property | type | contents |
 //! |---|---|---|
-//! | `x y z` | float | the surface at the pixel's centre, world, metres |
-//! | `nx ny nz` | float | unit normal on the side that the camera sees; normal maps are not in it |
-//! | `red green blue nir` | uchar | the photograph |
+//! | `x y z` | float | the surface at the pixel's centre, world space, metres |
+//! | `nx ny nz` | float | unit normal on the visible side, without normal maps |
+//! | `red green blue nir` | uchar | the rendered image |
 //! | `class` | uchar | 0 soil, 1 crop, 2 weed |
-//! | `part` | uchar | what it is, with the numbers of the format `parts` |
-//! | `plant` | uint | number of `plants.png` |
-//! | `leaf` | ushort | number of `leaves.png` |
+//! | `part` | uchar | number of the part, as in the format `parts` |
+//! | `plant` | uint | number in `plants.png` |
+//! | `leaf` | ushort | number in `leaves.png` |
 //!
-//! Binary, little endian. Points are in the order of the pixels; a second image of the same field adds to the same world.
+//! Binary, little endian. Points are in the order of the pixels; all images of a field share one world space.
 //!
 //! Source: Turk 1994, "The PLY Polygon File Format".
 

@@ -1,13 +1,15 @@
-//! Skeletons of leaves: `skeletons/SPLIT/NAME.json`, the joints of each leaf's kinematic tree in the world and in the image.
+//! Skeletons of leaves: `skeletons/SPLIT/NAME.json`, the joints of each leaf's kinematic tree in the world and in the
+//! image.
 //!
 //! ```text
 //! { "plants": [ { "plant": 3, "id": 2711, "leaves": [ { "leaf": 1, "id": 93, "joints": [
 //!     { "name": "ST1", "parent": null, "world_m": [x, y, z], "pixel": [u, v] }, … ] } ] } ] }
 //! ```
 //!
-//! Names are those of Di Cicco et al. 2017: `ST1`… along the petiole, `B` the blade's base, `VN1`… along the midrib, `PK` its tip, and
-//! `STL1`, `STR1`… half-way out on the secondary veins left and right of `VN1`… `parent` is a place in the same list. `pixel` is null
-//! behind the camera; it may lie outside the image, and what lies there may be hidden. Plants and leaves are those of `record.json`.
+//! Names are those of Di Cicco et al. 2017: `ST1`… along the petiole, `B` the base of the blade, `VN1`… along the
+//! midrib, `PK` its tip, and `STL1`, `STR1`… half-way out on the secondary veins left and right of `VN1`… `parent` is
+//! an index in the same list. `pixel` is null behind the camera; it may be outside the image, and the joint may be
+//! occluded. Plants and leaves are those of `record.json`.
 
 use super::Format;
 use crate::model::recipe::{Recipe, json};
@@ -76,9 +78,9 @@ impl Format for Writer {
     }
 }
 
-/// The joints of a leaf; none of a model's.
+/// Returns the joints of a leaf; none for a leaf of a model.
 fn joints(rendered: &Rendered, plant: u32, leaf: u16) -> &[PlacedJoint] {
-    // By rising number, as they are made.
+    // Plants are sorted by number.
     let place = rendered.plants.binary_search_by_key(&plant, |grown| grown.number);
     let axis = place.ok().and_then(|place| rendered.plants.get(place)).and_then(|grown| grown.leaf_axes.iter().find(|axis| axis.leaf == leaf));
     axis.map_or(&[], |axis| &axis.joints)

@@ -1,10 +1,12 @@
-//! What phenotyping measures, one row each: `plants.csv`, `leaves.csv`, `images.csv`, and leaves once more as `leaves.parquet`; plants and
-//! images as Parquet stand beside every dataset ([`crate::index`]).
+//! Phenotypic traits: `plants.csv`, `leaves.csv`, `images.csv` with one row each, and leaves also as `leaves.parquet`.
+//! Plants and images are in Parquet tables beside every dataset ([`crate::index`]).
 //!
-//! Areas, lengths and angles are those of [`furrow_field::traits`], of what grew, whether it is seen or not; plants and leaves that an image
-//! neither shows nor hides have no row. `visible_area_m2` is a leaf's area times the share of its pixels that the image shows: right
-//! for a leaf that is held alike all over. Cells of what is not known (models, imported images) are empty. The first row names the columns; the
-//! first columns tell the image that a row is of (`dataset/index/origin.rs`).
+//! Areas, lengths and angles are those of [`furrow_field::traits`]: of the grown plants, visible or not. Plants and
+//! leaves that are neither visible nor occluded in an image have no row. `visible_area_m2` is a leaf's area times the
+//! visible fraction of its pixels, which is exact for a leaf with the same inclination everywhere.
+//!
+//! Cells of unknown values (models, imported images) are empty. The first row names the columns; the first columns
+//! identify the image of a row (`index/origin.rs`).
 
 use super::{Format, Whole};
 use crate::index::leaves;
@@ -94,22 +96,22 @@ impl Format for Writer {
     }
 }
 
-/// A table under way.
+/// A table that is being written.
 struct Table<'s, 'f>(csv::Writer<&'s mut Stream<'f>>);
 
 impl Table<'_, '_> {
-    /// Adds a row that is about an image.
+    /// Adds a row about an image.
     fn row(&mut self, origin: &Origin<'_>, row: impl Serialize) -> Result<()> {
         self.0.serialize((origin, row)).map_err(failed)
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` hands over")]
+#[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error by value")]
 fn failed(error: csv::Error) -> Error {
     Error::failed(format!("a table of {FOLDER} cannot be written: {error}"))
 }
 
-/// The names of the columns that a `T` fills, with commas between.
+/// Returns the names of the columns of a row `T`, separated by commas.
 fn columns<T: Serialize + Default>() -> Result<Vec<u8>> {
     let mut names = csv::Writer::from_writer(Vec::new());
     names.serialize(T::default()).map_err(failed)?;
@@ -125,7 +127,7 @@ fn table<T: Serialize + Default>(
     name: &str,
     rows: impl Fn(&Record, &Origin<'_>, &mut Table<'_, '_>) -> Result<()>,
 ) -> Result<()> {
-    // Names are written with the first row; a table without rows has them too.
+    // The writer would add names only with a first row, but a table without rows needs them too.
     let names = [columns::<Origin<'_>>()?, columns::<T>()?].join(&b',');
     out.file(&format!("{FOLDER}/{name}"), |stream| {
         stream.put(names)?;
@@ -143,7 +145,7 @@ impl<'a> PlantRow<'a> {
     fn of(plant: &'a Plant) -> Self {
         let grown = plant.grown.as_ref();
         let place = |axis: usize| grown.map(|grown| grown.position_m[axis]);
-        // A model has neither a code nor an age.
+        // Models have neither an EPPO code nor an age.
         let aged = grown.filter(|grown| !grown.eppo.is_empty());
         let traits = grown.and_then(|grown| grown.traits);
         Self {

@@ -1,7 +1,8 @@
-//! Trajectories of the TUM RGB-D benchmark: `FIELD-CAMERA.txt`, one image a line: time, x y z, quaternion x y z w.
+//! Trajectories of the TUM RGB-D benchmark: `FIELD-CAMERA.txt`, one image per line: time, x y z, quaternion x y z w.
 //!
-//! Poses take the camera's frame (x right, y down, z forward) to the world; seconds and metres. A scene file's `path: Poses("…")` reads
-//! them again. A rolling shutter cannot be told; poses are those of the middle row.
+//! Poses map the camera's frame (x right, y down, z forward) to world space; units are seconds and metres.
+//! `path: Poses("…")` in a scene file reads them. The format cannot represent a rolling shutter; poses are those of the
+//! middle row.
 //!
 //! Source: Sturm et al. 2012, "A benchmark for the evaluation of RGB-D SLAM systems"; its page "File formats".
 

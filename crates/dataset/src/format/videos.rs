@@ -1,10 +1,12 @@
-//! Sequences in COCO files: a video for each camera of each field, whose frames count on over the field's days, as the text files of MOTS do.
+//! Sequences in COCO files: one video for each camera of each field. Its frames are numbered over all days of the
+//! field, as in the text files of MOTS.
 //!
-//! An entry has `id`, `name` (that of the file of MOTS), `width` and `height`. Ids count from 1 through the cameras of a field, in the order of its scene
-//! file, then through the fields: they depend neither on the split nor on how many fields there are.
+//! An entry has `id`, `name` (that of the MOTS file), `width` and `height`. Ids are numbered from 1 over the cameras of
+//! a field, in the order of the scene file, then over the fields: they depend neither on the split nor on the number of
+//! fields.
 //!
-//! Source: Yang, Fan & Xu 2019, "Video instance segmentation" (YouTube-VIS); Dave et al. 2020, "TAO: A large-scale benchmark for tracking any
-//! object"; MMTracking, `CocoVID`.
+//! Source: Yang, Fan & Xu 2019, "Video instance segmentation" (YouTube-VIS); Dave et al. 2020, "TAO: A large-scale
+//! benchmark for tracking any object"; MMTracking, `CocoVID`.
 
 use crate::model::record::CaptureRecord;
 use crate::model::split::Split;
@@ -12,16 +14,16 @@ use crate::read::set::Set;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
 
-/// The videos of a dataset of drives, rigs or days.
+/// Videos of a dataset with drives, rigs or days.
 pub(super) struct Videos {
-    /// Names of the cameras that see each field.
+    /// Names of the cameras, which are the same in each field.
     cameras: Vec<String>,
-    /// Width and height of their images, pixels.
+    /// Width and height of the images, pixels.
     size: [u32; 2],
 }
 
 impl Videos {
-    /// Those of a dataset; `None` where each image is of a field of its own.
+    /// Returns the videos of a dataset; `None` if each image shows another field.
     pub(super) fn of(set: &Set) -> Result<Option<Self>> {
         if !set.recipe.has_sequences() {
             return Ok(None);
@@ -30,7 +32,7 @@ impl Videos {
         for index in 0..set.recipe.captures().min(set.recipe.count) {
             let record = set.record(index)?;
             let Some(CaptureRecord { camera, .. }) = record.capture else { break };
-            // All cameras of a frame come before those of the next.
+            // The images of all cameras of a frame precede those of the next frame.
             if all.cameras.contains(&camera) {
                 break;
             }
@@ -40,12 +42,12 @@ impl Videos {
         Ok(Some(all))
     }
 
-    /// The id of the video that an image belongs to.
+    /// Returns the id of the video that an image belongs to.
     pub(super) fn id(&self, capture: &CaptureRecord) -> Result<u64> {
         let place = self.cameras.iter().position(|name| *name == capture.camera).ok_or_else(|| {
             let known = self.cameras.join(", ");
             Error::damaged(format!(
-                "field {} was taken by a camera `{}`, and the first field by {known}",
+                "field {} has a camera `{}`, but the first field has {known}",
                 capture.field, capture.camera
             ))
         })?;
@@ -56,14 +58,14 @@ impl Videos {
         field.saturating_mul(self.cameras.len() as u64).saturating_add(camera + 1)
     }
 
-    /// The entries of a split, field by field.
+    /// Returns the entries of a split, field by field.
     pub(super) fn entries(&self, set: &Set, split: Split) -> impl Iterator<Item = Result<Value>> {
         let (recipe, captures) = (&set.recipe, set.recipe.captures());
         let [width, height] = self.size;
         let fields = 0..recipe.count.div_ceil(captures);
         let fields = fields.filter(move |field| recipe.split_of(field * captures) == split);
         fields.flat_map(move |field| {
-            // Of the last field some images may be left out.
+            // The last field may have fewer images.
             let images = recipe.count - field * captures;
             let entry = move |(camera, name): (u64, &String)| {
                 let name = format!("{}-{name}", Set::name(field));

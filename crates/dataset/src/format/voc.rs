@@ -1,11 +1,12 @@
 //! Pascal VOC: `VOCdevkit/VOC2012` with boxes as XML and masks of classes and objects, for torchvision and supervision.
 //!
-//! Boxes count pixels from 1 and hold their last ones. Numbers of `SegmentationClass` are 0 for soil and then the classes, of `SegmentationObject` the
-//! objects of the XML file in its order; 255 is void: no label, or an object behind the 254th. Photographs are JPEG,
-//! for readers look for `.jpg`: of quality 95 unless the dataset's are JPEG themselves. Lists of names are `train.txt`, `val.txt`, `trainval.txt` and `test.txt`.
+//! Boxes count pixels from 1 and include their last ones. Numbers in `SegmentationClass` are 0 for soil and then the
+//! classes; numbers in `SegmentationObject` are the objects of the XML file in its order. 255 is void: no label, or an
+//! object after the 254th. Images are JPEG, since readers search for `.jpg`: of quality 95 unless the dataset stores
+//! JPEG. `train.txt`, `val.txt`, `trainval.txt` and `test.txt` list the names of images.
 //!
-//! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and 5; colours are those of its
-//! `VOClabelcolormap`.
+//! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and
+//! 5; colours are those of its `VOClabelcolormap`.
 
 use super::{Format, Whole, picture};
 use crate::format::labels::Labels;
@@ -24,13 +25,13 @@ use std::fmt::Write;
 pub(super) struct Writer;
 
 const FOLDER: &str = "voc/VOCdevkit/VOC2012";
-/// Quality of the photographs.
+/// Quality of the JPEG images, of 100.
 const QUALITY: u8 = 95;
-/// Most objects that a mask numbers.
+/// Maximum number of objects in a mask.
 const MOST: usize = 254;
-/// Share of a plant beyond the frame from which on it counts as truncated.
+/// Fraction within the frame below which a plant counts as truncated.
 const TRUNCATED: f64 = 0.95;
-/// Share that is seen below which a plant is difficult: scores pass over it.
+/// Visible fraction below which a plant counts as difficult; evaluations ignore it.
 const DIFFICULT: f64 = 0.2;
 
 impl Format for Writer {
@@ -49,7 +50,7 @@ impl Format for Writer {
             let class = labels.classes().get(usize::from(class)).map(|class| class.name.as_str()).unwrap_or_default();
             let truncated = u8::from(plant.seen.inside_fraction() < TRUNCATED);
             let difficult = u8::from(plant.seen.shown_fraction() < DIFFICULT);
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
                 "\t<object><name>{}</name><pose>Unspecified</pose><truncated>{truncated}</truncated><difficult>{difficult}</difficult>\
@@ -102,17 +103,18 @@ impl Format for Writer {
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         let lossless = recipe.photo() == Photo::Png;
-        let words = || "photographs are JPEG, as its readers expect; those in images/ have lost nothing".to_owned();
+        let words = || "images are JPEG, as its readers expect; those in images/ are lossless".to_owned();
         lossless.then(words).into_iter().collect()
     }
 }
 
-/// A word within XML.
+/// Escapes text for XML.
 fn escaped(word: &str) -> String {
     word.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The kit's colours: the bits of a number from the lowest on, three by three, are those of R, G, B from the highest on.
+/// Returns the kit's colours. The bits of a number, from the lowest, are assigned in groups of three to R, G and B,
+/// starting with the highest bit of each.
 fn colors() -> Vec<[u8; 3]> {
     let channel = |number: u8, of: u8| (0..3).map(|k| (number >> (3 * k + of).min(7) & u8::from(3 * k + of < 8)) << (7 - k)).sum();
     (0..=u8::MAX).map(|number| [0, 1, 2].map(|of| channel(number, of))).collect()
@@ -122,7 +124,7 @@ fn colors() -> Vec<[u8; 3]> {
 mod tests {
     use super::*;
 
-    /// Expected: the first colours of the development kit's list, and that of void.
+    /// Expected: the first colours in the development kit's list, and the colour of void.
     #[test]
     fn colours_are_those_of_the_kit() {
         let colors = colors();

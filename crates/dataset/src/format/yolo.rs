@@ -1,11 +1,15 @@
-//! YOLO segmentation: a polygon a plant, with what is lost by it; Ultralytics and supervision read it.
+//! YOLO segmentation: one polygon per plant, with its loss of accuracy; Ultralytics and supervision read it.
 //!
-//! A row is a plant: its class (0 crop, 1 weed), then x and y of a polygon's corners, shares of the image's width and height. The
-//! polygon runs along the borders of the plant's pixels, so boxes that readers take from it are the plant's. The format has one closed polygon
-//! a plant and neither holes nor parts; they are joined by cuts, and `loss.json` tells for every plant the intersection over union of its mask and
-//! what Ultralytics paints, with the mean and the worst. Leaves, which a plant's row cannot tell, are left out.
+//! A row is a plant: its class (0 crop, 1 weed), then x and y of a polygon's corners, as fractions of the image's width
+//! and height. The polygon runs along the borders of the plant's pixels, so boxes that readers derive from it are the
+//! plant's.
 //!
-//! Source: Ultralytics documentation, "Instance Segmentation Datasets Overview"; ultralytics 8.4.190; supervision 0.31.2.
+//! The format has one closed polygon per plant, without holes or separate parts; these are joined by cuts. `loss.json`
+//! has for every plant the intersection over union of its mask and the pixels that Ultralytics paints, with the mean
+//! and the worst value. Leaves are omitted, since a plant's row cannot represent them.
+//!
+//! Source: Ultralytics documentation, "Instance Segmentation Datasets Overview"; ultralytics 8.4.190; supervision
+//! 0.31.2.
 
 use super::outline::{Corner, Mask};
 use super::{Format, Whole, boxes};
@@ -23,12 +27,12 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "yolo";
 
-/// What is lost of a plant.
+/// Loss of accuracy for a plant.
 #[derive(Serialize, Deserialize)]
 struct Loss {
     /// Number of the plant in `plants.png`.
     plant: u32,
-    /// Intersection over union of its mask and what Ultralytics paints.
+    /// Intersection over union of its mask and the pixels that Ultralytics paints.
     iou: f64,
 }
 
@@ -68,7 +72,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let polygons = "a plant is one polygon, holes and parts are joined by cuts, leaves are left out; loss.json tells what is lost of \
+        let polygons = "a plant is one polygon: holes and separate parts are joined by cuts, leaves are omitted; loss.json has the loss of \
                         each plant";
         [vec![polygons.into()], boxes::warnings(recipe)].concat()
     }
@@ -81,7 +85,7 @@ fn loss_path(split: &str, name: &str) -> String {
 fn losses(set: &Set, split: Split, name: &str) -> Result<Vec<Loss>> {
     let path = set.folder.join(loss_path(split.name(), name));
     let bytes = furrow_base::input::contents(&path).map_err(Error::reading(&path))?;
-    serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("this is no list of losses: {e}")).in_file(path))
+    serde_json::from_slice(&bytes).map_err(|e| Error::damaged(format!("these are not losses: {e}")).in_file(path))
 }
 
 fn mask(sample: &Sample, plant: &Plant) -> Option<Mask> {
@@ -89,7 +93,7 @@ fn mask(sample: &Sample, plant: &Plant) -> Option<Mask> {
     plant.seen.bounds.map(|bounds| Mask::new(bounds, |x, y| sample.plants[(y * width + x) as usize] == plant.number))
 }
 
-/// All plants' losses as they pass.
+/// Running statistics of the losses of all plants.
 #[derive(Default)]
 struct Sum {
     plants: u64,
@@ -100,7 +104,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Counts a plant; returns what is told of it.
+    /// Adds a plant, and returns its entry in `loss.json`.
     fn add(&mut self, split: Split, name: &str, loss: &Loss) -> serde_json::Value {
         let Loss { plant, iou } = *loss;
         let told = serde_json::json!({ "image": name, "split": split.name(), "plant": plant, "iou": iou });

@@ -1,7 +1,8 @@
-//! YOLO detection: a box a plant, for Ultralytics and supervision.
+//! YOLO detection: one box per plant, for Ultralytics and supervision.
 //!
-//! A row is a plant: its class (0 crop, 1 weed), then its box's middle, width and height, shares of the image's. A box holds the plant's
-//! pixels whole, from their left and upper borders to their right and lower ones.
+//! A row is a plant: its class (0 crop, 1 weed), then centre, width and height of its box, as fractions of the image's
+//! width and height. A box contains the plant's pixels entirely, from their left and upper borders to their right and
+//! lower ones.
 //!
 //! Source: Ultralytics documentation, "Object Detection Datasets Overview".
 

@@ -1,10 +1,11 @@
-//! YOLO pose: a box a plant with its keypoints, for Ultralytics.
+//! YOLO pose: one box per plant with its keypoints, for Ultralytics.
 //!
-//! A row is a plant: class (0 crop, 1 weed), box, and 17 keypoints of three numbers each: the stem, where it meets the ground, then the tips of
-//! leaves 1 to 16 in the order in which they appeared, seed leaves first. x and y are shares of the image's width and height; the third is 2 in
-//! sight, 1 behind something, and 0 outside the image or where there is none, x and y being 0 then too. Leaves beyond the sixteenth are left out.
+//! A row is a plant: class (0 crop, 1 weed), box, and 17 keypoints of three numbers each: the stem, where it meets the
+//! ground, then the tips of leaves 1 to 16 in order of appearance, cotyledons first. x and y are fractions of the
+//! image's width and height. The third number is 2 for a visible point and 1 for an occluded one. All three are 0
+//! outside the image and for missing points. Leaves beyond the sixteenth are omitted.
 //!
-//! Source: Ultralytics documentation, "Pose Estimation Datasets Overview"; 17 keypoints are what its pretrained networks have.
+//! Source: Ultralytics documentation, "Pose Estimation Datasets Overview"; its pretrained networks have 17 keypoints.
 
 use super::{Format, Whole, boxes};
 use furrow_base::Result;
@@ -19,7 +20,7 @@ pub(super) struct Writer;
 
 const FOLDER: &str = "yolo-pose";
 
-/// Leaves whose tips a row has.
+/// Number of leaves whose tips are in a row.
 const TIPS: u16 = 16;
 
 impl Format for Writer {
@@ -42,7 +43,7 @@ impl Format for Writer {
     fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
         let count = 1 + TIPS;
         let list = |of: &dyn Fn(u16) -> String| (0..count).map(of).collect::<Vec<_>>().join(", ");
-        // A mirrored leaf has the number that it had.
+        // Leaves keep their numbers when an image is mirrored.
         let same = list(&|k| k.to_string());
         let names = list(&|k| if k == 0 { "stem".to_owned() } else { format!("tip {k}") });
         let classes = Labels::of(&set.recipe)?.of_plants().len();
@@ -57,13 +58,13 @@ impl Format for Writer {
     }
 }
 
-/// A plant's keypoints.
+/// Returns a plant's keypoints.
 fn points(plant: &Plant) -> impl Iterator<Item = Option<Keypoint>> + '_ {
     let tip = |number| plant.leaves.iter().find(|leaf| leaf.number == number).and_then(|leaf| leaf.tip);
     std::iter::once(plant.stem).chain((1..=TIPS).map(tip))
 }
 
-/// A keypoint's place, and what a row says of its being seen.
+/// Returns a keypoint's position, and the text of its visibility in a row.
 fn told(point: Option<Keypoint>) -> ((f64, f64), &'static str) {
     let seen = match point.map(|point| point.state) {
         Some(PointState::Visible) => " 2",

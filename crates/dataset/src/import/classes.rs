@@ -1,22 +1,22 @@
-//! Which of a source's numbers, colours or names mean soil, crop and weed.
+//! Mapping from a source's numbers, colours or category names to soil, crop and weed.
 
 use crate::model::sample::IGNORE;
 use furrow_render::scene::tag::Class;
 use std::collections::BTreeMap;
 
-/// What a label of a source means.
+/// Meaning of a label of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
     /// A class.
     Class(Class),
-    /// A leaf of a plant that has a label of its own (COCO only).
+    /// A leaf whose plant has its own label (COCO only).
     Leaf,
     /// No label.
     Ignore,
 }
 
 impl Meaning {
-    /// Its number in `semantics.png`; leaves are told by their plants.
+    /// Returns its number in `semantics.png`; [`IGNORE`] for leaves, whose class is that of their plant.
     pub fn number(self) -> u8 {
         match self {
             Self::Class(class) => class as u8,
@@ -24,7 +24,7 @@ impl Meaning {
         }
     }
 
-    /// Reads `soil`, `crop`, `weed`, `leaf` or `ignore`.
+    /// Parses `soil`, `crop`, `weed`, `leaf` or `ignore`.
     pub fn named(word: &str) -> Option<Self> {
         match word {
             "ignore" => Some(Self::Ignore),
@@ -34,12 +34,12 @@ impl Meaning {
     }
 }
 
-/// Meanings by name: of numbers, or of categories.
+/// Meanings by number or category name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names(pub BTreeMap<String, Meaning>);
 
 impl Names {
-    /// Reads `0=soil,1=crop,2=weed`.
+    /// Parses a list such as `0=soil,1=crop,2=weed`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut all = BTreeMap::new();
         for pair in text.split(',') {
@@ -51,7 +51,7 @@ impl Names {
         Ok(Self(all))
     }
 
-    /// As it was written, sorted.
+    /// Returns a text of the mapping, sorted by name.
     pub fn words(&self) -> String {
         format!("{:?}", self.0)
     }
@@ -62,14 +62,14 @@ impl Names {
 pub struct Colors(pub BTreeMap<[u8; 3], Meaning>);
 
 impl Colors {
-    /// Reads `0,255,0=crop;255,0,0=weed;0,0,0=soil`.
+    /// Parses a list such as `0,255,0=crop;255,0,0=weed;0,0,0=soil`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut all = BTreeMap::new();
         for pair in text.split(';') {
             let (color, meaning) = pair_of(pair)?;
             let numbers: Option<Vec<u8>> = color.split(',').map(|n| n.trim().parse().ok()).collect();
             let color: [u8; 3] = numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| {
-                format!("`{color}` is no colour: write three numbers from 0 to 255, such as 0,255,0=crop")
+                format!("`{color}` is not a colour: write three numbers from 0 to 255, such as 0,255,0=crop")
             })?;
             if all.insert(color, meaning).is_some() {
                 return Err(format!("the colour {color:?} is named twice"));

@@ -1,9 +1,10 @@
-//! COCO instances: masks of plants, and of leaves where it has them, as polygons or run lengths; keypoints by the names stem, base, tip. Leaves may
-//! stand in `leaves_SPLIT.json` beside `instances_SPLIT.json`.
+//! Source for COCO instances: masks of plants and optionally of leaves, as polygons or run lengths; keypoints named
+//! stem, base and tip. Leaves may be in a separate `leaves_SPLIT.json` beside `instances_SPLIT.json`.
 //!
-//! What no mask covers is soil. Where masks overlap, the smaller lies on top. A leaf belongs to the plant that most of it lies on. A crowd
-//! (`iscrowd` 1) has a class and no instance. Polygons hold the pixels whose centres lie inside, by the even-odd rule; the
-//! reference implementation may put a pixel on the outline otherwise. Source: COCO data format, <https://cocodataset.org/#format-data>.
+//! Pixels without a mask are soil. Where masks overlap, the smaller one is on top. A leaf belongs to the plant that
+//! contains most of its pixels. A crowd (`iscrowd` 1) has a class and no instance. A polygon contains the pixels whose
+//! centres are inside by the even-odd rule; the reference implementation may decide otherwise for pixels on the
+//! outline. Source: COCO data format, <https://cocodataset.org/#format-data>.
 
 use super::classes::{Meaning, Names};
 use super::files::{length, same_size};
@@ -23,31 +24,31 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Images with their annotations.
+/// A source of images with COCO annotations.
 pub struct Coco {
     listed: Vec<Listed>,
     images: Vec<Annotated>,
     words: String,
 }
 
-/// An image and what is drawn on it.
+/// An image and its annotations.
 struct Annotated {
     path: PathBuf,
     size: (u32, u32),
     things: Vec<Thing>,
 }
 
-/// A plant, a leaf, a crowd, a patch without a label.
+/// An annotation: a plant, a leaf, a crowd or an unlabelled area.
 struct Thing {
     id: u64,
-    /// The file that says so.
+    /// The file that contains the annotation.
     document: Arc<Path>,
     meaning: Meaning,
     crowd: bool,
-    /// Number of its plant, where its maker told it.
+    /// Number of its plant, from the attribute `plant` if present.
     plant: Option<u32>,
     segmentation: Segmentation,
-    /// Stem, base, tip.
+    /// Keypoints stem, base and tip.
     points: [Option<Keypoint>; 3],
 }
 
@@ -89,7 +90,7 @@ struct Category {
     keypoints: Vec<String>,
 }
 
-/// A mask as COCO writes it.
+/// A mask in one of COCO's encodings.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Segmentation {
@@ -99,9 +100,9 @@ enum Segmentation {
 }
 
 impl Coco {
-    /// Opens a file of annotations, or a folder with `annotations/instances_SPLIT.json`. Images lie in `images`, or in its folder of the
-    /// split; without it in `images` beside the annotations. `classes` tells what categories mean; without it they are called
-    /// soil, crop, weed and leaf.
+    /// Opens a file of annotations, or a folder with `annotations/instances_SPLIT.json`. The images are in `images` or
+    /// in its subfolder of the split; if `images` is `None`, in the folder `images` beside the annotations. `classes`
+    /// gives the meanings of the categories; without it, the categories must be named soil, crop, weed or leaf.
     pub fn open(from: &Path, images: Option<&Path>, classes: Option<&Names>) -> Result<Self> {
         let mut all =
             Self { listed: Vec::new(), images: Vec::new(), words: format!("{:?}\n", classes.map(Names::words)) };
@@ -112,10 +113,10 @@ impl Coco {
         }
         found.sort_by(|a, b| a.0.cmp(&b.0));
         if let Some(pair) = found.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            return Err(Error::input("it is listed twice").in_file(&pair[0].1.path));
+            return Err(Error::input("this image is listed twice").in_file(&pair[0].1.path));
         }
         if found.is_empty() {
-            return Err(Error::input("there are no images in it").in_file(from));
+            return Err(Error::input("it lists no images").in_file(from));
         }
         for (one, image) in found {
             let _ = writeln!(all.words, "{one:?} {}", length(&image.path)?);
@@ -125,7 +126,7 @@ impl Coco {
         Ok(all)
     }
 
-    /// The images of one file, with the leaves of the file beside it.
+    /// Reads the images of one annotation file, including the leaves of the file beside it.
     fn document(
         &mut self,
         split: Option<Split>,
@@ -145,7 +146,7 @@ impl Coco {
             let image = of_split.map_or_else(|| named(folder), Ok)?;
             if !image.is_file() {
                 let what = format!("its image {} is missing", image.display());
-                return Err(instances.wrong(what).help("say where images lie with --images"));
+                return Err(instances.wrong(what).help("give the folder of the images with --images"));
             }
             let annotated = Annotated { path: image, size: (*width, *height), things: Vec::new() };
             if found.insert(*id, (Listed { split, name: file_name.clone() }, annotated)).is_some() {
@@ -160,7 +161,7 @@ impl Coco {
     }
 }
 
-/// A file of annotations that was read.
+/// A parsed annotation file.
 struct Read {
     path: PathBuf,
     bytes: Vec<u8>,
@@ -179,7 +180,7 @@ impl Read {
         Error::input(what).in_file(&self.path)
     }
 
-    /// Gives images what it says of them.
+    /// Adds the annotations to their images.
     fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<u64, (Listed, Annotated)>) -> Result<()> {
         let annotations = std::mem::take(&mut self.document.annotations);
         let mut kinds: BTreeMap<u64, (Meaning, &[String])> = BTreeMap::new();
@@ -221,14 +222,15 @@ impl Read {
     }
 }
 
-/// The file of leaves beside one of instances, if there is one: `leaves_train.json` beside `instances_train.json`.
+/// Returns the file of leaves beside a file of instances, if it exists: `leaves_train.json` beside
+/// `instances_train.json`.
 fn leaves_beside(path: &Path) -> Option<PathBuf> {
     let split = path.file_name()?.to_str()?.strip_prefix("instances_")?;
     Some(path.with_file_name(format!("leaves_{split}"))).filter(|leaves| leaves.is_file())
 }
 
-/// An annotation by its id and the line where that stands, as the beginning of a sentence. Only annotations are looked through, for images
-/// have ids as well.
+/// Returns the beginning of an error message: an annotation with its id and line. Searches only behind the key
+/// `annotations`, since images have ids too.
 fn named(id: u64, document: &[u8]) -> String {
     let text = String::from_utf8_lossy(document);
     let from = text.find("\"annotations\"").unwrap_or(0);
@@ -240,7 +242,7 @@ fn named(id: u64, document: &[u8]) -> String {
     format!("annotation {id}{line} ")
 }
 
-/// The files of annotations, each with its split where its name tells one.
+/// Returns the annotation files, each with the split in its name, if any.
 fn documents(from: &Path) -> Result<Vec<(Option<Split>, PathBuf)>> {
     if from.is_file() {
         return Ok(vec![(None, from.into())]);
@@ -248,21 +250,21 @@ fn documents(from: &Path) -> Result<Vec<(Option<Split>, PathBuf)>> {
     let file = |split: Split| from.join("annotations").join(format!("instances_{}.json", split.name()));
     let found: Vec<_> = Split::ALL.into_iter().map(|s| (Some(s), file(s))).filter(|(_, path)| path.is_file()).collect();
     if found.is_empty() {
-        return Err(Error::input("there is no annotations/instances_train.json, …_val.json or …_test.json in it")
+        return Err(Error::input("it does not contain annotations/instances_train.json, …_val.json or …_test.json")
             .in_file(from)
             .help("give --from such a folder or one JSON file"));
     }
     Ok(found)
 }
 
-/// Where the images of a file lie unless one says otherwise.
+/// Returns the default folder of the images of an annotation file.
 fn beside(from: &Path, document: &Path) -> PathBuf {
     let root = if from.is_file() { document.parent().unwrap_or(Path::new(".")) } else { from };
     let images = root.join("images");
     if images.is_dir() { images } else { root.into() }
 }
 
-/// The keypoint of this name, where the annotation has it.
+/// Returns the keypoint with this name, if the annotation has it.
 fn point(names: &[String], name: &str, values: &[f32]) -> Option<Keypoint> {
     let at = names.iter().position(|n| n == name)?;
     let [x, y, v] = values.as_chunks::<3>().0.get(at)?;
@@ -299,7 +301,7 @@ impl Source for Coco {
 
 type Points = BTreeMap<(u32, u16), [Option<Keypoint>; 3]>;
 
-/// Classes, plants and leaves of an image, and their points.
+/// Rasterizes the annotations of an image. Returns the classes, the plants and leaves, and their keypoints.
 fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
     let (w, h) = image.size;
     let n = w as usize * h as usize;
@@ -324,7 +326,7 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
             *votes.entry(plants[*i as usize]).or_default() += 1;
         }
         votes.remove(&0);
-        // Of equal ones the first.
+        // If plants have equal votes, takes the one with the lowest number.
         let owner =
             votes.into_iter().max_by_key(|(plant, n)| (*n, std::cmp::Reverse(*plant))).map_or(0, |(plant, _)| plant);
         owners[*k] = owner;
@@ -338,7 +340,7 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
     }
     let mut found = instances(&image.path, &semantics, &plants, &leaves)?;
     if beyond > 0 {
-        found.warnings.push(format!("{beyond} pixels of leaves lie beyond their plants: they were taken from them"));
+        found.warnings.push(format!("{beyond} pixels of leaves are outside their plants and were removed"));
     }
     let mut points = Points::new();
     for (k, thing) in image.things.iter().enumerate() {
@@ -351,7 +353,8 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
     Ok((semantics, found, points))
 }
 
-/// Numbers of plants, 0 for what is none: those that their maker gave if they are all there and differ, else from 1.
+/// Returns the plant number of each annotation, 0 for other annotations. Uses the numbers in the attributes if all
+/// plants have different ones, otherwise counts from 1.
 fn plant_numbers(things: &[Thing]) -> Vec<u32> {
     let is_plant = |t: &Thing| !t.crowd && matches!(t.meaning, Meaning::Class(Class::Crop | Class::Weed));
     let told: Vec<u32> = things.iter().filter(|t| is_plant(t)).filter_map(|t| t.plant).collect();
@@ -368,7 +371,7 @@ fn plant_numbers(things: &[Thing]) -> Vec<u32> {
     things.iter().map(number).collect()
 }
 
-/// The pixels of a mask, as places in the image row by row.
+/// Returns the pixels of a mask, as indices into the image row by row.
 fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     let (w, h) = image.size;
     let wrong = |what: String| {
@@ -386,35 +389,35 @@ fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
     Ok(rle.pixels().map_err(|e| wrong(e.to_string()))?.map(|pixel| pixel as u32).collect())
 }
 
-/// The pixels whose centres lie in an odd number of the polygons' windings, in the order of their places. The work grows with the rows that
-/// edges cross, not with the image.
+/// Returns the pixels whose centres are inside at least one of the polygons by the even-odd rule, by ascending index.
+/// The time depends on the rows that edges cross, not on the size of the image.
 fn inside(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
     let mut crossings: Vec<Crossing> = polygons.iter().enumerate().flat_map(|(k, p)| crossings(h, k, p)).collect();
     crossings.sort_by(|a, b| (a.row, a.polygon).cmp(&(b.row, b.polygon)).then(a.x.total_cmp(&b.x)));
     let mut all = Vec::new();
     for line in crossings.chunk_by(|a, b| (a.row, a.polygon) == (b.row, b.polygon)) {
         for [from, to] in line.as_chunks::<2>().0 {
-            // Pixels with a centre from one crossing to the next.
+            // The pixels whose centres are between the two crossings.
             let first = (from.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
             let end = (to.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
             all.extend((first..end).map(|x| from.row * w + x));
         }
     }
-    // Parts of one thing may lie on each other.
+    // Polygons of one annotation may overlap.
     all.sort_unstable();
     all.dedup();
     all
 }
 
-/// Where a polygon crosses the middle of a row.
+/// A point where a polygon crosses the centre line of a row.
 struct Crossing {
     row: u32,
-    /// Which of the polygons.
+    /// Index of the polygon.
     polygon: usize,
     x: f64,
 }
 
-/// Where polygon number `polygon` crosses the rows of an image of `h` rows, edge by edge.
+/// Returns the crossings of polygon `polygon` with the rows of an image of `h` rows, edge by edge.
 fn crossings(h: u32, polygon: usize, corners: &[f64]) -> Vec<Crossing> {
     let points = corners.as_chunks::<2>().0;
     let mut all = Vec::new();
@@ -430,7 +433,8 @@ fn crossings(h: u32, polygon: usize, corners: &[f64]) -> Vec<Crossing> {
     all
 }
 
-/// The rows that an edge from height `y0` to `y1` may cross: those between, and one beyond each end against rounding.
+/// Returns the rows that an edge from height `y0` to `y1` may cross, extended by one row at each end because of
+/// rounding.
 fn rows(h: u32, y0: f64, y1: f64) -> std::ops::Range<u32> {
     let held = |y: f64| y.clamp(0.0, f64::from(h)) as u32;
     held((y0.min(y1) - 1.5).floor())..held((y0.max(y1) + 0.5).ceil())
@@ -444,10 +448,10 @@ mod tests {
     fn a_polygon_holds_the_pixels_whose_centres_lie_in_it() {
         let square = vec![1.0, 1.0, 3.0, 1.0, 3.0, 3.0, 1.0, 3.0];
         assert_eq!(inside(5, 4, std::slice::from_ref(&square)), [6, 7, 11, 12]);
-        // A second part, of one pixel, outside the image in part.
+        // A second polygon that covers one pixel and is partly outside the image.
         let corner = vec![4.4, -1.0, 9.0, -1.0, 9.0, 0.6, 4.4, 0.6];
         assert_eq!(inside(5, 4, &[square, corner]), [4, 6, 7, 11, 12]);
-        // Above its centres it holds none.
+        // A polygon above the pixel centres contains no pixel.
         assert_eq!(inside(5, 4, &[vec![0.0, 0.0, 5.0, 0.0, 5.0, 0.4, 0.0, 0.4]]), Vec::<u32>::new());
         let triangle = vec![0.0, 0.0, 4.0, 0.0, 0.0, 4.0];
         assert_eq!(inside(4, 4, &[triangle]).len(), 6);
@@ -462,7 +466,7 @@ mod tests {
         assert_eq!(named(8, text), "annotation 8 ");
     }
 
-    /// As it was: every row asks every edge.
+    /// Reference implementation that tests every edge in every row.
     fn row_by_row(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
         let mut all = Vec::new();
         for row in 0..h {
@@ -488,8 +492,8 @@ mod tests {
         all
     }
 
-    /// Expected: the pixels of a plain scan, for polygons that cross themselves, lie on each other, reach out of the image and have corners on
-    /// centres of rows.
+    /// Expected: the same pixels as with the reference implementation, for polygons that intersect themselves, overlap,
+    /// extend beyond the image and have vertices on centre lines of rows.
     #[test]
     fn edges_cross_the_rows_that_a_plain_scan_finds() {
         let mut s = furrow_base::sampling::Stream::of(5, 0, furrow_base::sampling::Purpose::Test, 0);
@@ -507,8 +511,8 @@ mod tests {
         }
     }
 
-    /// Rationale: every row of the image used to ask every edge, for each annotation. Expected: an edge looks at the rows that it crosses and at
-    /// most four more, however large the image.
+    /// Rationale: testing every edge in every row is slow for large images. Expected: an edge tests the rows that it
+    /// crosses and at most four more, whatever the size of the image.
     #[test]
     fn an_edge_looks_at_its_own_rows() {
         for h in [100, 10_000, 1_000_000] {

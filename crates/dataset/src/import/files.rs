@@ -1,4 +1,4 @@
-//! Which files of a source belong together: by the stems of their names, split by split.
+//! Matching of the files of a source by the stems of their names, within each split.
 
 use super::Listed;
 use crate::model::split::Split;
@@ -6,10 +6,10 @@ use furrow_base::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Endings of pictures.
+/// Extensions of image files.
 const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// Names that folders of splits have.
+/// Names of the folders of splits.
 const SPLITS: [(&str, Split); 6] = [
     ("train", Split::Train),
     ("training", Split::Train),
@@ -19,7 +19,7 @@ const SPLITS: [(&str, Split); 6] = [
     ("test", Split::Test),
 ];
 
-/// The pictures of a folder whose stems end in `suffix`, by the rest of the stem.
+/// Returns the image files of a folder whose stems end in `suffix`, by the rest of the stem.
 pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, PathBuf>> {
     let mut all: BTreeMap<String, PathBuf> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(Error::reading(folder))? {
@@ -32,13 +32,13 @@ pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, P
         let Some(name) = stem.strip_suffix(suffix) else { continue };
         if let Some(other) = all.insert(name.to_owned(), path.clone()) {
             return Err(Error::input(format!("{} and {} have the same name", other.display(), path.display()))
-                .help("take one of them away"));
+                .help("remove one of them"));
         }
     }
     Ok(all)
 }
 
-/// The pictures of a folder, or of the folders of splits in it.
+/// Returns the image files of the split folders in `folder`, or of `folder` itself if it has none.
 pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<Listed, PathBuf>> {
     let mut all = BTreeMap::new();
     for (name, split) in SPLITS {
@@ -55,12 +55,12 @@ pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<Listed, Pat
     Ok(all)
 }
 
-/// A file's length, bytes: with its name, what tells it without reading it.
+/// Returns a file's length in bytes. Name and length identify a file without reading it.
 pub(super) fn length(path: &Path) -> Result<u64> {
     Ok(std::fs::metadata(path).map_err(Error::reading(path))?.len())
 }
 
-/// Refuses a picture of another size than its image's.
+/// Returns an error if a label file's size differs from that of its image.
 pub(super) fn same_size(path: &Path, found: (u32, u32), expected: (u32, u32)) -> Result<()> {
     if found == expected {
         return Ok(());

@@ -1,8 +1,9 @@
-//! Plants and leaves that agree with the classes: what a source says of them, mended where it contradicts itself.
+//! Plant and leaf numbers of a source, corrected so that they agree with the classes.
 //!
-//! A plant is crop or weed as a whole, a leaf lies on one plant. Where a source has it otherwise the class stands, for it is what
-//! people draw most carefully: pixels of a plant that are soil or have no label leave it, a number that crop and weed share is two
-//! plants, a leaf on two plants is two leaves. What was mended is told.
+//! A plant has a single class, and a leaf belongs to a single plant. If a source contradicts this, the class takes
+//! precedence, since people annotate classes most carefully: pixels of a plant that are soil or unlabelled are removed
+//! from it, a number that is used for crop and weed becomes two plants, and a leaf on two plants becomes two leaves.
+//! Corrections are reported as warnings.
 
 use furrow_base::Result;
 use furrow_base::error::Error;
@@ -10,16 +11,17 @@ use furrow_render::scene::tag::{Class, MOST_PLANTS};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Numbers of plants and leaves, one a pixel.
+/// Plant and leaf number of each pixel.
 pub(super) struct Instances {
     pub(super) plants: Vec<u32>,
     pub(super) leaves: Vec<u16>,
     pub(super) warnings: Vec<String>,
-    /// New numbers of plant and leaf by those of the source; leaf 0 is the plant itself.
+    /// New numbers of plant and leaf by the numbers of the source; leaf 0 is the plant itself.
     pub(super) numbers: BTreeMap<(u32, u32), (u32, u16)>,
 }
 
-/// From a source's class, plant and leaf of each pixel, 0 for none; leaves may count through the image. `path` is what an error names.
+/// Computes plant and leaf numbers from a source's class, plant and leaf of each pixel (0 for none). Leaves may be
+/// numbered throughout the image. `path` is the file that errors name.
 pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &[u32]) -> Result<Instances> {
     let vegetation = |class: u8| class == Class::Crop as u8 || class == Class::Weed as u8;
     let kept: Vec<(u8, u32)> = semantics
@@ -33,7 +35,7 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
     for (place, leaf) in kept.iter().zip(leaves).filter(|(place, leaf)| place.1 != 0 && **leaf != 0) {
         of_leaf.insert((plant_of(*place), *leaf), 0);
     }
-    // By rising number, from 1 on each plant.
+    // Renumbers the leaves of each plant from 1, in ascending order.
     let (mut plant_before, mut next) = (0, 0_u32);
     for ((plant, _), number) in &mut of_leaf {
         next = if *plant == plant_before { next + 1 } else { 1 };
@@ -60,15 +62,16 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
         .keys()
         .filter(|(plant, class)| *class == Class::Weed as u8 && numbers.contains_key(&(*plant, Class::Crop as u8)));
     let told = [
-        (lost[0], "pixels of a plant are soil or have no label: they were taken from it"),
-        (lost[1], "pixels of a leaf lie on no plant: they were taken from it"),
-        (shared.count() as u64, "numbers stand for a crop plant and a weed: each is two plants"),
+        (lost[0], "pixels of plants are soil or unlabelled and were removed from the plants"),
+        (lost[1], "pixels of leaves are on no plant and were removed from the leaves"),
+        (shared.count() as u64, "numbers are used for a crop plant and a weed; each becomes two plants"),
     ];
     all.warnings.extend(told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")));
     Ok(all)
 }
 
-/// A number for every plant and class: the source's where it fits and is not taken, else the next free one.
+/// Returns a number for each plant and class: the source's number if it is in range and not in use, otherwise the next
+/// free one.
 fn plant_numbers(path: &Path, kept: &[(u8, u32)]) -> Result<BTreeMap<(u32, u8), u32>> {
     let mut numbers: BTreeMap<(u32, u8), u32> = BTreeMap::new();
     for (class, plant) in kept.iter().filter(|(_, plant)| *plant != 0) {
@@ -91,7 +94,7 @@ fn plant_numbers(path: &Path, kept: &[(u8, u32)]) -> Result<BTreeMap<(u32, u8), 
 }
 
 fn too_many(path: &Path, what: &str, most: u32) -> Error {
-    Error::input(format!("it has more {what} than labels can number, {most}; cut the image in two")).in_file(path)
+    Error::input(format!("it has more {what} than labels can number, {most}; cut the image into two")).in_file(path)
 }
 
 #[cfg(test)]
@@ -113,14 +116,15 @@ mod tests {
 
     #[test]
     fn contradictions_are_mended_and_told() {
-        // Plant 3 is crop and weed and reaches into the soil and the unlabelled; leaf 5 lies on both plants and beside them.
+        // Plant 3 is crop and weed and extends into soil and unlabelled pixels; leaf 5 is on both plants and beside
+        // them.
         let all = of(&[1, 2, 0, 255, 1], &[3, 3, 3, 3, 0], &[5, 5, 0, 0, 5]);
         assert_eq!(all.plants, [3, 4, 0, 0, 0]);
         assert_eq!(all.leaves, [1, 1, 0, 0, 0]);
         assert_eq!(all.warnings.len(), 3);
     }
 
-    /// Expected: what 24 bits hold stays; what they do not gets the next number, and is refused where there is none.
+    /// Expected: numbers within 24 bits are kept; larger ones get the next free number, or an error if there is none.
     #[test]
     fn numbers_that_labels_hold_stay() {
         assert_eq!(of(&[1, 1, 2], &[70_000, 2, MOST_PLANTS], &[0; 3]).plants, [70_000, 2, MOST_PLANTS]);

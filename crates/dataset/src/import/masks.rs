@@ -1,4 +1,4 @@
-//! A folder of images and one of masks: numbers (gray, indexed) or colours that stand for classes.
+//! Source with a folder of images and a folder of masks: numbers (grey or indexed) or colours that represent classes.
 
 use super::classes::{Colors, Names};
 use super::files::{length, listed, same_size};
@@ -10,37 +10,37 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// What masks hold.
+/// Coding of the masks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Coding {
-    /// Numbers, by what they mean.
+    /// Pixel values are numbers with these meanings.
     Numbers(Names),
-    /// Colours, by what they mean.
+    /// Pixel values are colours with these meanings.
     Colors(Colors),
 }
 
-/// Where images and masks lie, and how they are read.
+/// Folders of images and masks, and how they are read.
 #[derive(Clone, Debug)]
 pub struct Folders {
-    /// PNG or JPEG images, in the folder or in `train`, `val` and `test` below it.
+    /// Folder of PNG or JPEG images, which are directly in it or in its subfolders `train`, `val` and `test`.
     pub images: PathBuf,
-    /// PNG masks, likewise.
+    /// Folder of PNG masks, with the same subfolders.
     pub masks: PathBuf,
-    /// Near infrared, PNG or JPEG, likewise.
+    /// Folder of near-infrared images, PNG or JPEG, with the same subfolders.
     pub nir: Option<PathBuf>,
-    /// What the names of images end in that the names of masks do not.
+    /// Suffix of the images' names that is removed before matching.
     pub image_suffix: String,
-    /// What the names of masks end in.
+    /// Suffix of the masks' names that is removed before matching.
     pub mask_suffix: String,
-    /// What the names of infrared images end in.
+    /// Suffix of the infrared images' names that is removed before matching.
     pub nir_suffix: String,
-    /// What the masks hold.
+    /// Coding of the masks.
     pub coding: Coding,
-    /// Whether what has no meaning has no label; otherwise it is an error.
+    /// Whether values without a meaning become unlabelled; otherwise they are an error.
     pub ignore_others: bool,
 }
 
-/// What masks mean unless one says otherwise: the numbers of `semantics.png`.
+/// Default meanings: the numbers of `semantics.png`.
 const NUMBERS: &str = "0=soil,1=crop,2=weed,255=ignore";
 
 impl Default for Coding {
@@ -50,7 +50,7 @@ impl Default for Coding {
 }
 
 impl Folders {
-    /// Images and masks of the same names, whose numbers are those of `semantics.png`; anything else is an error.
+    /// Describes images and masks with equal names, with the numbers of `semantics.png`; other numbers are an error.
     pub fn new(images: PathBuf, masks: PathBuf) -> Self {
         Self {
             images,
@@ -72,7 +72,7 @@ struct Files {
     nir: Option<PathBuf>,
 }
 
-/// Images with masks.
+/// A source of images with masks.
 pub struct Masks {
     folders: Folders,
     images: Vec<Listed>,
@@ -81,7 +81,7 @@ pub struct Masks {
 }
 
 impl Masks {
-    /// Finds what belongs together; every image must have its mask.
+    /// Matches images and masks by name; returns an error if an image has no mask.
     pub fn open(folders: Folders) -> Result<Self> {
         let images = listed(&folders.images, &folders.image_suffix)?;
         let mut masks = listed(&folders.masks, &folders.mask_suffix)?;
@@ -126,8 +126,8 @@ fn lacks(image: &Path, what: &str, folder: &Path, suffix: &str, one: &Listed) ->
     Error::input(format!("its {what} is missing: {}/{split}{}{suffix}.png", folder.display(), one.name))
         .in_file(image)
         .help(
-            "names match but for --image-suffix, --mask-suffix and --nir-suffix; add the \
-         file, or take the image away",
+            "names must match except for --image-suffix, --mask-suffix and --nir-suffix; \
+         add the file, or remove the image",
         )
 }
 
@@ -168,7 +168,7 @@ impl Source for Masks {
 }
 
 impl Masks {
-    /// Classes of a mask's pixels.
+    /// Returns the classes of a mask's pixels.
     fn semantics(&self, path: &Path, width: u32, map: Map) -> Result<Vec<u8>> {
         match (&self.folders.coding, map) {
             (Coding::Numbers(names), Map::Numbers(numbers) | Map::Indexed(numbers, _)) => {
@@ -178,7 +178,7 @@ impl Masks {
                 self.all(path, width, &numbers, meaning, |n| format!("the number {n}"), "--classes")
             }
             (Coding::Numbers(_), Map::Colors(_)) => Err(Error::input(
-                "this mask holds colours, not numbers; name them with --colors '0,255,0=crop;…' instead of --classes",
+                "this mask contains colours, not numbers; use --colors '0,255,0=crop;…' instead of --classes",
             )
             .in_file(path)),
             (Coding::Colors(colors), map) => {
@@ -202,12 +202,12 @@ impl Masks {
             Some(number) => Ok(number),
             None if self.folders.ignore_others => Ok(IGNORE),
             None => Err(Error::input(format!(
-                "pixel {},{} has {}, which no class was given for",
+                "pixel {},{} has {}, for which no class was given",
                 place as u32 % width,
                 place as u32 / width,
                 words(*pixel)
             ))
-            .help(format!("name it in {option}, or give --others ignore"))
+            .help(format!("add it to {option}, or give --others ignore"))
             .in_file(path)),
         };
         pixels.iter().enumerate().map(one).collect()

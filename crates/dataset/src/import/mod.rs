@@ -1,14 +1,15 @@
-//! Other people's images and labels as a dataset of ours, so that real sets enter training and comparison by the same door.
+//! Import of foreign images and labels into a dataset, so that training and comparison read real sets like rendered
+//! ones.
 //!
-//! A source lists its images and reads one of them; everything else is the same for all: images are numbered in the order of their
-//! splits and names, written and sealed one by one, and an interrupted import is gone on with by the same call. What a source does
-//! not know (coverage, depth, what is hidden) is left out rather than made up.
+//! A [`Source`] lists its images and reads one of them. Everything else is common to all sources: images are numbered
+//! by split and name and written one by one with a checksum record, and the same call continues an interrupted import.
+//! Values that a source does not provide (coverage, depth, hidden parts) are omitted, not estimated.
 //!
-//! | file | idea |
+//! | file | contents |
 //! |---|---|
-//! | `classes` | which numbers, colours or names mean crop and weed |
-//! | `files` | which files belong together |
-//! | `instances` | plants and leaves that agree with the classes |
+//! | `classes` | the numbers, colours or names of soil, crop and weed |
+//! | `files` | matching of images and label files by name |
+//! | `instances` | plant and leaf numbers that agree with the classes |
 //! | `masks`, `phenobench`, `coco` | one source each |
 
 pub mod classes;
@@ -20,6 +21,7 @@ pub mod phenobench;
 
 use crate::make::begin::{self, refuse_full};
 use crate::make::generate;
+use crate::make::task::{Task, task};
 use crate::model::annotate;
 use crate::model::invariants;
 use crate::model::labelling::Labelling;
@@ -30,7 +32,6 @@ use crate::model::split::{Shares, Split};
 use crate::read::checksum_record::{ChecksumRecord, write_files};
 use crate::read::native;
 use crate::read::set::Set;
-use crate::read::task::{Task, task};
 use furrow_base::Result;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -38,48 +39,49 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Images and labels that lie elsewhere.
+/// Foreign images and labels to import.
 pub trait Source: Sync {
-    /// The format's name.
+    /// Returns the name of the format.
     fn name(&self) -> &'static str;
 
-    /// The images, sorted by split and name; all have a split or none has.
+    /// Returns the images, sorted by split and name. Either all images have a split or none has.
     fn images(&self) -> &[Listed];
 
-    /// Everything that decides what is read, in words: options, names, lengths of files. No path of a machine.
+    /// Returns a text that determines the contents of the import: options, names and lengths of files. It contains no
+    /// absolute path, so it is equal on all machines.
     fn words(&self) -> &str;
 
-    /// Whether its images have near infrared: all of them or none.
+    /// Returns whether the images have near infrared: either all or none.
     fn has_nir(&self) -> bool {
         false
     }
 
-    /// What the user should know of the source as a whole.
+    /// Returns warnings about the source as a whole.
     fn warnings(&self) -> &[String] {
         &[]
     }
 
-    /// Reads the image at a place of the list.
+    /// Reads the image at position `place` of [`Source::images`].
     fn read(&self, place: usize) -> Result<Labelled>;
 }
 
 /// An image of a source.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Listed {
-    /// Its split, where the source has splits.
+    /// Its split; `None` if the source has no splits.
     pub split: Option<Split>,
     /// Its name in the source.
     pub name: String,
 }
 
-/// An image with its labels, one value a pixel, as in a [`Sample`].
+/// An image with its labels, one value per pixel, as in a [`Sample`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Labelled {
-    /// Pixels across and down.
+    /// Width and height in pixels.
     pub size: (u32, u32),
-    /// 8-bit sRGB.
+    /// Colour, 8-bit sRGB.
     pub rgb: Vec<[u8; 3]>,
-    /// Near infrared; empty where the source [has none](Source::has_nir).
+    /// Near infrared, 8 bits; empty if the source [has none](Source::has_nir).
     pub nir: Vec<u8>,
     /// Class, or [`crate::model::sample::IGNORE`].
     pub semantics: Vec<u8>,
@@ -87,23 +89,24 @@ pub struct Labelled {
     pub plants: Vec<u32>,
     /// Number of the leaf on its plant, 0 for none.
     pub leaves: Vec<u16>,
-    /// Stem of a plant (leaf 0), base and tip of a leaf: by plant and leaf.
+    /// Keypoints (stem, base and tip) by plant and leaf; the stem belongs to leaf 0.
     pub points: BTreeMap<(u32, u16), [Option<Keypoint>; 3]>,
-    /// What the user should know.
+    /// Warnings about this image.
     pub warnings: Vec<String>,
 }
 
-/// How a source is brought in.
+/// Settings of an import.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// Splits for a source that has none.
+    /// Shares of the splits, for a source without splits.
     pub split: Shares,
-    /// What others may do with the images.
+    /// Licence of the images, as free text.
     pub licence: String,
 }
 
-/// Brings a source in, or goes on with it. Call it inside a pool; `done` is told of every image. The lists of all images are
-/// [`crate::make::finish`]'s.
+/// Imports a source into `folder`, or continues an interrupted import. Must be called inside a thread pool. `done` is
+/// called with the index of each imported image; raising `stop` ends the import with an error. [`crate::make::finish`]
+/// writes the files of the whole dataset afterwards.
 pub fn import(
     folder: &Path,
     source: &dyn Source,
@@ -112,7 +115,7 @@ pub fn import(
     stop: &AtomicBool,
 ) -> Result<Set> {
     let there = AtomicUsize::new(0);
-    // Of several faults the first image's is told, whatever the number of threads.
+    // If there are several errors, returns that of the first image, whatever the number of threads.
     let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
         let fault = (0..source.images().len() as u64).into_par_iter().find_map_first(|index| {
             if stop.load(Ordering::Relaxed) {
@@ -124,7 +127,8 @@ pub fn import(
     };
     if !folder.join(FILE).exists() {
         refuse_full(folder)?;
-        // Twice the reading, but a fault in the last image leaves nothing behind that a better command would stumble over.
+        // Reads all images before writing, so that an error in any of them leaves no partial dataset in the way of the
+        // corrected command.
         each(&|index| source.read(index as usize).map(drop))?;
     }
     let set = begin(folder, source, order)?;
@@ -137,12 +141,12 @@ pub fn import(
     Ok(set)
 }
 
-/// Writes the recipe, or finds it written.
+/// Creates the dataset with the recipe of the import, or opens the existing one.
 fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
     let images = source.images();
     let mut counts = [0_u32; Split::ALL.len()];
     images.iter().filter_map(|i| i.split).for_each(|split| counts[split as usize] += 1);
-    // As many for training as there are, then as many for validation: the pattern of splits goes once over all images.
+    // With the number of images of each split as shares, the periodic pattern of splits covers all images exactly once.
     let split = if counts == [0; 3] { order.split } else { Shares(counts) };
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
@@ -162,7 +166,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
     Ok(Set::new(folder, begin::begin(folder, recipe, &[], false)?))
 }
 
-/// Brings in one image, where it is not there yet.
+/// Imports one image, unless it is complete.
 fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
     let Set { folder, recipe, .. } = set;
     let files = match task(set, index)? {
@@ -179,7 +183,7 @@ fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
     ChecksumRecord::of(index, recipe, &files)?.write(folder)
 }
 
-/// What was read as a sample of ours.
+/// Converts an image that was read into a [`Sample`].
 fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sample {
     let (width, height) = read.size;
     let mut sample = Sample {

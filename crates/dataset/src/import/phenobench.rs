@@ -1,8 +1,9 @@
-//! PhenoBench: `SPLIT/{images,semantics,plant_instances,leaf_instances}/NAME.png`; its `test` has no labels and is left out.
+//! Source for PhenoBench: `SPLIT/{images,semantics,plant_instances,leaf_instances}/NAME.png`. Its `test` split has no
+//! labels and is skipped.
 //!
-//! 3 and 4 are partial crop and weed and become 1 and 2; 255 is no label. Numbers of plants may be the same for a crop plant and a weed,
-//! those of leaves count through the image. Visibilities tell what a cut of a larger picture left of an instance, and are not
-//! kept. Source: Weyler et al. 2024, and its loader, version 0.1.0.
+//! Classes 3 and 4, partial crop and partial weed, become 1 and 2; 255 is unlabelled. A crop plant and a weed may have
+//! the same number; leaves are numbered throughout the image. Visibilities are not imported: they describe the fraction
+//! of an instance within a crop of a larger image. Source: Weyler et al. 2024, and its loader, version 0.1.0.
 
 use super::files::{length, pictures, same_size};
 use super::instances::instances;
@@ -27,7 +28,7 @@ pub struct PhenoBench {
 const LABELS: [&str; 3] = ["semantics", "plant_instances", "leaf_instances"];
 
 impl PhenoBench {
-    /// Finds the images that have labels.
+    /// Opens a PhenoBench folder and lists the images that have labels.
     pub fn open(root: &Path) -> Result<Self> {
         let mut all = Self {
             root: root.into(),
@@ -43,7 +44,7 @@ impl PhenoBench {
             }
             let found = pictures(&folder.join("images"), "")?;
             if !folder.join(LABELS[0]).is_dir() {
-                all.warnings.push(format!("{}: {} images without labels were left out", folder.display(), found.len()));
+                all.warnings.push(format!("{}: {} images without labels were skipped", folder.display(), found.len()));
                 continue;
             }
             for (name, path) in found {
@@ -58,9 +59,9 @@ impl PhenoBench {
             }
         }
         if all.images.is_empty() {
-            return Err(Error::input("there are no images with labels in it")
+            return Err(Error::input("this folder contains no images with labels")
                 .in_file(root)
-                .help("give --from the folder that holds train/images, train/semantics, …"));
+                .help("give --from the folder that contains train/images, train/semantics, …"));
         }
         Ok(all)
     }
@@ -96,7 +97,7 @@ impl Source for PhenoBench {
             same_size(&path, (x, y), (w, h))?;
             match map {
                 Map::Numbers(numbers) | Map::Indexed(numbers, _) => Ok(numbers.into_iter().map(u32::from).collect()),
-                Map::Colors(_) => Err(Error::input("this is a picture in colour, not a map of numbers").in_file(path)),
+                Map::Colors(_) => Err(Error::input("this is a colour image, not a map of numbers").in_file(path)),
             }
         };
         let path = folder.join(LABELS[0]).join(format!("{name}.png"));
@@ -115,7 +116,7 @@ impl Source for PhenoBench {
     }
 }
 
-/// The class of a number.
+/// Returns the class of a PhenoBench number.
 fn class(path: &Path, width: u32, place: usize, number: u32) -> Result<u8> {
     match number {
         0..=2 => Ok(number as u8),

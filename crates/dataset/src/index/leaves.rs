@@ -1,4 +1,4 @@
-//! A table with a row a leaf that an image shows or hides: what phenotyping measures of it.
+//! Table with a row for each visible or occluded leaf of an image: phenotypic traits and pixel counts.
 
 use super::origin::Origin;
 use super::table::{Row, Table};
@@ -7,7 +7,7 @@ use crate::read::set::{Set, Whole};
 use furrow_base::Result;
 use furrow_render::scene::tag::Class;
 
-/// Writes the table of a dataset whose images are all there to `path`.
+/// Writes the table of a dataset whose images are complete to `path`.
 pub(crate) fn write(set: &Set, out: &mut Whole<'_>, path: &str) -> Result<()> {
     out.file(path, |out| {
         let seen = Seen::default;

@@ -1,5 +1,8 @@
-//! What people choose images and plants by, as tables that databases read: `images.parquet` with a row an image, `plants.parquet` with a row
-//! a plant that an image shows or hides. The format `traits` adds a table of leaves (`leaves.parquet`). A cell is empty where its value is not known: of models from disk, of imported images.
+//! Tables for selecting images and plants, in a format that databases read: `images.parquet` has a row for each image,
+//! `plants.parquet` a row for each visible or occluded plant of an image. The format `traits` adds a table of leaves
+//! (`leaves.parquet`).
+//!
+//! A cell is empty if its value is unknown, as for models from disk and for imported images.
 
 pub(crate) mod leaves;
 pub(crate) mod origin;
@@ -17,12 +20,12 @@ use furrow_render::settings::Engine;
 use origin::Origin;
 use table::{Row, Table, count};
 
-/// The table of images, below the dataset's folder.
+/// Path of the table of images, relative to the dataset's folder.
 pub const IMAGES: &str = "images.parquet";
-/// The table of plants.
+/// Path of the table of plants, relative to the dataset's folder.
 pub const PLANTS: &str = "plants.parquet";
 
-/// Writes both of a dataset whose images are all there.
+/// Writes both tables of a dataset whose images are complete.
 pub(crate) fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
     let mut records = set.all().peekable();
     if let Some(Ok(first)) = records.peek() {
@@ -56,17 +59,18 @@ pub(crate) fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
     })
 }
 
-/// Degrees between straight down and the camera's axis.
+/// Returns the angle between the optical axis of the camera and straight down, degrees.
 fn tilt(world_to_camera: [[f64; 3]; 3]) -> f64 {
     (-world_to_camera[2][2]).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
-/// Values in one cell, with semicolons between.
+/// Joins values into one cell, separated by semicolons.
 fn joined<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
     values.into_iter().collect::<Vec<_>>().join("; ")
 }
 
-/// Samples of the mean pixel of a traced photograph: as the film tells, or as they were asked for where it tells nothing, such as of one sample.
+/// Returns the mean number of samples per pixel of a path-traced image: that of the film or, if the record has none (as
+/// for one sample), the requested number.
 fn spp(set: &Set, record: &Record) -> Option<f64> {
     let told = record.sampling.as_ref().map(|sampling| sampling.spp);
     let traced = || set.recipe.rendering().ok().filter(|rendering| rendering.engine == Engine::Trace);
@@ -150,7 +154,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
 fn of_plant(origin: &Origin<'_>, plant: &Plant) -> Row {
     let grown = plant.grown.as_ref();
     let place = |axis: usize| grown.map(|grown| grown.position_m[axis]);
-    // A model has neither a code nor an age.
+    // Models have neither an EPPO code nor an age.
     let aged = grown.filter(|grown| !grown.eppo.is_empty());
     let traits = grown.and_then(|grown| grown.traits);
     let condition = grown.and_then(|grown| grown.condition);

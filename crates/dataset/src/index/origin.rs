@@ -1,31 +1,33 @@
-//! Which image a row is about: the columns with which all tables of plants and leaves begin, so that they are joined with that of images and
-//! filtered by field, day and camera without it. Camera, day and frame are empty where an image has none.
+//! Columns that identify the image of a row. All tables of plants and leaves start with them, so that these tables can
+//! be joined with the table of images, and filtered by field, day and camera without it.
+//!
+//! Camera, day and frame are empty if an image has none.
 
 use super::table::{Row, count};
 use crate::model::recipe::Recipe;
 use crate::model::record::Record;
 use serde::Serialize;
 
-/// The image of a row.
+/// Image of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Origin<'a> {
-    /// Its name.
+    /// Name of the image.
     image: &'a str,
-    /// Its number in the dataset.
+    /// Number of the image in the dataset.
     number: u64,
     split: &'static str,
     /// Number of the field that it shows.
     field: u64,
-    /// Name of the camera, of a drive, a rig or a day.
+    /// Name of the camera, for a drive, a rig or days.
     camera: Option<&'a str>,
     /// Days after the emergence of the field's first crop.
     day: Option<u32>,
-    /// Images of its camera before it, on all days.
+    /// Number of images that its camera took before, on all days.
     frame: Option<u32>,
 }
 
 impl<'a> Origin<'a> {
-    /// That of an image of a dataset.
+    /// Returns the origin for an image of the dataset with this recipe.
     pub(crate) fn of(recipe: &Recipe, record: &'a Record) -> Self {
         let capture = record.capture.as_ref();
         Self {
@@ -39,7 +41,7 @@ impl<'a> Origin<'a> {
         }
     }
 
-    /// Its columns.
+    /// Returns the columns with their names.
     pub(super) fn cells(&self) -> Row {
         vec![
             ("image", self.image.into()),

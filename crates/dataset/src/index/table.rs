@@ -1,4 +1,4 @@
-//! A table in the format Parquet: typed columns, each of which may lack values, compressed by Snappy.
+//! Parquet table: typed columns with optional values, compressed with Snappy.
 
 use crate::read::set::Stream;
 use furrow_base::{Error, Result};
@@ -11,7 +11,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use std::sync::Arc;
 
-/// A value of one row, or none.
+/// Optional value of a column in one row.
 pub(super) enum Cell {
     Text(Option<String>),
     Int(Option<i32>),
@@ -20,7 +20,7 @@ pub(super) enum Cell {
     Double(Option<f64>),
 }
 
-/// The values of a row with the names of their columns: the same names and kinds in every row.
+/// Values of a row with the names of their columns; names and types are the same in every row.
 pub(super) type Row = Vec<(&'static str, Cell)>;
 
 macro_rules! cells {
@@ -50,7 +50,7 @@ cells! {
     f64 => Double;
 }
 
-/// The values of one column.
+/// Values of one column that are not yet written.
 enum Column {
     Text(Vec<Option<String>>),
     Int(Vec<Option<i32>>),
@@ -77,7 +77,7 @@ impl Column {
             (Self::Long(all), Cell::Long(value)) => all.push(value),
             (Self::Single(all), Cell::Single(value)) => all.push(value),
             (Self::Double(all), Cell::Double(value)) => all.push(value),
-            _ => return Err(Error::failed("two rows of a table have other columns")),
+            _ => return Err(Error::failed("two rows of a table have different columns")),
         }
         Ok(())
     }
@@ -92,7 +92,7 @@ impl Column {
         }
     }
 
-    /// Writes its values and forgets them.
+    /// Writes the values and removes them from memory.
     fn write(&mut self, to: &mut ColumnWriter<'_>) -> Result<()> {
         let done = match (self, to) {
             (Self::Text(all), ColumnWriter::ByteArrayColumnWriter(to)) => {
@@ -115,28 +115,29 @@ impl Column {
                 let (levels, values) = dense(all, |value| value);
                 to.write_batch(&values, Some(&levels), None)
             }
-            _ => return Err(Error::failed("a column of a table is of another kind than its table says")),
+            _ => return Err(Error::failed("a column of a table does not have the type in its schema")),
         };
         done.map(drop).map_err(failed)
     }
 }
 
-/// Which rows have a value, as Parquet's definition levels, and the values; what held them is empty then.
+/// Returns Parquet's definition levels, which mark the rows that have a value, and the values. `all` is empty
+/// afterwards.
 fn dense<T, U>(all: &mut Vec<Option<T>>, as_stored: impl Fn(T) -> U) -> (Vec<i16>, Vec<U>) {
     let levels = all.iter().map(|value| i16::from(value.is_some())).collect();
     (levels, std::mem::take(all).into_iter().flatten().map(as_stored).collect())
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "what `map_err` hands over")]
+#[expect(clippy::needless_pass_by_value, reason = "`map_err` passes the error by value")]
 fn failed(error: ParquetError) -> Error {
     Error::failed(format!("a table cannot be written: {error}"))
-        .help("see that the disk has room and may be written, then run the same command again")
+        .help("check that the disk has free space and can be written, then repeat the command")
 }
 
-/// Rows that are written together: what a reader skips or takes as one.
+/// Number of rows in a row group, the unit that readers load or skip.
 const GROUP: usize = 100_000;
 
-/// A table under way.
+/// A table that is being written.
 pub(super) struct Table<'s, 'f> {
     writer: SerializedFileWriter<&'s mut Stream<'f>>,
     columns: Vec<Column>,
@@ -144,7 +145,7 @@ pub(super) struct Table<'s, 'f> {
 }
 
 impl<'s, 'f> Table<'s, 'f> {
-    /// Begins one whose rows are like this one, which is not written.
+    /// Starts a table with the columns of the row `like`, which is not written.
     pub(super) fn begin(out: &'s mut Stream<'f>, like: &Row) -> Result<Self> {
         let columns: Vec<Column> = like.iter().map(|(_, cell)| Column::of(cell)).collect();
         let field = |((name, _), column): (&(&str, Cell), &Column)| {
@@ -185,7 +186,7 @@ impl<'s, 'f> Table<'s, 'f> {
         Ok(())
     }
 
-    /// Writes what is left.
+    /// Writes the remaining rows and closes the table.
     pub(super) fn end(mut self) -> Result<()> {
         if self.waiting > 0 {
             self.write()?;
@@ -194,7 +195,7 @@ impl<'s, 'f> Table<'s, 'f> {
     }
 }
 
-/// A count as a column holds it.
+/// Converts a count to the integer type of columns; numbers beyond its range become the largest value.
 pub(super) fn count(n: impl TryInto<i64>) -> i64 {
     n.try_into().unwrap_or(i64::MAX)
 }

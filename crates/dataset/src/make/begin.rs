@@ -1,20 +1,22 @@
-//! Writes a dataset's recipe, or finds it written: several programs may begin one dataset at once.
+//! Writes the recipe of a new dataset or merges it with an existing one. Several processes may create one dataset at
+//! the same time.
 
 use crate::File;
 use crate::format;
+use crate::make::pack;
 use crate::model::keep::Kept;
 use crate::model::photo::Photo;
 use crate::model::recipe::{FILE, Made, Recipe};
-use crate::pack;
 use crate::read::checksum_record::write_files;
 use crate::read::links;
 use furrow_base::{Error, Result};
 use furrow_output::{create_atomically, is_unfinished};
 use std::path::Path;
 
-/// Begins a dataset of this recipe in `folder`, whose scene is `files`, or goes on with the same one: it may get longer and get more
-/// formats, and its label maps must be those of the recipe only where they were `named`. Returns the recipe that is there then. Of two
-/// programs that begin different ones at once, one is refused.
+/// Creates a dataset with this recipe and the scene `files` in `folder`, or continues the existing one, which may get
+/// more images and more formats. Its omitted label maps must equal those of `recipe` only if the user `named` them.
+/// Returns the recipe that is in the folder afterwards. If two processes create different datasets in one folder at the
+/// same time, one gets an error.
 pub(crate) fn begin(folder: &Path, recipe: Recipe, files: &[File], named: bool) -> Result<Recipe> {
     let path = folder.join(FILE);
     if path.exists() {
@@ -22,11 +24,11 @@ pub(crate) fn begin(folder: &Path, recipe: Recipe, files: &[File], named: bool) 
     }
     refuse_full(folder)?;
     write_changed(folder, files)?;
-    // Last: a folder with a recipe has its scene.
+    // The recipe is written last, so that a folder with a recipe always has its scene.
     if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files, named) }
 }
 
-/// The recipe that [`begin`] would leave in `folder`. What that refuses is refused here; nothing is written.
+/// Returns the recipe that [`begin`] would write to `folder`, or its error. Writes nothing.
 pub(crate) fn merged_recipe(folder: &Path, recipe: Recipe, named: bool) -> Result<Recipe> {
     if folder.join(FILE).exists() {
         return joined(folder, recipe, named);
@@ -41,10 +43,10 @@ fn go_on(folder: &Path, recipe: Recipe, files: &[File], named: bool) -> Result<R
     Ok(recipe)
 }
 
-/// A recipe with what the dataset that lies in the folder has beside it; an error where that is another dataset.
+/// Merges a recipe with that of the dataset in the folder. Returns an error if that is a different dataset.
 fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
     let before = Recipe::read(folder)?;
-    // Who asks for nothing in particular leaves labels and maps as they are.
+    // Default settings keep the labels and maps that the dataset has.
     recipe.labelling = recipe.labelling.over(&before.labelling);
     recipe.pack = recipe.pack.or(before.pack);
     match (&mut recipe.made, &before.made) {
@@ -60,14 +62,14 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
                 now.photo = then.photo;
             }
         }
-        // A recipe of before does not say it; to say it now would change the fingerprint that its images have.
+        // Recipes of older versions lack this value; adding it would change the fingerprint that their images have.
         (Made::Imported { nir, .. }, Made::Imported { nir: None, .. }) => *nir = None,
         _ => {}
     }
     before.check_goes_on(folder, &recipe)?;
-    // Formats that are there stay.
+    // Formats that the dataset has are kept.
     recipe.formats.extend(before.formats);
-    // In whatever order they were asked for, it is one dataset.
+    // The dataset does not depend on the order of `--format`.
     recipe.formats.sort();
     recipe.formats.dedup();
     links::refuse(folder, &recipe)?;
@@ -75,7 +77,7 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
     Ok(recipe)
 }
 
-/// Writes the files that are not there as they are to be: others may be reading them.
+/// Writes only the files whose contents on disk differ, since other processes may be reading them.
 pub(crate) fn write_changed(folder: &Path, files: &[File]) -> Result<()> {
     let changed =
         |file: &&File| !furrow_base::input::contents(&folder.join(&file.path)).is_ok_and(|there| there == file.bytes);
@@ -83,18 +85,19 @@ pub(crate) fn write_changed(folder: &Path, files: &[File]) -> Result<()> {
     write_files(folder, &changed)
 }
 
-/// Refuses a folder in which other things lie: nothing of the user's may be overwritten.
+/// Returns an error if the folder contains files that are not of a dataset, so that none of the user's files is
+/// overwritten.
 pub(crate) fn refuse_full(folder: &Path) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
-    // A dataset that was stopped while it began has left its scene, and perhaps half a file.
+    // An interrupted start leaves the `scene` folder, and perhaps an unfinished temporary file.
     let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
     let other = names.find(|name| name != "scene" && !is_unfinished(name));
     match other {
-        // Another program has begun the dataset meanwhile.
+        // Another process has created the dataset in the meantime.
         Some(_) if folder.join(FILE).exists() => Ok(()),
-        Some(name) => Err(Error::misuse(format!("other things lie in this folder, {} among them", name.display()))
+        Some(name) => Err(Error::misuse(format!("this folder contains other files, such as {}", name.display()))
             .in_file(folder)
-            .help("give --out a folder that is empty or not there yet")),
+            .help("give --out a folder that is empty or does not exist")),
         None => Ok(()),
     }
 }

@@ -1,10 +1,12 @@
-//! What a dataset will cost before it is made: core time, disk, files, memory.
+//! Cost estimate of a dataset before it is made: core time, disk space, number of files, memory.
 //!
-//! Three of its images (the first, the middle one, the last) are drawn at their size with two smaller numbers of samples: what grows with the
-//! samples is drawing, what does not is growing, labelling and writing. So is the length of files, since noise compresses badly. What belongs to
-//! all images together is written for a few copies of the three, in a temporary folder that goes away, and prolonged.
+//! At least three of its images (the first, the middle and the last one) are rendered as probes at full size with two
+//! smaller numbers of samples. Time that grows with the number of samples is rendering time; the rest is scene
+//! construction, labelling and writing. File sizes are extrapolated in the same way, since noise compresses badly. The
+//! files of the whole dataset (lists, report) are written for a few copies of the probes in a temporary folder, and
+//! their size is extrapolated to all images.
 //!
-//! Images are drawn one after another in memory; nothing is written where the dataset would lie.
+//! Probes are rendered one after another in memory; nothing is written to the dataset's folder.
 
 use crate::make::begin::merged_recipe;
 use crate::make::finish::finish;
@@ -31,93 +33,99 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Of the samples of an image, a probe has this share, or all where that is fewer than [`FEWEST`].
+/// A probe is rendered with the image's samples divided by this number, but with at least [`FEWEST`] samples, or all of
+/// them if the image has fewer.
 const SHARE: u32 = 3;
-/// Fewer samples tell little about how long they take.
+/// Smallest number of samples of a probe: fewer samples give no reliable time per sample.
 const FEWEST: u32 = 8;
-/// Images that are drawn whatever they take, and at most.
+/// Smallest number of probes, whatever time they take, and largest number.
 const PROBES: [usize; 2] = [3, 16];
-/// Core seconds after which no further image is drawn.
+/// Core seconds after which no further probe is rendered, once the smallest number is reached.
 const LONG_ENOUGH_S: f64 = 20.0;
-/// How many times more samples the second drawing of a probe has than the first.
+/// Ratio of the numbers of samples of a probe's second and first rendering.
 const STEP: u32 = 4;
-/// About the length of an image's row in the timing log.
+/// Approximate length of an image's row in the timing log, bytes.
 const LOG_ROW: u64 = 270;
-/// Bytes of an image's file in an archive, beside its own.
+/// Overhead in bytes of a file in an archive: tar header, mean padding, entry in the archive's record.
 const MEMBER: u64 = 512 + 256 + 40;
-/// Lengths of the hash and its key that a file of checksums holds beside them.
+/// Length in bytes of the hash of the checksum record itself, with its key, in a checksum record.
 const SEAL_HASH: u64 = 81;
-/// Images that the work on what belongs to all is done for; of further ones records alone are read.
+/// Number of images for which the time of writing the whole dataset's files is extrapolated; for further images only
+/// the records are read.
 const MOST_LOOKED_AT: u64 = 240;
-/// Fields whose memory is estimated.
+/// Largest number of fields whose memory is estimated.
 const MOST_ASKED: u64 = 64;
-/// Images whose pictures the report holds.
+/// Number of images that the report shows.
 const REPORTED: u64 = 24;
 
-/// What a dataset will cost.
+/// Estimated cost of a dataset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bill {
-    /// Images.
+    /// Number of images.
     pub images: u64,
-    /// Fields that they show.
+    /// Number of fields that the images show.
     pub fields: u64,
-    /// How often a field grows: once for all of its images of a day.
+    /// Number of scene constructions: each field is built once for all its images of a day.
     pub growings: u64,
-    /// What shards share out.
+    /// Number of units (fields or packs) that are divided among shards.
     pub units: u64,
-    /// The images that were drawn to know it.
+    /// Indices of the images that were rendered as probes.
     pub probes: Vec<u64>,
-    /// Samples that they were drawn with, fewer first.
+    /// Samples per pixel of the two renderings of each probe, smaller number first.
     pub spp: [u32; 2],
-    /// Core seconds in all.
+    /// Total core seconds.
     pub core_s: f64,
-    /// Of them, growing fields.
+    /// Core seconds of scene construction.
     pub grow_s: f64,
-    /// Drawing samples.
+    /// Core seconds of rendering.
     pub sample_s: f64,
-    /// Length of all files; files that are names of one file count once.
+    /// Total size of all files, bytes; hard links to the same file count once.
     pub bytes: u64,
-    /// Number of files, each name counted; made in one run.
+    /// Number of files if the dataset is made in one run; hard links count separately.
     pub files: u64,
-    /// Memory of a process before its first image, bytes.
+    /// Memory of the process before its first image, bytes.
     pub base_memory: u64,
-    /// Memory of each image under way, bytes: that of the largest field as far as it can be told before it grows.
+    /// Memory of each image in progress, bytes: that of the probes, scaled to the largest estimated memory of a field.
     pub image_memory: u64,
 }
 
 impl Bill {
-    /// Most memory of a process that shares so many cores among its images, bytes.
+    /// Returns the largest memory of a process that renders on `cores` cores, bytes.
     pub fn memory(&self, cores: usize) -> u64 {
-        // Images of one field follow each other.
+        // Images of one field are rendered one after another, so at most one image per scene construction is in
+        // progress.
         let at_once = cores.clamp(1, MOST_AT_ONCE).min(usize::try_from(self.growings.max(1)).unwrap_or(usize::MAX));
         self.base_memory + at_once as u64 * self.image_memory
     }
 
-    /// Shards of so many cores each, of which each takes about an hour; none is empty.
+    /// Returns the number of shards that take about an hour each on `cores` cores; no shard is empty.
     pub fn shards(&self, cores: u32) -> u64 {
         let hours = self.core_s / 3600.0 / f64::from(cores.max(1));
         (hours.ceil() as u64).clamp(1, self.units.max(1))
     }
 }
 
-/// What a bill is at.
+/// A step of the cost estimate, for progress messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// An image is drawn.
+    /// A probe image is rendered.
     Image {
-        /// Which of those that are drawn, from 1.
+        /// Number of the probe, from 1.
         number: usize,
-        /// How many will be at least.
+        /// Smallest total number of probes.
         least: usize,
-        /// How many will be at most.
+        /// Largest total number of probes.
         most: usize,
     },
-    /// What belongs to all images is written for a few.
+    /// The files of the whole dataset are written for a few images.
     Lists,
 }
 
-/// Tells what an order will cost that is for a folder, and what the user should know; an error where another dataset lies there. `begun` is told each
-/// step as it begins. Given up where the flag is raised.
+/// Estimates the cost of `order` in `folder`, and returns it with warnings for the user. `begun` is called at the start
+/// of each step. Raising `stop` ends the estimate with an error.
+///
+/// # Errors
+/// The errors of [`plan`](crate::make::plan::plan()), for example if the folder contains another dataset.
 pub fn bill(
     folder: &Path,
     order: &Order,
@@ -127,7 +135,7 @@ pub fn bill(
 ) -> Result<(Bill, Vec<String>)> {
     let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
     let recipe = merged_recipe(folder, recipe, order.omit.is_some())?;
-    // What the process has taken until now, the dataset's own process takes too.
+    // The run itself will need the same time as this process until here, for checking the order.
     let start = cpu()?;
     let base_memory = meter::memory().unwrap_or(0);
     let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
@@ -146,7 +154,7 @@ pub fn bill(
         }
     }
     if probes.is_empty() {
-        return Err(Error::input(format!("no image of those that were tried could be made: {}", warnings.join("; "))));
+        return Err(Error::input(format!("none of the probe images could be made: {}", warnings.join("; "))));
     }
     begun(Step::Lists);
     let peak = meter::peak_memory().unwrap_or(0);
@@ -157,7 +165,7 @@ pub fn bill(
     let (grow_s, sample_s) = (growings as f64 * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
     let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
     let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
-    // An archive and its record.
+    // Each pack is an archive and its record.
     let (mut bytes, mut number) = (all.bytes + count * LOG_ROW as f64, all.files + 1 + 2 * packs);
     for (split, images) in Split::ALL.into_iter().zip(images_of_splits(&recipe)) {
         if images > 0 {
@@ -183,7 +191,8 @@ pub fn bill(
     Ok((bill, warnings))
 }
 
-/// The images that may be drawn to know what all cost: the first, the middle and the last one, then those that lie the farthest from all before.
+/// Returns the indices of possible probes: the first, the middle and the last image, then images at successively halved
+/// distances between them.
 fn probed(count: u64) -> Vec<u64> {
     let last = count.saturating_sub(1);
     let halves = (2..).flat_map(|level: u32| (1..1_u64 << level).step_by(2).map(move |odd| (odd, level)));
@@ -197,15 +206,15 @@ fn probed(count: u64) -> Vec<u64> {
     all
 }
 
-/// Core seconds of this process until now.
+/// Returns the core seconds that this process has used so far.
 fn cpu() -> Result<f64> {
     meter::cpu().map(|taken| taken.as_secs_f64()).ok_or_else(|| {
-        Error::missing("what work takes is measured by /proc/self/stat, which this system does not have")
-            .help("ask for the bill on Linux, or leave it out")
+        Error::missing("core time is measured with /proc/self/stat, which this system does not have")
+            .help("estimate the cost on Linux, or leave the estimate out")
     })
 }
 
-/// Images of each split, in the order of [`Split::ALL`].
+/// Returns the number of images of each split, in the order of [`Split::ALL`].
 fn images_of_splits(recipe: &Recipe) -> [u64; 3] {
     let captures = recipe.captures();
     let mut images = [0; 3];
@@ -216,49 +225,51 @@ fn images_of_splits(recipe: &Recipe) -> [u64; 3] {
     images
 }
 
-/// What images of an order are drawn from and by.
+/// Scene and renderers for the probes of an order.
 struct Images {
     set: Set,
     scene: SceneFile,
-    /// Samples of the dataset's images.
+    /// Samples per pixel of the dataset's images.
     spp: u32,
-    /// Samples that probes are drawn with, fewer first; the same number twice where there are no fewer.
+    /// Samples per pixel of the two renderings of a probe, smaller number first; equal if the images have a single
+    /// sample.
     drawn: [u32; 2],
     renderers: [Renderer; 2],
-    /// The splits that the dataset's images are in.
+    /// Splits that contain images of the dataset.
     splits: Vec<Split>,
 }
 
-/// One image that was drawn to know what all cost.
+/// An image that was rendered to estimate the cost of all images.
 struct Probe {
     record: Record,
-    /// Whether its own files go into an archive.
+    /// Whether its native files go into an archive.
     packed: bool,
-    /// The cameras of its field, by their names.
+    /// Names of the cameras of its field.
     cameras: Vec<String>,
-    /// Core seconds to grow its field.
+    /// Core seconds of building its scene.
     grow_s: f64,
-    /// Core seconds of a sample in each of its pixels.
+    /// Core seconds of one sample in every pixel.
     sample_s: f64,
-    /// Core seconds of the rest.
+    /// Core seconds that do not depend on the number of samples: labelling, encoding, checksums.
     fixed_s: f64,
-    /// Its files in each split.
+    /// Its files as they would be in each split.
     files: BTreeMap<Split, Vec<File>>,
-    /// How much longer its files are with all samples.
+    /// Ratio of the total file size with all samples to that of the probe.
     longer: f64,
 }
 
 impl Probe {
-    /// Length of its files in a split with all samples, and of their checksums.
+    /// Returns the size in bytes of its files in a split with all samples, including the checksum record.
     fn bytes(&self, split: Split) -> f64 {
         let files = self.files.get(&split).map_or(&[][..], Vec::as_slice);
         let seal = files.iter().map(|file| file.path.len() as u64 + 100).sum::<u64>() + 2 * SEAL_HASH;
         let in_archive = if self.packed { files.iter().filter(|file| is_native(&file.path)).count() as u64 } else { 0 };
-        // In an archive each has a header and ends with a block, half of which is empty; its record says where it lies.
+        // In an archive each file has a header, is padded by half a block on average, and has an entry in the archive's
+        // record.
         length(files) as f64 * self.longer + (seal + in_archive * MEMBER) as f64
     }
 
-    /// How many of its files, its checksums among them, lie in folders.
+    /// Returns how many of its files, including the checksum record, are stored outside archives.
     fn lying(&self, files: &[File]) -> u64 {
         let in_archive = |file: &&File| self.packed && is_native(&file.path);
         (files.len() - files.iter().filter(in_archive).count()) as u64 + u64::from(!self.packed)
@@ -284,19 +295,19 @@ impl Images {
         Ok(Self { set, scene, spp, drawn, renderers, splits })
     }
 
-    /// How much more memory the largest field is estimated to take than the largest that was drawn; at least 1.
+    /// Returns the estimated memory of the largest field divided by that of the largest probe's field; at least 1.
     fn largest_over(&self, probes: &[Probe]) -> f64 {
         let recipe = &self.set.recipe;
         let fields = recipe.count.div_ceil(recipe.captures());
         let asked = fields.clamp(1, MOST_ASKED);
-        // A field that cannot be is told when its image is made.
+        // The error of a field that cannot be built is reported when its image is made.
         let bytes = |field: u64| self.scene.estimate(field).map_or(0.0, |estimate| estimate.total().bytes);
         let largest = (0..asked).map(|k| bytes(k * fields / asked)).fold(0.0, f64::max);
         let drawn = probes.iter().map(|probe| bytes(recipe.field_of(probe.record.index).0)).fold(0.0, f64::max);
         if drawn > 0.0 { (largest / drawn).max(1.0) } else { 1.0 }
     }
 
-    /// Draws an image, and measures it.
+    /// Renders an image twice with few samples, and measures times and file sizes.
     fn probe(&self, index: u64, stop: &Arc<AtomicBool>) -> Result<Probe> {
         let scene = self.scene.clone().until(stop);
         let mut kept = LastField::default();
@@ -308,7 +319,8 @@ impl Images {
         let mut draw = |renderer: &Renderer| {
             let begin = cpu()?;
             let made = render(&self.set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
-            // For its time alone: with few samples, class by samples and class at the centre may lie further apart than they ever do in the set.
+            // Called only to measure its time; the faults are ignored, because with few samples the classes by samples
+            // and at the pixel centre differ more than in the dataset.
             let _ = invariants::faults(&self.set.recipe, &made.sample);
             let files = self.files(&made)?;
             ChecksumRecord::of(index, &self.set.recipe, &files)?;
@@ -320,14 +332,16 @@ impl Images {
         let [few, many] = &self.renderers;
         let [fewer, more] = self.drawn.map(f64::from);
         let spp = f64::from(self.spp);
-        // Of the first drawing only its numbers are kept: a run of the dataset holds one image at a time as well.
+        // Only the measurements of the first rendering are kept, so that memory holds one image at a time, as in the
+        // run.
         let less =
             if fewer < more { Some(draw(few).map(|(_, files, seconds)| (length(&files), seconds))?) } else { None };
         let (mut made, files, seconds) = draw(many)?;
         let (sample_s, longer) = less.map_or((0.0, 1.0), |(short, short_s)| {
             let doublings = |from: f64, to: f64| (to / from).log2();
             let (short, long) = (short as f64, length(&files) as f64);
-            // Noise halves its variance with each doubling of samples, and takes as many bits less of each pixel.
+            // Each doubling of samples halves the variance of the noise, which saves a constant number of bits per
+            // pixel.
             let steepness = (long - short) / doublings(fewer, more);
             ((seconds - short_s).max(0.0) / (more - fewer), 1.0 + steepness * doublings(more, spp) / long)
         });
@@ -351,7 +365,7 @@ impl Images {
         })
     }
 
-    /// All files of an image.
+    /// Returns all files of an image, native and of formats.
     fn files(&self, made: &RenderedSample) -> Result<Vec<File>> {
         let mut files = native::files(&self.set.recipe, &made.sample, &made.text)?;
         files.extend(formatted(&self.set, &made.sample)?);
@@ -359,14 +373,15 @@ impl Images {
     }
 }
 
-/// Length of files, of which those of equal bytes take space once, as [`write_files`] writes them.
+/// Returns the total size of files. Files with equal contents count once, since [`write_files`] stores them as hard
+/// links.
 fn length(files: &[File]) -> u64 {
     let mut known = BTreeSet::new();
     let fresh = files.iter().filter(|file| file.bytes.len() <= BLOCK || known.insert(file.bytes.as_slice()));
     fresh.map(|file| file.bytes.len() as u64).sum()
 }
 
-/// What belongs to all images of a dataset together.
+/// Estimated cost of the files that belong to the whole dataset.
 struct Together {
     files: u64,
     bytes: f64,
@@ -374,14 +389,15 @@ struct Together {
 }
 
 impl Together {
-    /// Of a dataset of such images that copies these files of its scene.
+    /// Estimates the cost for images like `probes` and a dataset that contains the files of `scene`.
     fn of(recipe: &Recipe, scene: &[File], probes: &[Probe]) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         let small = Small::of(recipe, probes, 1);
         small.write(folder.path(), scene)?;
         let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count() as u64;
         let per_field = small.recipe.captures();
-        // A field of each split; one more that is not whole, where the last one is not; one more of each probe.
+        // Finished with one field per split, with an additional incomplete field if the last field is incomplete, and
+        // with an additional field per probe.
         let few_images = splits * per_field;
         let many_images = few_images + probes.len() as u64 * per_field;
         let few = small.finished(folder.path(), few_images)?;
@@ -393,7 +409,7 @@ impl Together {
         let core_s = (cpu()? - begin) / many_images as f64 * recipe.count.min(MOST_LOOKED_AT) as f64;
         let whole_fields = recipe.count / recipe.captures();
         let each = (many.files - few.files) / probes.len().max(1) as u64;
-        // Days after the first, of all fields.
+        // Number of days after the first one, summed over all fields.
         let days = (recipe.days().len() as u64).saturating_sub(1);
         let later_days = whole_fields * days + of_cut.div_ceil(recipe.captures_a_day()).saturating_sub(1);
         let of_later_days = if later_days > 0 {
@@ -414,24 +430,24 @@ impl Together {
     }
 }
 
-/// Files that belong to all images of a small dataset.
+/// Number and sizes of the files that belong to the whole of a small dataset.
 struct Finished {
-    /// How many.
+    /// Number of files.
     files: u64,
-    /// Length of the report.
+    /// Size of the report, bytes.
     page: u64,
-    /// Length of the others.
+    /// Size of the other files, bytes.
     lists: u64,
 }
 
-/// A small dataset of copies of the probes, with as many splits and cameras as the large one has.
+/// A small dataset of copies of the probes, with the splits and cameras of the planned one.
 struct Small<'a> {
     recipe: Recipe,
     probes: &'a [Probe],
 }
 
 impl<'a> Small<'a> {
-    /// One frame of each camera, on so many days where there are days.
+    /// Creates the recipe, with one frame per camera on each of the first `days` days.
     fn of(recipe: &Recipe, probes: &'a [Probe], days: usize) -> Self {
         let mut small = recipe.clone();
         small.split = Shares(images_of_splits(recipe).map(|images| u32::from(images > 0)));
@@ -443,7 +459,7 @@ impl<'a> Small<'a> {
         Self { recipe: small, probes }
     }
 
-    /// Writes it with as many images as are needed.
+    /// Writes the dataset, with enough images for every later use.
     fn write(&self, folder: &Path, scene: &[File]) -> Result<()> {
         write_files(folder, scene)?;
         write_files(folder, &[File { path: FILE.into(), bytes: self.recipe.text()? }])?;
@@ -456,7 +472,7 @@ impl<'a> Small<'a> {
         Ok(())
     }
 
-    /// The files of a probe as those of another image.
+    /// Returns the files of a probe, renamed to those of image `index`.
     fn copy(&self, probe: &Probe, index: u64) -> Result<Vec<File>> {
         let (field, capture) = self.recipe.field_of(index);
         let mut record = probe.record.clone();
@@ -477,7 +493,7 @@ impl<'a> Small<'a> {
         probe.files.get(&record.split).into_iter().flatten().map(renamed).collect()
     }
 
-    /// How many files that belong to all images a further field adds.
+    /// Returns the number of dataset-wide files that an additional field adds.
     fn files_of_a_field(&self, scene: &[File], splits: u64) -> Result<u64> {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         self.write(folder.path(), scene)?;
@@ -487,7 +503,7 @@ impl<'a> Small<'a> {
         Ok((many.files - few.files) / fields.max(1))
     }
 
-    /// Writes what belongs to all of its first images.
+    /// Finishes the dataset of the first `images` images, and returns the number and sizes of the files written.
     fn finished(&self, folder: &Path, images: u64) -> Result<Finished> {
         let recipe = Recipe { count: images, ..self.recipe.clone() };
         let paths = finish(&Set::new(folder, recipe), None)?;
@@ -505,8 +521,9 @@ impl<'a> Small<'a> {
 mod tests {
     use super::*;
 
-    /// Rationale: fields of a scene file differ, so few of them tell little of all. Expected: the first, the middle and the last image first, no image
-    /// twice, none that is not there, and those that follow spread evenly.
+    /// Rationale: fields of a scene file differ, so probes must be spread over the dataset. Expected: the first, the
+    /// middle and the last image come first, no image is repeated or beyond the end, and further images are spread
+    /// evenly.
     #[test]
     fn images_that_are_drawn_lie_far_apart() {
         assert_eq!(probed(1), [0]);
@@ -520,8 +537,9 @@ mod tests {
         }
     }
 
-    /// Rationale: all images of a drive are of one field, which one process grows. Expected: where there is one field, a day of work is for one shard and
-    /// takes the memory of one image, however many cores share it; of a thousand fields it is for 24 shards with eight images under way.
+    /// Rationale: all images of a drive show one field, which one process builds. Expected: with one field, a day of
+    /// work is one shard with the memory of one image, whatever the number of cores; with a thousand fields it is 24
+    /// shards with eight images in progress each.
     #[test]
     fn images_of_one_field_are_not_shared_out() {
         let bill = |growings| Bill {

@@ -1,7 +1,7 @@
-//! What is wrong with the leaf at each pixel's centre: chlorosis, necrosis, soil, edges of holes.
+//! Damage map: chlorosis, necrosis, soil and edges of holes of the leaf at each pixel's centre.
 //!
-//! Asked by the rays that labels are made of, so nothing is filtered, and answered by the functions that the leaf's light is made by
-//! ([`furrow_render::material::Damage`]).
+//! The damage is evaluated at the hits of the label rays, unfiltered, with the same functions that the leaf material
+//! uses for shading ([`furrow_render::material::Damage`]).
 
 use furrow_base::geometry::{Intersect, Window};
 use furrow_render::material::Damage;
@@ -9,7 +9,8 @@ use furrow_render::render::label;
 use furrow_render::scene::Scene;
 use rayon::prelude::*;
 
-/// The damage of each pixel of a scene's image, row by row from the top; none where no leaf is seen.
+/// Returns the damage of each pixel of a scene's image, row by row from the top; the default (no damage) where no leaf
+/// is visible.
 pub fn damage(scene: &Scene, geometry: &dyn Intersect) -> Vec<Damage> {
     let camera = &scene.camera;
     let window = Window::full(camera.width(), camera.height());

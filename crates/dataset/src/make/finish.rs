@@ -1,16 +1,16 @@
-//! What belongs to all images together, written when all are there: the formats' lists, the manifest, the report.
+//! Writes the files of the whole dataset once all images are complete: the formats' lists, the manifest, the report.
 
 use crate::format::labels::LeftOut;
+use crate::make::pack::store;
 use crate::make::push;
+use crate::make::task::{Task, remaining};
 use crate::model::recipe::{FILE, MANIFEST, Recipe};
-use crate::pack::store;
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native::{Files, is_native};
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::set::{Set, Stream, Whole, in_parallel};
-use crate::read::task::{Task, remaining};
 use crate::{format, index, report};
 use furrow_base::error::Kind;
 use furrow_base::{Error, Result};
@@ -20,8 +20,9 @@ use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Writes everything that belongs to all images. A [`Kind::Damaged`](furrow_base::error::Kind::Damaged) names the images that are missing, and, of a dataset in so many
-/// `shards`, those.
+/// Writes all files of the whole dataset and returns their paths. If images are missing, returns an error of
+/// [`Kind::Damaged`] that lists them, and, if the number of `shards` is given, the
+/// shards that contain them.
 pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     push::refuse_freed(set)?;
     let cut = store::cut_short(set);
@@ -40,7 +41,7 @@ pub fn finish(set: &Set, shards: Option<u64>) -> Result<Vec<PathBuf>> {
     check_records(set).and_then(|()| written(set)).map_err(|e| with_a_way_out(set, e))
 }
 
-/// An error where a record is not what its checksum says: tables and lists would repeat what is wrong in it.
+/// Returns an error if a record differs from its checksum, because tables and lists would copy the wrong values.
 fn check_records(set: &Set) -> Result<()> {
     let fault = |k| set.checksums(k).and_then(|checksums| set.fault_of_record(&checksums));
     match in_parallel(0..set.recipe.count, fault).flatten().next() {
@@ -49,7 +50,7 @@ fn check_records(set: &Set) -> Result<()> {
     }
 }
 
-/// An error in a file of an image, with what mends it.
+/// Adds a help text to an error in a file of an image: how to repair it.
 fn with_a_way_out(set: &Set, error: Error) -> Error {
     let within = error.place().and_then(|place| place.file.strip_prefix(&set.folder).ok());
     let is_image = within.is_some_and(|path| path.starts_with("images") || path.starts_with("packs"));
@@ -58,7 +59,7 @@ fn with_a_way_out(set: &Set, error: Error) -> Error {
     }
     let folder = set.folder.display();
     error.help(format!(
-        "`trace dataset render {folder}` makes anew what is damaged; `trace dataset verify {folder}` tells all of it"
+        "`trace dataset render {folder}` renders damaged images again; `trace dataset verify {folder}` lists all damage"
     ))
 }
 
@@ -68,7 +69,7 @@ fn written(set: &Set) -> Result<Vec<PathBuf>> {
     let packs: Vec<Id> = Packing::of(recipe).map(|packing| packing.all().collect()).unwrap_or_default();
     packs.par_iter().try_for_each(|id| store::ensure(set, *id))?;
     if !packs.is_empty() {
-        // Where nothing is in it.
+        // Fails if the folder is not empty, which is intended.
         let _ = std::fs::remove_dir(folder.join("images"));
     }
     let mut whole = Whole::new(folder);
@@ -86,21 +87,22 @@ fn written(set: &Set) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Says which images are missing, for a person, and, where their number is known, which shards, for a scheduler.
+/// Returns the error for missing images: lists the images, and, if the number of shards is given, the shards for a
+/// scheduler.
 pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> Error {
     let again = match shards {
-        None => "run `trace dataset render` again; it makes what is missing".to_owned(),
+        None => "run `trace dataset render` again; it renders the missing images".to_owned(),
         Some(of) => {
             let lacking: BTreeSet<u64> = missing.iter().map(|k| set.recipe.unit_of(*k) % of).collect();
             let lacking: Vec<u64> = lacking.into_iter().collect();
-            format!("run the shards again that have them: --array={}", ranges(&lacking))
+            format!("run the shards that contain them again: --array={}", ranges(&lacking))
         }
     };
     let words = format!("{} of {} images are missing: {}", missing.len(), set.recipe.count, ranges(missing));
     Error::damaged(words).help(again).in_file(&set.folder)
 }
 
-/// Numbers in rising order as `1-3,7`: what Slurm's `--array` takes.
+/// Formats ascending numbers as `1-3,7`, the syntax of Slurm's `--array`.
 pub fn ranges(numbers: &[u64]) -> String {
     let mut parts: Vec<(u64, u64)> = Vec::new();
     for n in numbers {
@@ -113,7 +115,7 @@ pub fn ranges(numbers: &[u64]) -> String {
     parts.iter().map(text).collect::<Vec<_>>().join(",")
 }
 
-/// The recipe and the scene, which belong to no image.
+/// Returns the checksums of the recipe and of the scene's files, which belong to no image.
 fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum>> {
     let mut todo = vec![folder.join(FILE)];
     if recipe.rendering().is_ok() {
@@ -123,7 +125,7 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum
     while let Some(path) = todo.pop() {
         if path.is_dir() {
             let entries = std::fs::read_dir(&path).map_err(Error::io(&path))?;
-            // Another program may be about to write what is there already.
+            // Skips temporary files of another process that is writing the same files.
             let whole = entries.filter_map(std::io::Result::ok).filter(|entry| !is_unfinished(&entry.file_name()));
             todo.extend(whole.map(|entry| entry.path()));
         } else {
@@ -135,7 +137,7 @@ fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum
     Ok(files)
 }
 
-/// The manifest, image by image: it may be larger than memory.
+/// Writes the manifest image by image, since it may be larger than memory.
 fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>) -> Result<()> {
     let Set { folder, recipe, .. } = set;
     let mut content = Sha256::new();
@@ -185,13 +187,13 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     out.put("\n}\n")
 }
 
-/// The archives that images lie in.
+/// Returns the path and checksum of each archive of images.
 pub(crate) fn archives(set: &Set) -> impl Iterator<Item = (String, Checksum)> + '_ {
     let all = Packing::of(&set.recipe).map(Packing::all).into_iter().flatten();
     all.filter_map(|id| Some((id.path(), set.packs.get(&set.folder, id)?.tar.clone())))
 }
 
-/// The files of an image that lie in the dataset's folder, and in no archive.
+/// Returns the files of an image that are stored in the dataset's folder, not in an archive.
 pub(crate) fn of_image<'a>(
     recipe: &Recipe,
     image: &'a ChecksumRecord,

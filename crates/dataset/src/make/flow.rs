@@ -1,8 +1,8 @@
-//! Where what an image shows lies in other images of its field: optical flow to the next frame, disparity to the other cameras.
+//! Optical flow to the next frame and disparity to the other cameras, for each pixel of an image.
 //!
-//! Nothing is estimated: the point of the surface at a pixel's centre, as the label's ray met it, is projected by the other camera,
-//! whose lens, rolling shutter and place are known. Whether it is seen there is asked by a ray from that camera to the point. Plants and
-//! ground do not move between the images of a field.
+//! The flow is exact: the surface point that the label ray hits at a pixel's centre is projected into the other camera,
+//! whose lens, rolling shutter and pose are known. A ray from that camera to the point determines whether the point is
+//! visible there. Plants and ground do not move between the images of a field.
 
 use crate::model::sample::Flow;
 use furrow_base::geometry::{Intersect, Ray};
@@ -11,11 +11,11 @@ use furrow_field::drive::Capture;
 use furrow_optics::sensor::Camera;
 use rayon::prelude::*;
 
-/// A point hides itself from a ray that ends this share of its length before it.
+/// Visibility rays end this fraction of their length before the point, so that the surface does not occlude itself.
 const CLOSE: f32 = 1e-4;
 
-/// The flows of image `at` of a field's captures: to the next frame of its camera, and to the other cameras of its frame. `depth` is that of
-/// its pixels, row by row.
+/// Returns the flows of capture `at` of a field: to the next frame of its camera, and to the other cameras of its
+/// frame. `depth` is the depth of its pixels, row by row.
 pub fn flows(captures: &[Capture], at: usize, depth: &[f32], geometry: &dyn Intersect) -> Vec<Flow> {
     let here = &captures[at];
     let next = captures.iter().find(|other| other.name == here.name && other.frame == here.frame + 1);
@@ -40,7 +40,7 @@ fn flow(to: &str, from: &Camera, other: &Camera, depth: &[f32], geometry: &dyn I
     Flow { to: to.into(), pixels, visible }
 }
 
-/// Whether something lies between an eye and a point.
+/// Returns `true` if an object occludes the segment from `eye` to `point`.
 fn hidden(point: Vec3, eye: Vec3, geometry: &dyn Intersect) -> bool {
     let way = point - eye;
     let length = way.length();

@@ -1,8 +1,9 @@
-//! Takes everything that a scene reads into the dataset's folder, so that the dataset can be continued and checked on any machine.
+//! Copies all files that a scene reads into the dataset's folder, so that the dataset can be continued and verified on
+//! any machine.
 //!
-//! Files that the scene reaches by relative paths keep their places to each other below `scene/`. A file that only an absolute path
-//! leads to goes to `scene/external/`, and where a path no longer leads to its file, the copied RON file gets a relative one. So do names
-//! that stand for files that ship with the program.
+//! Files that the scene names by relative paths keep their relative positions below `scene/`. A file that is named by
+//! an absolute path only goes to `scene/external/`. In copied RON files, paths that no longer lead to their file are
+//! replaced by relative paths, and so are names of files that ship with the program.
 
 use crate::File;
 use furrow_base::input::tidy;
@@ -12,22 +13,23 @@ use furrow_grow::soil::LAYERS;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-/// A scene's files as files of a dataset.
+/// The files of a scene, as they are stored in a dataset.
 pub(crate) struct Gathered {
     /// The files, below `scene/`.
     pub(crate) files: Vec<File>,
-    /// The scene file among them.
+    /// Path of the scene file, one of `files`.
     pub(crate) scene: String,
-    /// Whether the copy of a RON file names a file otherwise than the original does.
+    /// Whether the copy of a RON file names a file differently from the original.
     pub(crate) rewritten: bool,
 }
 
-/// Gathers the files that a scene reads, `scene` itself among them; paths as they were opened. `shipped` has the files for which names
-/// stand in the scene file.
+/// Reads the files at `paths`, which are all files of a scene including `scene` itself, as they were opened. `shipped`
+/// maps names in the scene file to files that ship with the program.
 pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, scene: &Path) -> Result<Gathered> {
     let places = places(paths, scene)?;
     let scene = absolute(scene)?;
-    // A species file names others by their files' names alone: `name` and the keys of tables stand in quotes too.
+    // In species files only names with the extension `.ron` are replaced: `name` and keys of tables are quoted strings
+    // too.
     let is_file = |name: &str| Path::new(name).extension().is_some_and(|e| e == "ron");
     let files: BTreeMap<String, PathBuf> =
         shipped.iter().filter(|(name, _)| is_file(name)).map(|(name, file)| (name.clone(), file.clone())).collect();
@@ -40,7 +42,7 @@ pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, sce
         {
             let page = RonFile { path: from.clone(), text: text.to_owned() };
             let is_scene = *from == scene;
-            // Layers that are not named are files that ship, which the copy must name.
+            // A scene file without `layers` uses files that ship with the program; the copy must name them.
             let whole = is_scene.then(|| page.written_out("soil", "layers", LAYERS)).flatten();
             let text = whole.as_ref().unwrap_or(&page.text);
             if let Some(text) =
@@ -55,10 +57,11 @@ pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, sce
     Ok(Gathered { files: gathered, scene: slashed(&places[&scene]), rewritten })
 }
 
-/// Where each file goes, by its absolute path; places are relative to the dataset's folder.
+/// Returns the destination of each file, relative to the dataset's folder, by its absolute path.
 fn places(paths: &[PathBuf], scene: &Path) -> Result<BTreeMap<PathBuf, PathBuf>> {
     let folder = scene.parent().unwrap_or(Path::new(""));
-    // Reached by relative paths alone: such a path begins as the scene's own does.
+    // True for files that are named by relative paths only; if the scene's path is absolute, theirs start with its
+    // folder.
     let near = |path: &Path| if scene.is_absolute() { path.starts_with(folder) } else { path.is_relative() };
     let mut root = absolute(scene)?;
     root.pop();
@@ -87,7 +90,8 @@ fn places(paths: &[PathBuf], scene: &Path) -> Result<BTreeMap<PathBuf, PathBuf>>
     Ok(places)
 }
 
-/// The text of a RON file that moves from `from` to `to` with the others; `None` where each of its paths leads to its file as before.
+/// Returns the text of a RON file that is copied from `from` to `to`, with corrected paths; `None` if all its paths
+/// remain valid.
 fn renamed(
     text: &str,
     from: &Path,
@@ -104,19 +108,20 @@ fn renamed(
     })
 }
 
-/// The way from a folder to a file; both are relative to the same folder, without `.` and `..`.
+/// Returns the relative path from a folder to a file; both must be relative to the same folder and without `.` and
+/// `..`.
 fn relative(folder: &Path, file: &Path) -> PathBuf {
     let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
     let up = folder.components().skip(shared).map(|_| Component::ParentDir);
     up.chain(file.components().skip(shared)).collect()
 }
 
-/// An absolute path without `.` and `..`.
+/// Returns the absolute path without `.` and `..`.
 fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).map(|full| tidy(&full)).map_err(Error::reading(path))
 }
 
-/// A relative path with `/` between its names.
+/// Returns a relative path with `/` as the separator.
 fn slashed(path: &Path) -> String {
     let names: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
     names.join("/")
@@ -145,7 +150,7 @@ mod tests {
             to(&["/p/a.ron", "/p/external/x.png", "/q/x.png"], "/p/a.ron"),
             ["scene/a.ron", "scene/external/x.png", "scene/external-/x.png"]
         );
-        // An absolute path to what lies beside the scene.
+        // A scene file given by its name alone.
         assert_eq!(to(&["a.ron", "b.ron"], "a.ron"), ["scene/a.ron", "scene/b.ron"]);
     }
 

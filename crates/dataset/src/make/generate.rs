@@ -1,21 +1,22 @@
-//! Makes the images that are missing, several at once, until all are there or someone asks to stop.
+//! Makes the missing images of a dataset, several at the same time, until all are complete or the run is stopped.
 //!
-//! Growing a field, labelling and writing it keep one core busy, drawing keeps all of them: so several images are under way at once,
-//! each with a share of the threads as a pool of its own. (In one pool for all, a thread that waits for a part of its image takes up
-//! a part of another, and may take up all of it.) Memory grows with the images at once, not with the dataset.
+//! Scene construction, labelling and writing use one core, rendering uses all. Therefore several images are in progress
+//! at the same time, each with its own pool of a part of the threads. (In a common pool, a thread that waits for work
+//! on its own image may steal work of another image and stay busy with it.) Memory depends on the number of images in
+//! progress, not on the size of the dataset.
 
 use crate::make::meter;
+use crate::make::pack::store;
 use crate::make::push::{Push, Unit};
 use crate::make::render::{LastField, Times, render, renderer, scene_file};
+use crate::make::task::{Task, in_format, task};
 use crate::make::time_left::TimeLeft;
 use crate::make::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
-use crate::pack::store;
 use crate::read::checksum_record::{ChecksumRecord, write_files_beside};
 use crate::read::native;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::set::Set;
-use crate::read::task::{Task, in_format, task};
 use crate::{File, format};
 use furrow_base::error::Kind;
 use furrow_base::{Error, Result};
@@ -30,25 +31,26 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Which of the images a run is for: those of the [units](crate::Recipe::unit_of) whose number % of == number.
+/// The part of a dataset that a run makes: the images whose [unit](crate::Recipe::unit_of) `u` satisfies `u % of ==
+/// number`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 0.
+    /// Number of the shard, from 0.
     pub number: u64,
-    /// How many shards there are.
+    /// Number of shards.
     pub of: u64,
 }
 
 impl Shard {
-    /// All images.
+    /// A single shard with all images.
     pub const ALL: Self = Self { number: 0, of: 1 };
 
-    /// Whether it holds a unit.
+    /// Returns `true` if a unit belongs to this shard.
     pub fn holds(self, unit: u64) -> bool {
         unit % self.of == self.number
     }
 
-    /// Reads `k/N`, k from 0 to N − 1.
+    /// Parses `k/N`, with k from 0 to N − 1.
     pub fn parse(text: &str) -> Result<Self, String> {
         let pair = text.split_once('/').and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
         pair.filter(|(k, n)| k < n)
@@ -57,74 +59,79 @@ impl Shard {
     }
 }
 
-/// How a run works; none of it changes a byte.
+/// Settings of a run that do not affect the contents of the dataset.
 #[derive(Clone, Copy, Debug)]
 pub struct Work<'a> {
-    /// Which images.
+    /// The part of the dataset to make.
     pub shard: Shard,
-    /// Workers; 0 for one on each core.
+    /// Number of threads; 0 for one per core.
     pub threads: usize,
-    /// Images under way at once; 0 for one on each worker, but no more than 16, nor than the memory is for.
+    /// Number of images in progress at the same time; 0 for one per thread, limited to 16 and to the fields that fit
+    /// into `memory`.
     pub at_once: usize,
-    /// Bytes of memory that a field may take; the usual share of the machine's unless given.
+    /// Memory limit of a field, bytes; `None` for the default fraction of the machine's memory.
     pub memory: Option<u64>,
-    /// How what is finished is sent elsewhere.
+    /// Command that copies finished files to another place.
     pub push: Option<&'a Push>,
-    /// Told how far the fields are that grow.
+    /// Receives the progress of scene construction.
     pub progress: Option<&'a Arc<BuildProgress>>,
-    /// Told how long images take.
+    /// Receives the time that each image takes.
     pub time_left: Option<&'a TimeLeft>,
 }
 
 impl Default for Work<'_> {
-    /// All images, on all cores.
+    /// All images, on all cores, without pushing and progress.
     fn default() -> Self {
         Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None, time_left: None }
     }
 }
 
-/// How a run is watched and stopped.
+/// Callbacks for progress and warnings of a run, and flags that stop it.
 pub struct Callbacks<'a> {
-    /// Told how many images are to be made, before the first.
+    /// Called before the first image with the number of images to make.
     pub begin: &'a (dyn Fn(usize) + Sync),
-    /// Told what the user should know before hours are spent.
+    /// Called with each warning before the first image.
     pub warn: &'a (dyn Fn(&str) + Sync),
-    /// Told of every image that is done, from any thread.
+    /// Called with the index of each completed image, from any thread.
     pub done: &'a (dyn Fn(u64) + Sync),
-    /// Set it to stop when the images under way are done.
+    /// Set to `true` to stop once the images in progress are complete.
     pub soon: &'a AtomicBool,
-    /// Set it to stop at once.
+    /// Set to `true` to stop at once.
     pub now: &'a Arc<AtomicBool>,
 }
 
-/// Where the images of a run go when they are finished.
+/// Destination of the finished images of a run.
 pub(crate) struct Delivery<'a> {
-    /// Whether an image is where it is to be already, wherever the run works.
+    /// Returns `true` if an image is already at the destination.
     pub(crate) has: &'a (dyn Fn(u64) -> bool + Sync),
-    /// Told of each unit that is finished, also of those that earlier runs finished.
+    /// Called for each finished unit, including units that earlier runs finished.
     pub(crate) deliver: &'a (dyn Fn(Unit) -> Result<()> + Sync),
-    /// The dataset's folder, wherever the run works: its timing log tells of the run, and who stops it is told its name.
+    /// The dataset's folder, which receives the timing log and is named in messages; the run itself may work in another
+    /// folder.
     pub(crate) home: &'a Path,
 }
 
-/// Images under way at once unless said otherwise: more would take more memory than they save time.
+/// Default limit of the number of images in progress: more would need much memory and save little time.
 pub(crate) const MOST_AT_ONCE: usize = 16;
 
-/// How many fields like one of them the memory is for. Where that cannot be told, one: its image will say why.
+/// Returns how many fields like field `index` fit into memory, from 1 to [`MOST_AT_ONCE`]. Returns 1 if the estimate
+/// fails; building the field then reports the error.
 pub(crate) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
     let memory = memory.unwrap_or_else(usual_memory) as f64;
     let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
     ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
 }
 
-/// Threads of one worker, of all that are shared out among so many workers; at least one.
+/// Returns the number of threads of one of `workers` workers that share `threads` threads; at least one.
 pub(crate) fn share(threads: usize, workers: usize, worker: usize) -> usize {
     (threads / workers + usize::from(worker < threads % workers)).max(1)
 }
 
-/// Makes what is missing of a shard. Stopped, it returns [`Kind::Interrupted`] with the number of images that are there, and the same
-/// call goes on later. A fault of one field ([`Error::is_of_one_field`]) is told when all others are made; a cause that lasts ends the
-/// run at once. What is made is kept in any case.
+/// Makes the missing images of a shard. A stopped run returns [`Kind::Interrupted`] with the number of complete images;
+/// the same call continues later.
+///
+/// An error of a single field ([`Error::is_of_one_field`]) is returned after all other images are made; any other
+/// error, such as a full disk, ends the run at once. Completed images are kept in all cases.
 pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     work.push.map_or(Ok(()), |push| push.clear(set))?;
     let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
@@ -132,7 +139,7 @@ pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result
     generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, home: &set.folder })
 }
 
-/// The same where what is finished goes elsewhere.
+/// Like [`generate`], with a custom destination for the finished images.
 pub(crate) fn generate_for(
     set: &Set,
     work: &Work<'_>,
@@ -154,13 +161,13 @@ pub(crate) fn generate_for(
     let tasks: Vec<(u64, Task)> = tasks.into_iter().filter(|(_, t)| *t != Task::Done).collect();
     (callbacks.begin)(tasks.len());
     open.expect(set, &tasks)?;
-    // What is there and was not delivered: units that lack nothing.
+    // Delivers the units that are already complete, since an earlier run may have stopped before delivering them.
     let lacking: BTreeSet<String> = tasks.iter().map(|(index, _)| Unit::of(set, *index).name()).collect();
     let mut units: Vec<Unit> = held_units(set, shard);
     units.retain(|unit| !lacking.contains(&unit.name()));
     let sent = delivery.deliver;
     units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
-    // Images of one field and day follow each other on one worker, which grows it once.
+    // One worker renders all images of a field and day one after another, and builds the scene once.
     let fields: Vec<&[(u64, Task)]> =
         tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
     if let Some(time_left) = work.time_left {
@@ -203,9 +210,9 @@ pub(crate) fn generate_for(
     let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
     let failed = AtomicBool::new(false);
     let fail = |index: u64, error: Error| {
-        // What is wrong with one field is no reason to lose a night; what is wrong with the disk is.
+        // An error of one field does not stop the run; any other error, such as a full disk, does.
         failed.fetch_or(!error.is_of_one_field(), Ordering::Relaxed);
-        // Where the disk is full it cannot be noted, and the error itself is told.
+        // If this write fails too, for example on a full disk, the original error is still returned.
         let _ = run.timing_log.add(&Row::Failure(ImageFailure { index, error: error.to_string(), failed_s: now() }));
         failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
     };
@@ -232,7 +239,7 @@ pub(crate) fn generate_for(
                 }
             };
             if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
-                // Those that did start end with their images.
+                // The threads that did start stop after their current images.
                 failed.store(true, Ordering::Relaxed);
                 return Some(Error::no_thread(e));
             }
@@ -240,7 +247,7 @@ pub(crate) fn generate_for(
         None
     });
     let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // It may have been stopped after the last image was done.
+    // A stop may arrive after the last image; the run is complete then.
     let lacking = tasks.len() - made.into_inner();
     let end = match lacking {
         _ if !failures.is_empty() => End::Failed,
@@ -258,17 +265,18 @@ pub(crate) fn generate_for(
     if lacking == 0 { Ok(()) } else { Err(interrupted(delivery.home, wanted - lacking, wanted)) }
 }
 
-/// Told to stop when so many of the images that were asked for were there.
+/// Returns the error of a stopped run, with the number of complete images (`there`) and of requested images (`wanted`).
 pub(crate) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
-    Error::stopped(format!("stopped: {there} of {wanted} images are there"))
-        .help("the same command goes on with it")
+    Error::stopped(format!("stopped: {there} of {wanted} images are complete"))
+        .help("the same command continues the dataset")
         .in_file(folder)
 }
 
-/// Images whose faults are told one by one.
+/// Largest number of failed images that are listed in an error message.
 const MOST_TOLD: usize = 20;
 
-/// What went wrong in a run, by image: the whole run's failure alone, or those of single images in one.
+/// Combines the errors of a run, by image, into one: an error that ended the run alone, or else the list of errors of
+/// single fields.
 pub(crate) fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
     let more = failures.len().saturating_sub(MOST_TOLD);
@@ -287,13 +295,13 @@ pub(crate) fn together(failures: BTreeMap<u64, Error>) -> Error {
     }
     words.truncate(MOST_TOLD);
     if more > 0 {
-        words.push(format!("{more} images more were not made; correct these and run the same command again"));
+        words.push(format!("{more} more images were not made; correct these errors and run the same command again"));
     }
     let words = words.join("\nerror: ");
     if input { Error::input(words) } else { Error::damaged(words) }
 }
 
-/// What a shard pushes, images or packs.
+/// Returns the units of a shard that are delivered: images or packs.
 fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
     match Packing::of(&set.recipe) {
         Some(packing) => packing.all().filter(|id| shard.holds(packing.place(*id))).map(Unit::Pack).collect(),
@@ -301,11 +309,11 @@ fn held_units(set: &Set, shard: Shard) -> Vec<Unit> {
     }
 }
 
-/// The packs of a shard that are not whole yet.
+/// The incomplete packs of a shard, each with its number of images to make.
 pub(crate) struct OpenPacks(BTreeMap<Id, AtomicUsize>);
 
 impl OpenPacks {
-    /// Those of a shard, none where images lie in folders.
+    /// Returns the incomplete packs of a shard; none if the dataset stores images in folders.
     pub(crate) fn of(set: &Set, shard: Shard) -> Result<Self> {
         let Some(packing) = Packing::of(&set.recipe) else { return Ok(Self(BTreeMap::new())) };
         let held: Vec<Id> = packing.all().filter(|id| shard.holds(packing.place(*id))).collect();
@@ -313,12 +321,12 @@ impl OpenPacks {
         Ok(Self(open.into_iter().filter(|(_, whole)| !whole).map(|(id, _)| (id, AtomicUsize::new(0))).collect()))
     }
 
-    /// Whether an image lies in a pack that is whole.
+    /// Returns `true` if an image belongs to a complete pack.
     pub(crate) fn is_settled(&self, set: &Set, index: u64) -> bool {
         Packing::of(&set.recipe).is_some_and(|packing| !self.0.contains_key(&packing.id(index)))
     }
 
-    /// Is told what remains to be done; closes the packs of which nothing does.
+    /// Counts the remaining images of each pack, and closes the packs that have none.
     fn expect(&self, set: &Set, tasks: &[(u64, Task)]) -> Result<()> {
         let Some(packing) = Packing::of(&set.recipe) else { return Ok(()) };
         for (index, _) in tasks {
@@ -330,7 +338,8 @@ impl OpenPacks {
         ready.map(|(id, _)| *id).try_for_each(|id| store::close(set, id))
     }
 
-    /// Is told of an image that is there; closes its pack after the last. Whether the unit that it belongs to is finished.
+    /// Counts an image as complete, and closes its pack after the last one. Returns `true` if the image's unit is now
+    /// finished.
     fn made(&self, set: &Set, index: u64) -> Result<bool> {
         let Some(id) = Packing::of(&set.recipe).map(|packing| packing.id(index)) else { return Ok(true) };
         let is_last = self.0.get(&id).is_some_and(|left| left.fetch_sub(1, Ordering::AcqRel) == 1);
@@ -344,7 +353,7 @@ impl OpenPacks {
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
-    /// What images are rendered from, and by what.
+    /// Scene file and renderer; `None` if no image has to be rendered.
     source: Option<(SceneFile, &'a Renderer)>,
     callbacks: &'a Callbacks<'a>,
     threads: usize,
@@ -354,11 +363,11 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Makes one image and writes its checksums.
+    /// Makes one image, or only its formats, and writes its checksum record.
     fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe, .. } = self.set;
-        // Another run may have made it meanwhile.
+        // Another run may have made the image in the meantime.
         if self::task(self.set, index)? == Task::Done {
             self.tell_time(begin, Duration::ZERO);
             return Ok(());
@@ -383,7 +392,8 @@ impl Run<'_> {
         write_files_beside(folder, &files, &own)?;
         let mut checksums = ChecksumRecord::of(index, recipe, &files)?;
         if let Some(before) = before {
-            // What only the renderer knows was whole, or the image would have been rendered again.
+            // Keeps the checksums of native files and of formats that need the film: these are intact, or the task
+            // would be `All`.
             let films: Vec<&str> =
                 format::all(recipe)?.into_iter().filter(|(_, f)| f.needs_film()).map(|(name, _)| name).collect();
             let kept = |path: &str| path.starts_with("images/") || films.iter().any(|name| in_format(path, name));
@@ -395,7 +405,8 @@ impl Run<'_> {
         self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
     }
 
-    /// Tells how long an image took whose field grew so long for it, seconds.
+    /// Adds an image's time to the remaining-time estimate, with the time `grow` of scene construction. Returns the
+    /// image's time, seconds.
     fn tell_time(&self, begin: Instant, grow: Duration) -> f64 {
         let seconds = begin.elapsed().as_secs_f64();
         if let Some(time_left) = self.time_left {
@@ -404,7 +415,8 @@ impl Run<'_> {
         seconds
     }
 
-    /// Notes that the run ends, and what it took since the process had taken so much.
+    /// Writes the last row of the timing log: the reason for the end, the CPU time since `cpu_before`, and the peak
+    /// memory.
     fn ended(&self, end: End, cpu_before: Option<Duration>) -> Result<()> {
         let taken = meter::cpu().zip(cpu_before).map(|(now, before)| now.saturating_sub(before));
         self.timing_log.add(&Row::Ended(Ended {
@@ -416,7 +428,7 @@ impl Run<'_> {
     }
 }
 
-/// The files of all formats of an image.
+/// Returns the files of all formats of an image.
 pub(crate) fn formatted(set: &Set, sample: &crate::Sample) -> Result<Vec<File>> {
     let mut files = Vec::new();
     for (_, format) in format::all(&set.recipe)? {
@@ -425,7 +437,7 @@ pub(crate) fn formatted(set: &Set, sample: &crate::Sample) -> Result<Vec<File>> 
     Ok(files)
 }
 
-/// The files of those formats that follow from the native files.
+/// Returns the files of the formats that can be made from the native files, without rendering.
 fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
     let sample = set.sample(index)?;
     let mut files = Vec::new();
@@ -435,9 +447,9 @@ fn derived(set: &Set, index: u64) -> Result<Vec<File>> {
     Ok(files)
 }
 
-/// An image that nothing can make again.
+/// Returns the error for a damaged image that was imported and so cannot be rendered again.
 fn lost(set: &Set, index: u64) -> Error {
-    Error::damaged(format!("image {index} is damaged, and nothing here can make it again"))
+    Error::damaged(format!("image {index} is damaged, and an imported image cannot be rendered again"))
         .in_file(&set.folder)
         .help("import the images again")
 }

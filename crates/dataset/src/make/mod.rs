@@ -1,4 +1,4 @@
-//! A whole dataset in one call: plan, render, finish.
+//! Makes a whole dataset in one call: plans it, renders the images, writes the files of the whole dataset.
 
 pub mod begin;
 pub mod bill;
@@ -8,10 +8,12 @@ pub mod flow;
 pub mod gather;
 pub mod generate;
 pub mod meter;
+pub mod pack;
 pub mod plan;
 pub mod push;
 pub mod render;
 pub mod status;
+pub mod task;
 pub mod time_left;
 pub mod timing_log;
 
@@ -22,22 +24,24 @@ use furrow_base::Result;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Makes what is missing of a dataset in `folder` with all threads, and returns the paths of the files that belong to all images.
-/// Killed, stopped or damaged, the same call makes what is missing and ends with the same files.
+/// Makes the missing images of the dataset in `folder` on all cores, and returns the paths of the files that describe
+/// the whole dataset (lists, manifest, report). After a kill, a stop or damage, the same call makes the missing images
+/// and ends with the same files.
 pub fn make(folder: impl AsRef<Path>, order: &Order) -> Result<Vec<PathBuf>> {
     let never = Arc::default();
     let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &|_| (), soon: &never, now: &never };
     make_watched(folder.as_ref(), order, &Work::default(), &callbacks)
 }
 
-/// The same with a choice of threads, told of warnings and progress, and stopped when the callbacks say so. All shards are made.
+/// Like [`make`], with settings for threads and memory, and with callbacks that receive warnings and progress and can
+/// stop the run. Ignores the shard of `work` and makes all images.
 pub fn make_watched(folder: &Path, order: &Order, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     let set = begin(folder, order, callbacks)?;
     generate(&set, &Work { shard: Shard::ALL, ..*work }, callbacks)?;
     finish::finish(&set, None)
 }
 
-/// Begins a dataset, or finds it begun, and tells the warnings.
+/// Creates the dataset in `folder`, or opens it if it exists, and passes the warnings to `callbacks.warn`.
 pub fn begin(folder: &Path, order: &Order, callbacks: &Callbacks<'_>) -> Result<Set> {
     let (set, warnings) = plan(folder, order, callbacks.now)?;
     for warning in &warnings {

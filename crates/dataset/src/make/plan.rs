@@ -1,9 +1,11 @@
-//! Begins a dataset: checks the scene file by growing its first field, takes everything that it reads into the folder, writes the recipe.
+//! Creates a dataset: checks the scene file by building its first field, copies all files that it reads into the
+//! folder, writes the recipe.
 
 use crate::format::labels::Labels;
 use crate::make::begin::begin;
 use crate::make::gather::{Gathered, gather};
 use crate::make::generate::interrupted;
+use crate::make::pack;
 use crate::make::status::images_there;
 use crate::model::classes::Classes;
 use crate::model::keep::{self, Kept, Omitted};
@@ -11,7 +13,6 @@ use crate::model::labelling::Labelling;
 use crate::model::photo::Photo;
 use crate::model::recipe::{FILE, Made, Recipe, Rendering};
 use crate::model::split::Shares;
-use crate::pack;
 use crate::read::checksum_record;
 use crate::read::links;
 use crate::read::set::Set;
@@ -27,52 +28,54 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// What a dataset is to be: scene file, number of images, size, formats, render options.
+/// Order of a dataset: scene file, number of images, image size, formats, render options.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// The scene file.
     pub scene: PathBuf,
-    /// Seed, instead of the scene file's.
+    /// Seed; `None` for the scene file's.
     pub seed: Option<u64>,
-    /// How many images.
+    /// Number of images.
     pub count: u64,
-    /// Days on which they are taken, instead of the scene file's; none keeps them.
+    /// Days on which the images are taken; empty for the scene file's.
     pub days: Vec<u32>,
-    /// Image width, instead of the scene file's.
+    /// Image width in pixels; `None` for the scene file's.
     pub width: Option<u32>,
-    /// Image height.
+    /// Image height in pixels; `None` for the scene file's.
     pub height: Option<u32>,
-    /// Formats beside the native one.
+    /// Names of additional formats; the native format is always written.
     pub formats: Vec<String>,
-    /// Classes of the formats, and what they leave out.
+    /// Classes of the formats, and limits below which plants and leaves are omitted from them.
     pub labelling: Labelling,
-    /// Maps that images keep beside photograph, labels and record.
+    /// Maps that are stored in addition to the image, labels and record.
     pub keep: Vec<Kept>,
-    /// Label maps that images go without, since their records tell the same. `None`: none, or those that a dataset goes without that is gone on
-    /// with.
+    /// Label maps that are not stored, since the record contains the same information. `None` omits none in a new
+    /// dataset and keeps the choice of an existing one.
     pub omit: Option<Vec<Omitted>>,
-    /// How photographs are stored; as PNG, a dataset that is gone on with keeps its way.
+    /// Encoding of the images; with the default, PNG, an existing dataset keeps its encoding.
     pub photo: Photo,
-    /// Whether images are labels alone: nothing is lit, and there are no photographs.
+    /// Whether only labels are made, without lighting and without rendered images.
     pub labels_only: bool,
-    /// How the images are split.
+    /// Shares of the training, validation and test sets.
     pub split: Shares,
-    /// Images of an archive, instead of a folder each; a multiple of the images of a field.
+    /// Number of images per archive, a multiple of the images of a field; `None` stores each image in a folder.
     pub pack: Option<u64>,
-    /// What others may do with them.
+    /// Licence of the dataset, as free text.
     pub licence: String,
-    /// How the images are rendered, before the edit; a fixed number of samples.
+    /// Render options before `edit` is applied; the number of samples must be fixed.
     pub options: RenderOptions,
-    /// What is changed; [`furrow_field::ablation::FULL`] for nothing.
+    /// Ablation that is applied; [`furrow_field::ablation::FULL`] for none.
     pub edit: &'static Edit,
-    /// Most bytes of memory that a field may take, where not the usual; no byte depends on it.
+    /// Memory limit of a field, bytes; `None` for the default. Does not affect the contents of the dataset.
     pub memory: Option<u64>,
-    /// Told how far the first field is, which grows to check the order, and of a bill those of the images that are drawn; no byte depends on it.
+    /// Receives the progress of building the first field, which checks the order, and of the probes of a cost estimate.
+    /// Does not affect the contents of the dataset.
     pub progress: Arc<BuildProgress>,
 }
 
 impl Order {
-    /// Images 0 to `count` − 1 of a scene file, as the file says, path traced with the usual quality, in the native format.
+    /// Creates an order for images 0 to `count` − 1 of a scene file: its size, seed and days, path traced with the
+    /// default quality, in the native format.
     pub fn new(scene: impl Into<PathBuf>, count: u64) -> Self {
         Self {
             scene: scene.into(),
@@ -97,15 +100,16 @@ impl Order {
         }
     }
 
-    /// What the manifest says where nobody has said what others may do.
+    /// Licence text of the manifest if no licence is given.
     pub const NO_LICENCE: &'static str = "not stated";
 }
 
-/// Most species that `species.png` numbers.
+/// Largest number of species: `species.png` has 8 bits, and 0 is no species.
 const MOST_SPECIES: usize = u8::MAX as usize;
 
-/// Begins a dataset in `folder`, or goes on with the same one: it may get longer and get more formats. Returns it with what the user
-/// should know. Given up where the flag is raised while the first field grows: [`Kind::Interrupted`], with the number of images that are there.
+/// Creates a dataset in `folder`, or continues the existing one, which may get more images and more formats. Returns it
+/// with warnings for the user. Raising `stop` while the first field is built returns [`Kind::Interrupted`] with the
+/// number of complete images.
 pub fn plan(folder: &Path, order: &Order, stop: &Arc<AtomicBool>) -> Result<(Set, Vec<String>)> {
     let drafted = draft(order, stop).map_err(|error| match error.kind() {
         Kind::Interrupted => given_up(folder, order.count, error),
@@ -116,7 +120,7 @@ pub fn plan(folder: &Path, order: &Order, stop: &Arc<AtomicBool>) -> Result<(Set
     Ok((Set::new(folder, recipe), warnings))
 }
 
-/// An interruption, with what lies in the folder of a dataset that is to have so many images.
+/// Adds the number of complete images in the folder to an interruption; `images` is the number of ordered images.
 fn given_up(folder: &Path, images: u64, error: Error) -> Error {
     let begun = Set::open(folder).and_then(|set| Ok((images_there(&set)?, set.recipe.count)));
     match begun {
@@ -125,30 +129,30 @@ fn given_up(folder: &Path, images: u64, error: Error) -> Error {
     }
 }
 
-/// A dataset that was checked and not begun.
+/// A checked order; nothing is written yet.
 pub(crate) struct Draft {
-    /// What would make it.
+    /// Recipe of the dataset.
     pub(crate) recipe: Recipe,
-    /// The scene that it would hold.
+    /// Files of the scene, to be copied into the dataset.
     pub(crate) files: Vec<File>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub(crate) warnings: Vec<String>,
-    /// The scene file where it lies now.
+    /// The original scene file.
     pub(crate) scene: SceneFile,
-    /// [`Rendering::scene_sha256`] of the scene where it lies now.
+    /// [`Rendering::scene_sha256`] of the original scene.
     pub(crate) scene_sha256: String,
 }
 
-/// Checks an order by growing its first field as far as something is told of it; given up where the flag is raised.
+/// Checks an order by building its first field, without most of the ground. Raising `stop` ends it with an error.
 pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
-    // Names are checked before anything is written.
+    // Options are checked before anything is written.
     let options = order.edit.options(order.options.clone());
     if !options.quality.is_fixed() {
-        return Err(Error::input("the images of a dataset have a fixed number of samples")
+        return Err(Error::input("the images of a dataset need a fixed number of samples")
             .help("give --spp instead of --target-error or --time"));
     }
     let keep = if order.labels_only { labels_alone(order, &options)? } else { keep::checked(order.keep.clone())? };
-    // Before anything grows: what could not be rendered here.
+    // Opening the renderer first reports missing hardware or libraries before a field is built.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
     let source = opened(&order.scene, order)?.until(stop);
     let first = source.clone().told_only().field(0)?;
@@ -159,7 +163,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             field.species.len()
         ))
         .in_file(&order.scene)
-        .help("make two scene files of it"));
+        .help("split it into two scene files"));
     }
     let Gathered { files, scene, rewritten } = gather(&field.files, &field.shipped, &order.scene)?;
     let elsewhere = rewritten || source.allows_outside();
@@ -209,30 +213,31 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     Ok(Draft { recipe, files, warnings: told, scene: source, scene_sha256 })
 }
 
-/// The maps that images keep which are labels alone; an error for what such images cannot be.
+/// Returns the maps to store for images without rendering (`labels_only`). Returns an error for options that need
+/// rendering.
 fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
-    let refused = |what: &str| Err(Error::misuse(what).help("leave --labels-only out, or this"));
+    let refused = |what: &str| Err(Error::misuse(what).help("leave out --labels-only or this option"));
     if options.engine != Engine::Trace {
-        return refused("--engine raster draws its labels with its picture, and --labels-only draws none");
+        return refused("--engine raster renders labels together with the image, and --labels-only renders no image");
     }
     if order.edit.asks_samples() {
-        return refused("this --edit makes labels of samples, and --labels-only takes none");
+        return refused("this --edit makes labels from samples, and --labels-only takes none");
     }
     if order.photo != Photo::default() {
-        return refused("--photo stores photographs, and --labels-only draws none");
+        return refused("--photo sets the encoding of images, and --labels-only renders none");
     }
     keep::checked(keep::of_labels(&order.keep)?)
 }
 
-/// A scene file as an order asks for it.
+/// Opens a scene file with the edit, seed, days, size and limits of an order.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
     let scene = SceneFile::edited(scene, order.edit)?;
     let scene = scene.seed(order.seed).days(&order.days).width(order.width).height(order.height).memory(order.memory);
     Ok(scene.unlit(order.labels_only).progress(&order.progress))
 }
 
-/// SHA-256 of a scene whose copies may name other files than the originals do, found by growing the first field from them in
-/// a folder of their own; an error where it still reads something outside.
+/// Returns the SHA-256 of a scene whose copied files may contain other paths than the originals. Builds the first field
+/// from the copies in a temporary folder, and returns an error if it reads a file outside that folder.
 fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicBool>) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
@@ -249,20 +254,20 @@ fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicB
     }
 }
 
-/// What formats with one pose for all rows lose of a camera that rolls.
+/// Returns a warning if formats with one pose per image are written for a camera with a rolling shutter.
 fn rolling(recipe: &Recipe, camera: &Camera) -> Result<Option<String>> {
     let formats = format::all(recipe)?.into_iter().filter(|(_, format)| camera.rolls() && format.has_one_pose());
     let names: Vec<String> = formats.map(|(name, _)| name.to_string()).collect();
-    let words = "cannot tell a rolling shutter: poses are those of the middle row";
+    let words = "cannot represent a rolling shutter: poses are those of the middle row";
     Ok((!names.is_empty()).then(|| format!("{} {words}", names.join(", "))))
 }
 
-/// What the formats of a recipe cannot hold or do otherwise.
+/// Returns the formats' warnings about data that they cannot represent.
 fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     let mut all = Vec::new();
     if recipe.formats.is_empty() && !recipe.labelling.is_usual() {
         all.push(
-            "classes and limits are those of formats, and there is none: `trace dataset finish DIR --format …` writes them".into(),
+            "classes and limits apply to formats, and none is given: `trace dataset finish DIR --format …` adds formats".into(),
         );
     }
     for (name, format) in format::all(recipe)? {
@@ -271,8 +276,8 @@ fn warnings(recipe: &Recipe) -> Result<Vec<String>> {
     Ok(all)
 }
 
-/// Adds formats to a dataset, and gives all of them other labels where some are given; their files are made by the next run. Returns what the
-/// user should know.
+/// Adds formats to a dataset, and replaces the classes and limits of all its formats if `labelling` is not the default.
+/// The next run makes the formats' files. Returns warnings for the user.
 pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Result<Vec<String>> {
     let mut recipe = set.recipe.clone();
     if !labelling.is_usual() {
@@ -289,12 +294,12 @@ pub fn add_formats(set: &mut Set, names: &[String], labelling: &Labelling) -> Re
         && let Some((name, _)) = format::all(&recipe)?.into_iter().find(|(_, f)| f.needs_film() || f.needs_camera())
     {
         return Err(Error::input(format!(
-            "--format {name} holds what only the renderer knows, and these images were not rendered"
+            "--format {name} contains data that only the renderer has, and these images were imported"
         ))
         .in_file(&set.folder)
         .help(
-            "other formats can be \
-             added; `trace dataset finish --help` lists them",
+            "add another format; \
+             `trace dataset finish --help` lists all",
         ));
     }
     format::check_maps(&recipe).and_then(|()| pack::check(&recipe)).map_err(|e| e.in_file(&set.folder))?;

@@ -1,17 +1,19 @@
-//! Sends what is finished elsewhere while the rest is made: a command of the user's is run for each finished image or pack.
+//! Copies finished files to another place during the run: executes a command of the user for each finished image or
+//! pack.
 //!
-//! A unit is what is finished at once: a pack with its record, an image with its checksums and the files of its formats, the recipe with the
-//! scene before them, and what `finish` writes after them. For each a folder is made that holds its files by their paths below the dataset's
-//! folder, as further names of the same files. A command that copies what is in that folder, keeping paths, therefore builds the same dataset
-//! at the other place:
+//! Files are pushed in units: first the recipe with the scene, then each pack with its record or each image with its
+//! checksum record and the files of its formats, and at the end the files that `finish` writes. Each unit gets a
+//! temporary folder with hard links to its files, under their paths relative to the dataset's folder. A command that
+//! copies this folder's contents and keeps the paths therefore builds the same dataset at the other place:
 //!
 //! ```text
 //! --push 'rclone copy {dir} remote:bucket/set'      --push 'cp -a {dir}/. /mnt/set/'
 //! --push 'aws s3 cp --recursive {dir} s3://bucket/set'
 //! ```
 //!
-//! What was pushed is noted in `pushed/UNIT.json` with a hash of what it was, after the command and the one that checks it have ended well; so
-//! a killed run pushes again what it was about to push, and nothing else. Freed units count as done.
+//! After the command and the check command have succeeded, the unit's hash is written to `pushed/UNIT.json`. A run
+//! after a kill therefore repeats only the push that was interrupted. Units whose files were removed after the push
+//! count as complete.
 
 use crate::model::recipe::{FILE, MANIFEST, compact};
 use crate::read::checksum::Checksum;
@@ -33,31 +35,31 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How finished units are sent elsewhere.
+/// Command and settings that copy finished units to another place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Push {
-    /// Shell command; `{dir}` stands for the folder with a unit's files.
+    /// Shell command; `{dir}` is replaced by the folder with a unit's files.
     pub command: String,
-    /// Shell command that is run after it, and fails where what arrived is not what was sent.
+    /// Shell command that is run after `command` and must fail if the copy differs from the original.
     pub check: Option<String>,
-    /// Whether the files of a unit are removed here once it was pushed.
+    /// Whether the local files of a unit are removed after it was pushed.
     pub free: bool,
-    /// How often a unit is tried before the run ends.
+    /// Number of attempts for a unit before the run ends with an error.
     pub tries: u32,
-    /// How long a command may take; as long as it likes unless given.
+    /// Time limit of a command; `None` for no limit.
     pub timeout: Option<Duration>,
 }
 
-/// What stands for the folder in a command.
+/// Placeholder for the folder in a command.
 const DIR: &str = "{dir}";
 
-/// The last words of a command that are told.
+/// Number of bytes at the end of a command's output that an error message may contain.
 const TOLD: u64 = 2000;
 
-/// Between two looks at a command that runs.
+/// Polling interval for a running command.
 const EVERY: Duration = Duration::from_millis(20);
 
-/// What is pushed at once.
+/// A set of files that are pushed together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unit {
     /// The recipe and the scene.
@@ -66,12 +68,12 @@ pub(crate) enum Unit {
     Pack(Id),
     /// An image in a folder of its own.
     Image(u64),
-    /// What belongs to all images together.
+    /// The files of the whole dataset that `finish` writes.
     Whole,
 }
 
 impl Unit {
-    /// The one that an image belongs to.
+    /// Returns the unit of an image.
     pub(crate) fn of(set: &Set, index: u64) -> Self {
         Packing::of(&set.recipe).map_or(Self::Image(index), |packing| Self::Pack(packing.id(index)))
     }
@@ -89,7 +91,8 @@ impl Unit {
         folder.join("pushed").join(format!("{}.json", self.name()))
     }
 
-    /// Its files by their paths below the dataset's folder, and a hash of what they are; `None` where it is not finished.
+    /// Returns the paths of its files below the dataset's folder and a hash of their contents; `None` if the unit is
+    /// not finished.
     pub(crate) fn contents(self, set: &Set) -> Result<Option<(Vec<String>, String)>> {
         let folder = &set.folder;
         Ok(match self {
@@ -125,13 +128,13 @@ impl Unit {
         })
     }
 
-    /// What was noted of it, where it was pushed as it is now.
+    /// Returns the record of its push if it was pushed with the contents that have this hash.
     fn noted(self, set: &Set, hash: &str) -> Option<Note> {
         let bytes = furrow_base::input::contents(&self.note(&set.folder)).ok()?;
         serde_json::from_slice(&bytes).ok().filter(|note: &Note| note.sha256 == hash)
     }
 
-    /// Whether its files were removed here because they lie elsewhere.
+    /// Returns `true` if its local files were removed after it was pushed.
     pub(crate) fn is_freed(self, set: &Set) -> bool {
         if !self.note(&set.folder).is_file() {
             return false;
@@ -141,7 +144,7 @@ impl Unit {
     }
 }
 
-/// Names of the units whose files were removed here because they lie elsewhere.
+/// Returns the names of the units whose local files were removed after they were pushed.
 pub(crate) fn freed(set: &Set) -> BTreeSet<String> {
     let Ok(entries) = std::fs::read_dir(set.folder.join("pushed")) else { return BTreeSet::new() };
     let notes = entries.filter_map(|entry| furrow_base::input::contents(&entry.ok()?.path()).ok());
@@ -149,29 +152,30 @@ pub(crate) fn freed(set: &Set) -> BTreeSet<String> {
     notes.filter(|note| note.freed).map(|note| note.unit).collect()
 }
 
-/// An error where images were pushed and removed here: what belongs to all images is made of all of them.
+/// Returns an error if images were pushed and removed locally, because the files of the whole dataset are made from all
+/// images.
 pub(crate) fn refuse_freed(set: &Set) -> Result<()> {
     let freed = freed(set).len();
     if freed == 0 {
         return Ok(());
     }
     let what = if set.recipe.pack.is_some() { "packs" } else { "images" };
-    Err(Error::misuse(format!("{freed} {what} were pushed and removed here"))
-        .help("`trace dataset finish` and `verify` read all of them: run these on the folder that they were pushed to")
+    Err(Error::misuse(format!("the local files of {freed} {what} were removed after they were pushed"))
+        .help("`trace dataset finish` and `verify` read all images: run them on the folder that received the images")
         .in_file(&set.folder))
 }
 
-/// That a unit was pushed.
+/// Record of a pushed unit, stored in `pushed/UNIT.json`.
 #[derive(Serialize, Deserialize)]
 struct Note {
     unit: String,
-    /// Of its record, or of its files.
+    /// Hash of the unit's checksum record, or of its files if it has none.
     sha256: String,
-    /// Whether its files were removed here.
+    /// Whether its local files were removed.
     freed: bool,
 }
 
-/// Files below a folder of the dataset.
+/// Adds the paths of all files below the folder `within` of the dataset to `files`.
 fn below_folder(folder: &Path, within: &str, files: &mut Vec<String>) -> Result<()> {
     let Ok(entries) = std::fs::read_dir(folder.join(within)) else { return Ok(()) };
     for entry in entries {
@@ -187,7 +191,7 @@ fn below_folder(folder: &Path, within: &str, files: &mut Vec<String>) -> Result<
     Ok(())
 }
 
-/// Files of a format that belong to no image, from the manifest that lists all.
+/// Returns the files of a format that belong to no image, from the list of all files in the manifest.
 fn lists(folder: &Path, set: &Set, format: &str) -> Vec<String> {
     #[derive(Deserialize)]
     struct Listed {
@@ -212,22 +216,22 @@ fn hashed(folder: &Path, files: Vec<String>) -> Result<(Vec<String>, String)> {
     Ok((files, Checksum::of(words.as_bytes()).sha256))
 }
 
-/// Pushes what `finish` wrote.
+/// Pushes the files that `finish` wrote.
 pub fn whole(set: &Set, push: &Push, stop: &AtomicBool) -> Result<()> {
     push.unit(set, Unit::Whole, stop)
 }
 
 impl Push {
-    /// An error where the commands do not say what is to be copied.
+    /// Returns an error if the command does not contain `{dir}`.
     pub fn check(&self) -> Result<()> {
         if self.command.contains(DIR) {
             return Ok(());
         }
-        Err(Error::misuse(format!("--push `{}` does not say what is to be copied", self.command))
-            .help("write {dir} for the folder whose files are finished, such as --push 'rclone copy {dir} remote:set'"))
+        Err(Error::misuse(format!("--push `{}` does not contain {{dir}}", self.command))
+            .help("write {dir} for the folder with the finished files, such as --push 'rclone copy {dir} remote:set'"))
     }
 
-    /// Pushes a unit, unless it was pushed as it is now; does nothing where it is not finished.
+    /// Pushes a finished unit, unless it was already pushed with its current contents. Ignores unfinished units.
     pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: &AtomicBool) -> Result<()> {
         let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
         let note = |freed| Note { unit: unit.name(), sha256: hash.clone(), freed };
@@ -238,27 +242,28 @@ impl Push {
             Some(_) => {}
             None => {
                 match self.send(set, unit, &files, stop) {
-                    // Another run may have pushed it meanwhile, and removed it here.
+                    // Another run may have pushed the unit in the meantime and removed its local files.
                     Err(e) if e.is_not_found() && unit.noted(set, &hash).is_some_and(|note| note.freed) => {
                         return Ok(());
                     }
                     other => other?,
                 }
-                // The command may have taken hours.
+                // Checked again, since the command may have taken hours.
                 refuse_links(&set.folder, Path::new("pushed"))?;
                 write_atomically(&path, &compact(&note(false))?)?;
             }
         }
         let is_of_images = matches!(unit, Unit::Pack(_) | Unit::Image(_));
         if self.free && is_of_images {
-            // First what says that they lie elsewhere.
+            // The record is written before the files are removed, so that a kill in between loses no information.
             write_atomically(&path, &compact(&note(true))?)?;
             free(set, &files)?;
         }
         Ok(())
     }
 
-    /// Clears away what killed runs have left of their pushes and archives: further names of files that are to take no room here any longer.
+    /// Removes temporary folders and archives of killed runs if pushed files are freed; their hard links would keep the
+    /// disk space of removed files in use.
     pub(crate) fn clear(&self, set: &Set) -> Result<()> {
         refuse_links(&set.folder, Path::new("packs"))?;
         for folder in [set.folder.clone(), set.folder.join("packs")].iter().filter(|_| self.free) {
@@ -269,7 +274,7 @@ impl Push {
         Ok(())
     }
 
-    /// Runs the commands until both end well.
+    /// Runs the commands until both succeed, at most `tries` times with growing pauses.
     fn send(&self, set: &Set, unit: Unit, files: &[String], stop: &AtomicBool) -> Result<()> {
         let folder = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
         let mut pause = Duration::from_secs(1);
@@ -278,7 +283,7 @@ impl Push {
                 None => return Ok(()),
                 Some(words) if tried >= self.tries => {
                     return Err(Error::failed(format!("{} was not pushed: {words}", unit.name()))
-                        .help("mend the command or the place it copies to; the same run goes on with what is not pushed yet")
+                        .help("correct the command or its destination; the same run continues with the units that are not pushed yet")
                         .in_file(&set.folder));
                 }
                 Some(_) => {}
@@ -293,12 +298,12 @@ impl Push {
     }
 }
 
-/// How long is waited for whoever clears a folder away to be done with it.
+/// Time to wait for another process that may be removing a temporary folder.
 const CLEARING: Duration = Duration::from_secs(1);
 
-/// A folder with a unit's files, for its commands.
+/// A temporary folder with a unit's files, for the commands.
 struct Staged {
-    /// Around it. It has the name of unfinished files: what a killed run leaves is cleared away with these.
+    /// Parent folder, named like unfinished files so that it is removed with them if the run is killed.
     around: tempfile::TempDir,
     dir: PathBuf,
 }
@@ -311,7 +316,7 @@ impl Staged {
             let (from, to) = (below(folder, file)?, below(&dir, file)?);
             let parent = to.parent().unwrap_or(&dir);
             std::fs::create_dir_all(parent).map_err(Error::io(parent))?;
-            // Another file system has no second name for it.
+            // Copies the file if a hard link is impossible, for example across file systems.
             if std::fs::hard_link(&from, &to).is_err() {
                 std::fs::copy(&from, &to).map_err(Error::io(&from))?;
             }
@@ -319,7 +324,8 @@ impl Staged {
         Ok(Self { around, dir })
     }
 
-    /// Whether another run has cleared it away as what a killed one has left. A command may well move the files out of it.
+    /// Returns `true` if another run has removed the folder as a leftover of a killed run. Missing files alone do not
+    /// prove it, since a command may move them.
     fn was_cleared(&self, files: &[String]) -> bool {
         if files.iter().all(|file| self.dir.join(file).is_file()) {
             return false;
@@ -330,12 +336,12 @@ impl Staged {
 }
 
 impl Push {
-    /// Runs the commands once; what is wrong in words where one fails.
+    /// Runs both commands once. Returns a description of the failure if one fails.
     fn attempt(&self, unit: Unit, folder: &Path, files: &[String], stop: &AtomicBool) -> Result<Option<String>> {
         loop {
             let staged = Staged::of(unit, folder, files)?;
             let mut failure = self.run(&self.command, &staged.dir, stop)?;
-            // The command has seen all only where nobody has taken any of it away.
+            // Repeats the attempt if another run removed the folder before the command had copied all of it.
             if staged.was_cleared(files) {
                 continue;
             }
@@ -349,20 +355,21 @@ impl Push {
         }
     }
 
-    /// Runs a command; what is wrong in words where it fails or takes too long. It is ended, with what it has started, where the run is to stop.
+    /// Runs a command. Returns a description of the failure if it fails or exceeds the time limit. If `stop` is raised,
+    /// ends the command and its child processes and returns an error.
     fn run(&self, command: &str, dir: &Path, stop: &AtomicBool) -> Result<Option<String>> {
         let place = dir.to_str().ok_or_else(|| {
-            Error::misuse("a folder whose name is not UTF-8 cannot stand in --push")
+            Error::misuse("--push cannot pass a folder whose name is not UTF-8")
                 .in_file(dir)
-                .help("name --out otherwise")
+                .help("give --out another name")
         })?;
         let filled = filled(command, place);
-        // A file, which unlike a pipe takes any number of words.
+        // The output goes to a file, because a full pipe would block the command.
         let mut said = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
         let words = |said: &std::fs::File| said.try_clone().map_err(Error::io(&std::env::temp_dir()));
         let mut shell = Command::new("sh");
         shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&said)?).stderr(words(&said)?);
-        // A group of its own: what it starts ends with it.
+        // A separate process group, so that child processes can be ended with the command.
         let mut child = shell.process_group(0).spawn().map_err(Error::io(Path::new("sh")))?;
         let begin = Instant::now();
         let ended = loop {
@@ -387,7 +394,7 @@ impl Push {
         let _ = said.seek(std::io::SeekFrom::Start(length.saturating_sub(TOLD)));
         let _ = said.take(TOLD).read_to_end(&mut text);
         let text = String::from_utf8_lossy(&text);
-        let last = text.trim().lines().last().unwrap_or("it said nothing");
+        let last = text.trim().lines().last().unwrap_or("it printed nothing");
         Ok(Some(format!(
             "`{filled}` ended with {}: {last}",
             ended.code().map_or("a signal".into(), |code| code.to_string())
@@ -395,20 +402,20 @@ impl Push {
     }
 }
 
-/// How long a command that is ended may clear up after itself.
+/// Time between SIGTERM and SIGKILL for a command that is ended.
 const GRACE: Duration = Duration::from_secs(2);
 
-/// Ends a command and what it has started: asked first, then killed.
+/// Ends a command and its child processes with SIGTERM, and with SIGKILL after [`GRACE`].
 fn end(child: &mut Child) {
     let group = child.id();
-    // Whether anybody of the group was there to get it.
+    // Returns true if the process group still had a process to receive the signal.
     let send = |signal: &str| {
         let words = format!("kill -s {signal} -- -{group}");
         Command::new("sh").arg("-c").arg(words).stderr(Stdio::null()).status().is_ok_and(|ended| ended.success())
     };
     send("TERM");
     let until = Instant::now() + GRACE;
-    // The shell may be gone while what it started is not; signal 0 asks and does nothing.
+    // The shell may have ended before its child processes; signal 0 only tests whether any process is left.
     while Instant::now() < until && { matches!(child.try_wait(), Ok(None)) || send("0") } {
         std::thread::sleep(EVERY);
     }
@@ -416,7 +423,7 @@ fn end(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// Removes the files of a unit here; what tells of them stays.
+/// Removes the local files of a unit, except the checksum records.
 pub(crate) fn free(set: &Set, files: &[String]) -> Result<()> {
     for file in files.iter().filter(|file| !file.starts_with("seals/")) {
         let path = below(&set.folder, file)?;
@@ -424,7 +431,7 @@ pub(crate) fn free(set: &Set, files: &[String]) -> Result<()> {
             Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(&path)(e)),
             _ => {}
         }
-        // The folder of an image, where nothing is left in it.
+        // Removes the folder of an image if it is empty.
         if native::is_native(file) {
             let _ = path.parent().map(std::fs::remove_dir);
         }
@@ -432,7 +439,8 @@ pub(crate) fn free(set: &Set, files: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A command with the folder in its place, as one word whatever it holds, within and without quotes.
+/// Replaces the placeholder of a command by the folder's path, escaped so that the shell sees one word, both within and
+/// outside quotes.
 fn filled(command: &str, dir: &str) -> String {
     #[derive(Clone, Copy, PartialEq)]
     enum Quotes {
@@ -482,7 +490,7 @@ fn filled(command: &str, dir: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Expected: the shell gets the folder's name letter by letter, wherever in the command it stands.
+    /// Expected: the shell receives the folder's path unchanged, wherever the placeholder is in the command.
     #[test]
     fn the_folder_is_one_word_wherever_it_stands() {
         for dir in ["/a b/c", "/it's", "/$HOME `x` \"y\" \\ z", "/plain"] {

@@ -1,4 +1,4 @@
-//! Renders field k: a [`Sample`].
+//! Renders or labels one image of a dataset and describes it as a [`Sample`].
 
 use crate::format;
 use crate::make::damage;
@@ -21,31 +21,31 @@ use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// What its name says.
+/// Seconds per day.
 const SECONDS_A_DAY: f64 = 86_400.0;
 
-/// Where an image's time went.
+/// Time of each step of making an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Times {
-    /// Growing the field and building what rays hit.
+    /// Building the scene and the BVH.
     pub grow: Duration,
-    /// Drawing, denoising included.
+    /// Rendering, including denoising.
     pub draw: Duration,
-    /// Labels and extents.
+    /// Computing labels and extents.
     pub label: Duration,
 }
 
-/// A new image of a dataset.
+/// A newly made image of a dataset.
 pub struct RenderedSample {
-    /// The image.
+    /// The image with its labels and record.
     pub sample: Sample,
-    /// What its pictures say of where they came from.
+    /// Provenance text, stored as metadata in its image files.
     pub text: String,
-    /// Where the time went.
+    /// Time of each step.
     pub times: Times,
 }
 
-/// The scene file that a dataset is rendered from.
+/// Opens the scene file of a dataset.
 pub fn scene_file(set: &Set) -> Result<SceneFile> {
     let rendering = set.recipe.rendering()?;
     let (folder, edit) = (&set.folder, rendering.edit()?);
@@ -54,8 +54,8 @@ pub fn scene_file(set: &Set) -> Result<SceneFile> {
     Ok(scene.unlit(rendering.labels_only))
 }
 
-/// What renders the images of a dataset; `None` for images that were imported. An error where this machine would make other bits than
-/// the one that began the dataset.
+/// Opens the renderer of a dataset; returns `None` for imported images. Returns an error if the images on this machine
+/// would differ from those of the machine that created the dataset.
 pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
     let renderer = near_renderer(set)?;
     if let Some(renderer) = &renderer {
@@ -64,8 +64,8 @@ pub fn renderer(set: &Set) -> Result<Option<Renderer>> {
     Ok(renderer)
 }
 
-/// The same for images that are compared and not kept: its ray tracing kernels may be others than the dataset's, as long as the images are
-/// [nearly the same](crate::check::difference).
+/// Like [`renderer`], for images that are only compared: the ray tracing kernels may differ from the dataset's, since
+/// the comparison allows [small differences](crate::check::difference).
 pub fn near_renderer(set: &Set) -> Result<Option<Renderer>> {
     let Ok(rendering) = set.recipe.rendering() else { return Ok(None) };
     same(set, "furrow", &set.recipe.furrow, env!("CARGO_PKG_VERSION"))?;
@@ -76,35 +76,35 @@ pub fn near_renderer(set: &Set) -> Result<Option<Renderer>> {
     Ok(Some(renderer))
 }
 
-/// Nothing where this machine has what the dataset was begun with.
+/// Returns an error if `here`, the version on this machine, is not `there`, the one that the dataset was created with.
 fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
     if there == here {
         return Ok(());
     }
     let folder = set.folder.display();
-    let words = format!("{folder}: the dataset was begun with {what} {there}, this is {here}: its images would differ");
-    Err(Error::misuse(words).help(format!("go on with {there}, or begin another dataset")))
+    let words = format!("{folder}: the dataset was created with {what} {there}, this is {here}: images would differ");
+    Err(Error::misuse(words).help(format!("continue it with {there}, or create another dataset")))
 }
 
-/// The field that was grown last, for the next image of it.
+/// The field that was built last, reused for further images of it.
 #[derive(Default)]
 pub struct LastField {
     field: Option<Field>,
-    /// Of its image before.
+    /// Traits that were measured for the previous image of this field.
     traits: Option<Traits>,
 }
 
-/// A field as an image has it.
+/// The field of an image, set to the image's camera and frame.
 pub(crate) struct Last<'a> {
     pub(crate) field: &'a Field,
-    /// What was measured of it for its image before, if it has one.
+    /// Traits that were measured for the previous image of this field; `None` for the first.
     traits: &'a mut Option<Traits>,
-    /// How long it took to grow and build it now.
+    /// Time of building the scene and BVH; zero if the field was reused.
     pub(crate) grow: Duration,
 }
 
 impl LastField {
-    /// The field that an image of a dataset shows.
+    /// Returns the field of an image of a dataset, and builds it if it is not the previous one.
     pub(crate) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<Last<'_>> {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
@@ -117,8 +117,8 @@ impl LastField {
         }
         let mut field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
         if field.grown().hash != rendering.scene_sha256 {
-            let help = format!("restore {}/scene/, or begin another dataset", folder.display());
-            let words = "the scene file or something that it names was changed since the dataset was begun";
+            let help = format!("restore {}/scene/, or create another dataset", folder.display());
+            let words = "the scene file or a file that it names was changed since the dataset was created";
             return Err(Error::misuse(words).help(help).in_file(folder.join(&rendering.scene)));
         }
         field.take(of_day)?;
@@ -129,13 +129,13 @@ impl LastField {
     }
 }
 
-/// Of an image of a field: which of its day it is, and the day.
+/// Splits the number of a capture of a field into its number within the day and the day.
 pub(crate) fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
     let a_day = recipe.captures_a_day();
     (capture % a_day, recipe.days().get((capture / a_day) as usize).copied())
 }
 
-/// Makes image `index` of a dataset from its [`scene_file`], whose threads do the work.
+/// Makes image `index` of a dataset from its [`scene_file`], on the threads of the scene file.
 pub fn render(
     set: &Set,
     scene_file: &SceneFile,
@@ -157,7 +157,7 @@ pub fn render(
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
 
-/// Labels an image without drawing it.
+/// Labels an image without rendering it.
 fn label(set: &Set, Last { field, traits, grow }: Last<'_>, index: u64, renderer: &Renderer) -> Result<RenderedSample> {
     let begin = Instant::now();
     let labels = field.label()?;
@@ -166,7 +166,7 @@ fn label(set: &Set, Last { field, traits, grow }: Last<'_>, index: u64, renderer
     Ok(RenderedSample { sample, text, times: Times { grow, draw: Duration::ZERO, label: begin.elapsed() } })
 }
 
-/// The sample of an image.
+/// Returns the sample of a rendered image.
 fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field();
@@ -184,7 +184,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<T
     }
     sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
-    // Classes know what they cover.
+    // Class statistics include the coverage, so they are computed again now that it is known.
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     if !recipe.keeps(Kept::Coverage) {
         sample.coverage.clear();
@@ -195,7 +195,7 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<T
     Ok(sample)
 }
 
-/// The sample of an image of which nothing but labels is known.
+/// Returns the sample of an image with everything that follows from its labels and its field.
 fn labelled(
     recipe: &Recipe,
     index: u64,
@@ -238,7 +238,7 @@ fn labelled(
         rgb: Vec::new(),
         nir: Vec::new(),
         semantics: labels.tags.iter().map(|t| t.class as u8).collect(),
-        // The recipe holds no more species than 8 bits number.
+        // At most 255 species, checked when the dataset is planned.
         species: labels.tags.iter().map(|t| kind(t.plant) as u8).collect(),
         parts: if recipe.rendering()?.parts { annotate::part_numbers(&labels, &field.kinds) } else { Vec::new() },
         plants: labels.tags.iter().map(|t| t.plant).collect(),
@@ -267,7 +267,7 @@ fn labelled(
     Ok(sample)
 }
 
-/// Which image of its field this is.
+/// Returns the record of a capture: field, day, frame, camera and time.
 fn taken(recipe: &Recipe, field: &furrow_field::Field) -> CaptureRecord {
     let Capture { name, frame, time_s, .. } = &field.captures[field.capture];
     let (first, place) = (recipe.days().first(), recipe.days().iter().position(|day| Some(*day) == field.day));
@@ -282,7 +282,7 @@ fn taken(recipe: &Recipe, field: &furrow_field::Field) -> CaptureRecord {
     }
 }
 
-/// The plants of a field that its image shows or hides, in the order of their numbers.
+/// Returns the plants of a field in the image's view, including fully occluded ones, by ascending number.
 fn plants(field: &furrow_field::Field, traits: &Traits, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
     let extents = render::extents(&field.scene, labels);
     let camera = &field.scene.camera;
@@ -300,7 +300,7 @@ fn plants(field: &furrow_field::Field, traits: &Traits, labels: &LabelMap, sampl
                 known(&mut leaf.seen, extent);
             }
         }
-        // Leaves of which no pixel is seen.
+        // Leaves without a visible pixel.
         for ((_, number), extent) in extents.range((grown.number, 1)..=(grown.number, u16::MAX)) {
             if extent.unoccluded > 0
                 && let Err(place) = plant.leaves.binary_search_by_key(number, |l| l.number)
@@ -334,7 +334,7 @@ fn plants(field: &furrow_field::Field, traits: &Traits, labels: &LabelMap, sampl
     all
 }
 
-/// A plant of which no pixel is seen.
+/// Returns the entry of a plant without a visible pixel.
 fn hidden(grown: &PlantRecord) -> Plant {
     Plant {
         number: grown.number,

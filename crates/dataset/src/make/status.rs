@@ -1,121 +1,124 @@
-//! How far a dataset is, from what lies in its folder: so it is told while runs are under way, after they were killed, and on any machine
-//! that sees the folder.
+//! Progress of a dataset, computed from the files in its folder. It is therefore available during runs, after a kill,
+//! and on any machine that can read the folder.
 //!
-//! An image counts as done where its checksums name files of the right lengths; [`verify`](crate::check::verify()) reads their bytes too.
+//! An image counts as complete if the files of its checksum record exist and have the recorded lengths;
+//! [`verify`](crate::verify()) also checks their contents.
 
 use crate::make::push::{self, Unit};
+use crate::make::task::{Task, remaining};
 use crate::make::timing_log::{self, End, ImageFailure, ImageTiming, Row, RunLog};
 use crate::model::recipe::compact;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::set::{Set, in_parallel};
-use crate::read::task::{Task, remaining};
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Images that are told as the slowest.
+/// Number of images that are listed as the slowest.
 const MOST_SLOW: usize = 5;
-/// A run that has not ended is silent when it has told nothing for so many times its slowest image …
+/// A run without an end row is silent after a pause in its log of this multiple of its slowest image's time …
 const SILENT_IMAGES: f64 = 10.0;
-/// … and for so many seconds.
+/// … and of at least this number of seconds.
 const SILENT_SECONDS: f64 = 300.0;
 
-/// How far a dataset is.
+/// Progress of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
-    /// Images that it is to have.
+    /// Number of images of the complete dataset.
     pub images: u64,
-    /// Of them, those that are there.
+    /// Number of complete images.
     pub done: u64,
-    /// Runs that have begun and not ended, and are not silent.
+    /// Number of runs that have started, have not ended and are not silent.
     pub working: usize,
-    /// Images an hour of all runs that work; where none does, of one run as they were.
+    /// Images per hour of all working runs together; if no run is working, the mean rate of a single earlier run.
     pub images_per_hour: Option<f64>,
-    /// Seconds until all are there at that rate; of shards that are at work, those of the slowest.
+    /// Estimated seconds until all images are complete: of the slowest shard if all incomplete shards are working, or
+    /// else at `images_per_hour`.
     pub left_s: Option<f64>,
-    /// Core seconds of the runs that have ended, where they tell it.
+    /// Total core seconds of the ended runs that recorded them.
     pub core_s: f64,
-    /// Most memory of a run's process, where one tells it.
+    /// Largest peak memory of a run's process, bytes, if any run recorded it.
     pub peak_bytes: Option<u64>,
-    /// Shard by shard.
+    /// Status of each shard.
     pub shards: Vec<ShardStatus>,
-    /// The images that took longest.
+    /// The slowest images.
     pub slowest: Vec<SlowImage>,
-    /// The images that are not there and could not be made.
+    /// Missing images whose last attempt failed.
     pub failures: Vec<FailedImage>,
 }
 
-/// How far a shard is.
+/// Progress of a shard.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShardStatus {
-    /// Its number, from 0.
+    /// Number of the shard, from 0.
     pub number: u64,
-    /// Images that it is to have.
+    /// Number of images of the complete shard.
     pub images: u64,
-    /// Of them, those that are there.
+    /// Number of complete images.
     pub done: u64,
-    /// Of the others, those that could not be made.
+    /// Number of missing images whose last attempt failed.
     pub failed: u64,
-    /// What its last run does.
+    /// State of its last run.
     pub state: State,
-    /// Images an hour of its last run.
+    /// Images per hour of its last run.
     pub images_per_hour: Option<f64>,
-    /// Seconds until all are there at that rate.
+    /// Estimated seconds until all images are complete at that rate.
     pub left_s: Option<f64>,
-    /// Seconds since its last run told something.
+    /// Seconds since the last entry in its last run's log.
     pub last_s: Option<f64>,
 }
 
-/// What the last run of a shard does.
+/// State of a shard, from its images and the log of its last run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// All images are there.
+    /// All images are complete.
     Done,
-    /// It makes images.
+    /// The run is making images.
     Working,
-    /// It has not ended, but has told nothing for long: it may have been killed.
+    /// The run has no end row and has logged nothing for a long time: it may have been killed.
     Silent,
-    /// It was asked to stop.
+    /// The run was stopped.
     Stopped,
-    /// It has ended, and some images could not be made.
+    /// The run has ended, and some images could not be made.
     Failed,
-    /// It has ended or was never begun, and images are missing.
+    /// Images are missing, and the shard has no run, or its last run ended without an error.
     Missing,
 }
 
-/// An image that took long.
+/// One of the slowest images.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SlowImage {
-    /// Its number.
+    /// Index of the image.
     pub index: u64,
-    /// Seconds in all.
+    /// Total seconds.
     pub seconds: f64,
-    /// Of them, growing the field.
+    /// Seconds of scene construction.
     pub grow_s: f64,
-    /// Drawing.
+    /// Seconds of rendering.
     pub draw_s: f64,
-    /// Labelling.
+    /// Seconds of labelling.
     pub label_s: f64,
-    /// Plants that it shows or hides, where its record is there.
+    /// Number of plants in view, visible or occluded; `None` if its record cannot be read.
     pub plants: Option<usize>,
 }
 
 /// An image that could not be made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailedImage {
-    /// Its number.
+    /// Index of the image.
     pub index: u64,
     /// The shard that it belongs to.
     pub shard: u64,
-    /// Why.
+    /// The error message.
     pub error: String,
 }
 
 impl Status {
-    /// Looks at a dataset as one of so many shards: as many as its last run had, unless given.
+    /// Computes the progress of a dataset of `shards` shards; `None` takes the number of shards of its last run.
+    /// Raising `stop` ends it with an error.
     pub fn of(set: &Set, shards: Option<u64>, stop: &AtomicBool) -> Result<Self> {
         let logs = timing_log::runs(&set.folder)?;
         let runs: Vec<Run<'_>> = logs.iter().map(Run::of).collect();
@@ -129,7 +132,7 @@ impl Status {
             .map(|f| FailedImage { index: f.index, shard: shard_of(f.index), error: f.error.clone() })
             .collect();
         let now = timing_log::now();
-        // More shards than images are named by nobody, and would fill the memory.
+        // Shards beyond the number of images are empty; without the limit a huge number would exhaust memory.
         let mut all: Vec<ShardStatus> = (0..of.min(set.recipe.count.max(1))).map(ShardStatus::empty).collect();
         for (index, done) in (0..).zip(&there) {
             if let Some(shard) = all.get_mut(shard_of(index) as usize) {
@@ -165,12 +168,12 @@ impl Status {
         })
     }
 
-    /// Whether nothing is missing.
+    /// Returns `true` if all images are complete.
     pub fn is_done(&self) -> bool {
         self.done == self.images
     }
 
-    /// All of it as one line of JSON.
+    /// Returns the status as one line of JSON.
     pub fn json(&self) -> Result<String> {
         Ok(String::from_utf8_lossy(&compact(self)?).trim_end().to_owned())
     }
@@ -190,7 +193,7 @@ impl ShardStatus {
         }
     }
 
-    /// Takes over what its last run tells.
+    /// Sets rate, times and state from the log of its last run.
     fn follow(&mut self, run: Option<&Run<'_>>, now: f64) {
         self.images_per_hour = run.and_then(Run::images_per_hour);
         self.last_s = run.filter(|run| run.last > 0.0).map(|run| (now - run.last).max(0.0));
@@ -203,7 +206,7 @@ impl ShardStatus {
     }
 }
 
-/// One run, as far as its file tells.
+/// Summary of a run's log.
 struct Run<'a> {
     shard: Option<(u64, u64)>,
     images: Vec<&'a ImageTiming>,
@@ -211,7 +214,7 @@ struct Run<'a> {
     end: Option<End>,
     core_s: Option<f64>,
     peak_bytes: Option<u64>,
-    /// When it last told something, seconds since 1970; 0 in files of before.
+    /// Time of its last row, seconds since 1970; 0 in logs of older versions, which have no times.
     last: f64,
 }
 
@@ -233,7 +236,8 @@ impl<'a> Run<'a> {
         run
     }
 
-    /// Seconds from its beginning to its last image; of a file of before, from how long its images took.
+    /// Returns the seconds from its start to its last image. For logs of older versions, they are estimated from the
+    /// images' times.
     fn seconds(&self) -> f64 {
         let done = self.images.iter().filter_map(|image| image.done_s).fold(0.0, f64::max);
         match self.began {
@@ -254,7 +258,7 @@ impl<'a> Run<'a> {
             (Some(End::Failed), _) => State::Failed,
             (None, Some(_)) if now - self.last <= SILENT_SECONDS.max(SILENT_IMAGES * slowest) => State::Working,
             (None, Some(_)) => State::Silent,
-            // Of before: nothing tells whether it goes on.
+            // A log of an older version does not show whether the run is still working.
             (None, None) => State::Missing,
         }
     }
@@ -264,12 +268,13 @@ fn per_hour(images: usize, seconds: f64) -> Option<f64> {
     (images > 0 && seconds > 0.0).then(|| 3600.0 * images as f64 / seconds)
 }
 
-/// Seconds for so many images.
+/// Returns the seconds for `images` images at a rate per hour.
 fn left(images: u64, per_hour: Option<f64>) -> Option<f64> {
     if images == 0 { Some(0.0) } else { per_hour.map(|rate| 3600.0 * images as f64 / rate) }
 }
 
-/// How many runs work, and how many images they make in an hour together; where none does, how many one of those before made.
+/// Returns the number of working runs and their images per hour together; if none is working, the mean rate of a single
+/// earlier run.
 fn rate(runs: &[Run<'_>], now: f64) -> (usize, Option<f64>) {
     let working: Vec<&Run<'_>> = runs.iter().filter(|run| run.state(now) == State::Working).collect();
     let together: f64 = working.iter().filter_map(|run| run.images_per_hour()).sum();
@@ -280,23 +285,23 @@ fn rate(runs: &[Run<'_>], now: f64) -> (usize, Option<f64>) {
     (working.len(), per_hour(made, runs.iter().map(Run::seconds).filter(|seconds| *seconds > 0.0).sum()))
 }
 
-/// Into how many shards the run that told something last cuts the dataset.
+/// Returns the number of shards of the run with the latest log row; 1 if there is none.
 fn last_shards(runs: &[Run<'_>]) -> u64 {
     let last = runs.iter().filter(|run| run.shard.is_some()).max_by(|a, b| a.last.total_cmp(&b.last));
     last.and_then(|run| run.shard).map_or(1, |(_, of)| of)
 }
 
-/// How many images of a dataset are there.
+/// Returns the number of complete images of a dataset.
 pub(crate) fn images_there(set: &Set) -> Result<usize> {
     Ok(there(set, &AtomicBool::new(false))?.into_iter().filter(|there| *there).count())
 }
 
-/// Of each image, whether it is there.
+/// Returns for each image whether it is complete.
 fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
     let freed = push::freed(set);
     let look = |index: u64| {
         if stop.load(Ordering::Relaxed) {
-            return Err(Error::stopped("stopped looking; nothing was changed"));
+            return Err(Error::stopped("stopped reading the dataset; nothing was changed"));
         }
         let Some(checksums) = set.checksums(index) else { return Ok(false) };
         let is_there = || has_files(set, &checksums) || freed.contains(&Unit::of(set, index).name());
@@ -305,7 +310,7 @@ fn there(set: &Set, stop: &AtomicBool) -> Result<Vec<bool>> {
     in_parallel(0..set.recipe.count, look).collect()
 }
 
-/// Whether the files that checksums name are there, as long as they say.
+/// Returns `true` if all files of a checksum record exist with the recorded lengths.
 fn has_files(set: &Set, checksums: &ChecksumRecord) -> bool {
     checksums
         .files
@@ -313,7 +318,7 @@ fn has_files(set: &Set, checksums: &ChecksumRecord) -> bool {
         .all(|(path, sum)| below(&set.folder, path).is_ok() && set.length(path).is_ok_and(|length| length == sum.bytes))
 }
 
-/// What each image last failed of.
+/// Returns the last failure of each image, by index.
 fn failures(logs: &[RunLog]) -> BTreeMap<u64, &ImageFailure> {
     let mut last: BTreeMap<u64, &ImageFailure> = BTreeMap::new();
     for row in logs.iter().flat_map(|log| &log.rows) {
@@ -326,7 +331,7 @@ fn failures(logs: &[RunLog]) -> BTreeMap<u64, &ImageFailure> {
     last
 }
 
-/// The images that took longest; one that was made several times counts by its longest.
+/// Returns the images with the longest times; for an image that was made several times, the longest one counts.
 fn slowest(set: &Set, logs: &[RunLog]) -> Vec<SlowImage> {
     let mut longest: BTreeMap<u64, &ImageTiming> = BTreeMap::new();
     for row in logs.iter().flat_map(|log| &log.rows) {
@@ -367,7 +372,8 @@ mod tests {
         Row::Began(Began { began_s, images: 9, at_once: 2, threads: 2 })
     }
 
-    /// Expected: images over seconds from the beginning to the last image; of a file without times, from the seconds of its images.
+    /// Expected: the rate is images divided by the seconds from the start to the last image; for a log without times,
+    /// the seconds are those of its images.
     #[test]
     fn rates_are_images_over_time() {
         let new = log((0, 2), vec![began(100.0), image(0, 9.0, Some(110.0)), image(2, 9.0, Some(120.0))]);
@@ -375,7 +381,7 @@ mod tests {
         let runs = [Run::of(&new), Run::of(&old)];
         let rates: Vec<_> = runs.iter().map(|run| run.images_per_hour().unwrap()).collect();
         assert_eq!(rates, [360.0, 720.0]);
-        // One that works decides; without it, both one after the other: four images in 30 seconds.
+        // Only the working run counts; if none is working, both count one after the other: four images in 30 seconds.
         assert_eq!(rate(&runs, 130.0), (1, Some(360.0)));
         assert_eq!(rate(&runs, 1e6), (0, Some(480.0)));
         assert_eq!(rate(&[], 0.0), (0, None));

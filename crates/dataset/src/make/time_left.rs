@@ -1,45 +1,47 @@
-//! How long a run still takes: a field is grown once, however many images are taken of it.
+//! Remaining-time estimate of a run. Scene construction counts once per field, whatever the number of its images.
 //!
-//! The work of a run is the time of its images, one after another. Of it, growing goes with the fields and the rest with the images. Several images
-//! are under way at once, so what is left takes as many times the time until now as it is of the work until now.
+//! The work of a run is the sum of its images' times. The part for scene construction is proportional to the number of
+//! constructions, the rest to the number of images. Several images are in progress at the same time; therefore
+//! remaining time = elapsed time × remaining work / completed work.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Is told of images as they are done, and tells how long all others take.
+/// Receives the time of each completed image and estimates the time of the remaining ones.
 #[derive(Debug, Default)]
 pub struct TimeLeft(Mutex<Option<Run>>);
 
-/// What a run is to do and has done.
+/// Planned and completed work of a run.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     begin: Instant,
     images: usize,
-    /// Times that a field is to grow.
+    /// Planned number of scene constructions.
     growings: usize,
     done: usize,
     grown: usize,
-    /// Seconds that images took, one after another.
+    /// Sum of the images' times, seconds.
     work_s: f64,
-    /// Of them, growing.
+    /// Part of `work_s` for scene construction.
     grow_s: f64,
 }
 
 impl TimeLeft {
-    /// From now on so many images are made, for which a field grows so many times.
+    /// Starts a run of `images` images with `growings` scene constructions.
     pub(crate) fn expect(&self, images: usize, growings: usize) {
         let run = Run { begin: Instant::now(), images, growings, done: 0, grown: 0, work_s: 0.0, grow_s: 0.0 };
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(run);
     }
 
-    /// An image is there; of the seconds that it took, its field grew so long, which is nothing where it was grown before.
+    /// Adds a completed image: its time, and the part of it for scene construction, which is zero if the field was
+    /// reused.
     pub(crate) fn add(&self, seconds: f64, grow: Duration) {
         if let Some(run) = self.0.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
             run.add(seconds, grow);
         }
     }
 
-    /// Until all images are there; `None` before the first.
+    /// Returns the estimated time until all images are complete; `None` before the first image.
     pub fn left(&self) -> Option<Duration> {
         let run = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let left = run.and_then(|run| run.left(run.begin.elapsed().as_secs_f64()))?;
@@ -55,7 +57,7 @@ impl Run {
         self.grow_s += grow.as_secs_f64();
     }
 
-    /// Seconds until all images are there, of a run that has worked for so many.
+    /// Returns the estimated seconds until all images are complete, after `elapsed_s` seconds of work.
     fn left(&self, elapsed_s: f64) -> Option<f64> {
         if self.done == 0 || self.work_s <= 0.0 {
             return None;
@@ -71,7 +73,8 @@ impl Run {
 mod tests {
     use super::*;
 
-    /// Seconds that are left of so many images of fields that grow so many times, once these are done: the seconds of each, and of them growing.
+    /// Returns the estimated remaining seconds of a run with these numbers after the `done` images, given as (seconds,
+    /// seconds of scene construction).
     fn left(images: usize, growings: usize, elapsed_s: f64, done: &[(f64, u64)]) -> Option<f64> {
         let mut run = Run { begin: Instant::now(), images, growings, done: 0, grown: 0, work_s: 0.0, grow_s: 0.0 };
         for (seconds, grow) in done {
@@ -80,8 +83,9 @@ mod tests {
         run.left(elapsed_s)
     }
 
-    /// Rationale: the first frame of a drive waits a minute for its field, all others do not. Expected: a field of 60 s and frames of 5 s are told as
-    /// what they take, from the first frame on, of one field, of two, and of two at once; where each image has its own field it is the mean of all.
+    /// Rationale: only the first frame of a drive waits a minute for scene construction. Expected: with 60 s per field
+    /// and 5 s per frame, the estimate is exact from the first frame on, for one field, for two, and for two at the
+    /// same time; if each image has its own field, the estimate uses the mean of all images.
     #[test]
     fn a_field_grows_once() {
         let (first, next) = ((65.0, 60), (5.0, 0));
@@ -93,7 +97,7 @@ mod tests {
             // Two workers.
             (24, 2, 65.0, &[first, first], 11.0 * 5.0),
             (10, 10, 130.0, &[first, first], 8.0 * 65.0),
-            // Formats of images that are there.
+            // Only formats of rendered images are made.
             (10, 0, 10.0, &[next, next], 8.0 * 5.0),
             (2, 1, 70.0, &[first, next], 0.0),
         ] {

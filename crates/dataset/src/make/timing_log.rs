@@ -1,8 +1,9 @@
-//! What runs tell of themselves while they work: when they began and ended, how long each image took, which failed and why. One file a run, one
-//! line a row.
+//! Timing logs of runs: start and end of each run, the time of each image, failed images with their errors. Each run
+//! has its own file with one row per line.
 //!
-//! The only place of a dataset with clock times: everything else is the same however often, where and in how many pieces it was
-//! made. Runs never share a file, for lines that two machines append to one file over a network get lost.
+//! This is the only place in a dataset with clock times; all other files are independent of when, where and in how many
+//! parts the dataset was made. Runs never share a file, because lines that two machines append to one file over a
+//! network file system can get lost.
 
 use crate::make::render::Times;
 use furrow_base::input::refuse_links;
@@ -14,22 +15,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::SystemTime;
 
-/// A row of a run's file. Files of before have images alone.
+/// A row of a timing log. Logs of older versions contain only images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Row {
-    /// An image is there.
+    /// An image was completed.
     Image(ImageTiming),
     /// An image could not be made.
     Failure(ImageFailure),
-    /// The run begins; its first row.
+    /// Start of the run; the first row.
     Began(Began),
-    /// The run ends; its last row, unless it was killed.
+    /// End of the run; the last row, missing if the run was killed.
     Ended(Ended),
 }
 
 impl Row {
-    /// When it was written, seconds since 1970; `None` in files of before.
+    /// Returns the time of the row, seconds since 1970; `None` in logs of older versions.
     pub fn time(&self) -> Option<f64> {
         match self {
             Self::Image(image) => image.done_s,
@@ -40,73 +41,73 @@ impl Row {
     }
 }
 
-/// What a run tells of one image.
+/// Times of one image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageTiming {
-    /// The image's number.
+    /// Index of the image.
     pub index: u64,
-    /// Hash of its native files: two runs that made one image must agree.
+    /// Hash of its native files, equal for all runs that made the same image.
     pub image: String,
-    /// Seconds from the start until its checksums are written.
+    /// Total seconds, including writing the checksum record.
     pub seconds: f64,
-    /// Of them, growing the field.
+    /// Seconds of scene construction.
     pub grow_s: f64,
-    /// Drawing.
+    /// Seconds of rendering.
     pub draw_s: f64,
-    /// Labelling.
+    /// Seconds of labelling.
     pub label_s: f64,
-    /// Images that were made at the same time by the run, this one included.
+    /// Number of images in progress at the same time in this run, including this one.
     pub at_once: usize,
-    /// Threads that they shared.
+    /// Number of threads that these images shared.
     pub threads: usize,
-    /// When it was done, seconds since 1970.
+    /// Time of completion, seconds since 1970.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub done_s: Option<f64>,
 }
 
 impl ImageTiming {
-    /// A row of an image that took this long and is done now.
+    /// Creates the row of an image that is completed now.
     pub fn new(index: u64, image: String, seconds: f64, times: &Times, at_once: usize, threads: usize) -> Self {
         let [grow_s, draw_s, label_s] = [times.grow, times.draw, times.label].map(|t| t.as_secs_f64());
         Self { index, image, seconds, grow_s, draw_s, label_s, at_once, threads, done_s: Some(now()) }
     }
 }
 
-/// What a run tells of an image that it could not make.
+/// An image that a run could not make.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageFailure {
-    /// The image's number.
+    /// Index of the image.
     pub index: u64,
-    /// Why, as the user is told.
+    /// The error message.
     pub error: String,
-    /// When, seconds since 1970.
+    /// Time of the failure, seconds since 1970.
     pub failed_s: f64,
 }
 
-/// What a run tells before its first image.
+/// The start of a run, before its first image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Began {
-    /// When, seconds since 1970.
+    /// Time of the start, seconds since 1970.
     pub began_s: f64,
-    /// Images that it is to make.
+    /// Number of images to make.
     pub images: usize,
-    /// Images that it makes at the same time.
+    /// Number of images in progress at the same time.
     pub at_once: usize,
-    /// Threads that they share.
+    /// Number of threads that they share.
     pub threads: usize,
 }
 
-/// What a run tells after its last image.
+/// The end of a run, after its last image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ended {
-    /// When, seconds since 1970.
+    /// Time of the end, seconds since 1970.
     pub ended_s: f64,
-    /// Why.
+    /// Reason for the end.
     pub end: End,
-    /// Seconds that all its threads together kept a core busy, where the system tells.
+    /// CPU seconds of all threads; `None` if the system does not report them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cpu_s: Option<f64>,
-    /// Most memory that its process had, where the system tells.
+    /// Peak memory of the process, bytes; `None` if the system does not report it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub peak_bytes: Option<u64>,
 }
@@ -115,21 +116,21 @@ pub struct Ended {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum End {
-    /// All its images are there.
+    /// All its images are complete.
     Done,
-    /// Somebody asked it to stop.
+    /// The run was stopped by a signal.
     Stopped,
     /// Some images could not be made.
     Failed,
 }
 
-/// Seconds since 1970, to a millisecond.
+/// Returns the current time in seconds since 1970, to a millisecond.
 pub fn now() -> f64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     since.as_millis() as f64 / 1000.0
 }
 
-/// A run's file, made with its first row.
+/// The timing log of a run; its file is created with the first row.
 pub struct TimingLog {
     dataset: PathBuf,
     shard: String,
@@ -137,12 +138,12 @@ pub struct TimingLog {
 }
 
 impl TimingLog {
-    /// For a run of a shard, `k-of-n`.
+    /// Creates the log of a run of a shard, `shard` being `k-of-n`.
     pub fn new(dataset: &Path, shard: &str) -> Self {
         Self { dataset: dataset.to_path_buf(), shard: shard.to_owned(), file: Mutex::new(None) }
     }
 
-    /// Adds a row.
+    /// Appends a row.
     pub fn add(&self, row: &Row) -> Result<()> {
         let mut held = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let (path, file) = match held.as_mut() {
@@ -154,7 +155,7 @@ impl TimingLog {
         file.write_all(line.as_bytes()).map_err(Error::io(path))
     }
 
-    /// The first name that no other run has taken.
+    /// Creates the file with the first run number that is not in use.
     fn open(&self) -> Result<(PathBuf, File)> {
         refuse_links(&self.dataset, Path::new("ledger"))?;
         let folder = self.dataset.join("ledger");
@@ -171,16 +172,16 @@ impl TimingLog {
     }
 }
 
-/// What one run wrote.
+/// The parsed log of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunLog {
-    /// Its shard k of n, by the name of its file; `None` where somebody has named it otherwise.
+    /// Its shard as (k, n), from the file name; `None` if the file was renamed.
     pub shard: Option<(u64, u64)>,
-    /// Its rows in the order in which they were written.
+    /// Its rows, oldest first.
     pub rows: Vec<Row>,
 }
 
-/// All runs, by file name. Lines that a killed run left half are passed over.
+/// Reads the logs of all runs, ordered by file name. Lines that a killed run left incomplete are skipped.
 pub fn runs(dataset: &Path) -> Result<Vec<RunLog>> {
     let folder = dataset.join("ledger");
     let entries = match std::fs::read_dir(&folder) {
@@ -198,14 +199,14 @@ pub fn runs(dataset: &Path) -> Result<Vec<RunLog>> {
     paths.into_iter().map(run).collect()
 }
 
-/// The shard in the name of a run's file, `shard-k-of-n-run-r`.
+/// Returns the shard in a log's file name, `shard-k-of-n-run-r`.
 fn shard(stem: &str) -> Option<(u64, u64)> {
     let (shard, _) = stem.strip_prefix("shard-")?.split_once("-run-")?;
     let (number, of) = shard.split_once("-of-")?;
     Some((number.parse().ok()?, of.parse().ok()?)).filter(|(number, of)| number < of)
 }
 
-/// What all runs tell of the images that they made, by file name.
+/// Returns the image rows of all runs, ordered by file name.
 pub fn rows(dataset: &Path) -> Result<Vec<ImageTiming>> {
     let image = |row| match row {
         Row::Image(image) => Some(image),
@@ -218,7 +219,8 @@ pub fn rows(dataset: &Path) -> Result<Vec<ImageTiming>> {
 mod tests {
     use super::*;
 
-    /// Expected: rows of each kind come back as they were, between them those of an older program, and half a line is passed over.
+    /// Expected: rows of each kind are read back unchanged, rows of an older version are read too, and an incomplete
+    /// line is skipped.
     #[test]
     fn rows_come_back_as_they_were_and_older_ones_are_read() {
         let folder = tempfile::tempdir().unwrap();

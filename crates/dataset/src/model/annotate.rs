@@ -1,4 +1,4 @@
-//! Label maps → what is known of each plant and leaf: pixels, boxes, masks, keypoints.
+//! Derives pixels, boxes, masks and keypoints of each plant and leaf from label maps.
 
 use crate::model::record::{ClassShare, Keypoint, Leaf, Plant, PointState, Seen};
 use crate::model::rle::{Box2, Rle};
@@ -10,13 +10,13 @@ use furrow_render::render::LabelMap;
 use furrow_render::scene::tag::Class;
 use std::collections::BTreeMap;
 
-/// Pixels and box of every plant (leaf 0) and every leaf (plant, leaf) that the maps show.
+/// Pixel count and bounding box of each plant, with the key (plant, 0), and of each leaf, with the key (plant, leaf).
 type Counted = BTreeMap<(u32, u16), (u32, Box2)>;
 
-/// Counts the pixels of plants and leaves.
+/// Counts the pixels of plants and leaves, and finds their bounding boxes. `width` is the image width in pixels.
 fn count(width: u32, plants: &[u32], leaves: &[u16]) -> Counted {
     let mut all = Counted::new();
-    // Runs of one leaf are counted at once.
+    // Counts a run of pixels of the same leaf at a time.
     let mut from = 0;
     while from < plants.len() {
         let key = (plants[from], leaves[from]);
@@ -44,9 +44,10 @@ fn count(width: u32, plants: &[u32], leaves: &[u16]) -> Counted {
     all
 }
 
-/// What the maps of a sample show of each plant and leaf; the rest of what a [`Plant`] knows is left out.
+/// Returns the visible plants and leaves with pixels, boxes and masks; other fields of [`Plant`] are left empty.
 ///
-/// A plant's class is that of its first pixel; [`crate::model::invariants`] see to it that the others agree.
+/// A plant's class and species are those of its first pixel; [`crate::model::invariants`] checks that its other pixels
+/// agree.
 pub fn plants(sample: &Sample) -> Vec<Plant> {
     let (width, height) = sample.size();
     let (plants, leaves) = (&sample.plants, &sample.leaves);
@@ -88,18 +89,18 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
     all
 }
 
-/// The number of what each pixel shows, 0 for nothing.
+/// Returns the part number of each pixel, 0 where nothing is visible.
 pub fn part_numbers(labels: &LabelMap, kinds: &[PartKind]) -> Vec<u8> {
     let number = |part: &u32| kinds.get(*part as usize).map_or(0, |kind| kind.number());
     labels.parts.iter().map(number).collect()
 }
 
-/// The class that a number of `semantics` stands for; `None` for [`IGNORE`] and numbers of no class.
+/// Returns the class with this number in `semantics`; `None` for [`IGNORE`] and unknown numbers.
 pub fn class_of(number: u8) -> Option<Class> {
     Class::ALL.get(usize::from(number)).copied()
 }
 
-/// Pixels of each class and of none, from the maps.
+/// Counts the pixels of each class, and the pixels without a label.
 pub fn classes(sample: &Sample) -> (Vec<ClassShare>, u64) {
     let mut pixels = [0_u64; Class::ALL.len()];
     let mut ignored = 0;
@@ -117,12 +118,13 @@ pub fn classes(sample: &Sample) -> (Vec<ClassShare>, u64) {
     (shares.to_vec(), ignored)
 }
 
-/// How far from a point, in pixels, the thing it belongs to may begin and the point still count as seen: a stem is as thin as a
-/// pixel, and a tip ends between two pixels' centres.
+/// Distance in pixels within which the plant or leaf of a keypoint must be visible for the keypoint to count as
+/// visible. A stem can be as thin as a pixel, and a tip can end between the centres of two pixels.
 const NEAR: i64 = 1;
 
-/// A point of the world in the image: visible where a pixel `NEAR` it shows what `owns` says it belongs to. `None` behind the
-/// camera, and outside the image where the lens has no answer.
+/// Projects a point in world space into the image. A point in the image is visible if `owns` holds for a pixel within
+/// `NEAR` pixels of it. Returns `None` behind the camera, and outside the image where the lens model has no solution.
+/// `owns` takes the index of a pixel.
 pub fn keypoint(camera: &Camera, point: Vec3, owns: impl Fn(usize) -> bool) -> Option<Keypoint> {
     let at = camera.project(point)?;
     let (w, h) = (i64::from(camera.width()), i64::from(camera.height()));
@@ -138,7 +140,8 @@ pub fn keypoint(camera: &Camera, point: Vec3, owns: impl Fn(usize) -> bool) -> O
     Some(Keypoint { x: at.x, y: at.y, state })
 }
 
-/// Shares that sum to 1, of 255, summing to 255: each rounded down, the rest given to those that lost most.
+/// Converts fractions that sum to 1 into whole numbers that sum to 255: each is rounded down, and the remainder goes to
+/// those with the largest fractional parts.
 pub fn of_255(shares: [f32; 3]) -> [u8; 3] {
     let exact = shares.map(|s| s.clamp(0.0, 1.0) * 255.0);
     let mut whole = exact.map(|s| s as u8);

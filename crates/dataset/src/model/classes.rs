@@ -1,15 +1,16 @@
-//! The classes that a user asks for, and which labels of a dataset belong to which of them.
+//! User-defined classes, and the labels of a dataset that belong to each of them.
 //!
-//! Written `soil; crop; weed`, or with labels, `soil; beet=BEAVX; chamomile=scentless mayweed; weed; ignore=stone`. A label is
+//! Classes are written as `soil; crop; weed`, or with labels as
+//! `soil; beet=BEAVX; chamomile=scentless mayweed; weed; ignore=stone`. A label is one of the following:
 //!
-//! | label | is |
+//! | label | meaning |
 //! |---|---|
 //! | soil, crop, weed | a class of `semantics.png` |
-//! | a species | of the set's table, by its name or EPPO code; wins over the class that it belongs to |
-//! | an organ, or what lies on the ground | of `parts.png`, such as petiole or stone; wins over both |
-//! | `model:NAME` | a model from disk that the scene file names, of `parts.png` too; wins over `model`, which is all of them |
+//! | a species | by name or EPPO code, from the dataset's table; overrides its class in `semantics.png` |
+//! | an organ, or an object on the ground | from `parts.png`, such as petiole or stone; overrides both |
+//! | `model:NAME` | a model from disk that the scene file names, also from `parts.png`; overrides `model`, all models |
 //!
-//! A pixel that no class claims has no label, nor has one that the class named `ignore` claims.
+//! A pixel that no class claims has no label; neither has one that the class `ignore` claims.
 
 use crate::model::sample::IGNORE;
 use furrow_base::{Error, Result};
@@ -19,39 +20,40 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// The labels of `semantics.png` by their number.
+/// Labels of `semantics.png` by number.
 const SEMANTICS: [&str; 3] = ["soil", "crop", "weed"];
 
-/// The label of all models from disk, and what that of a named one begins with.
+/// Label of all models from disk.
 const MODEL: &str = "model";
+/// Prefix of the label of a named model.
 const OF_NAME: &str = "model:";
 
-/// The class whose labels are none.
+/// Name of the class for labels that are to be ignored.
 const IGNORED: &str = "ignore";
 
 /// One class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Class {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// The labels that mean it: `soil`, `crop`, `weed`, species, organs, things on the ground.
+    /// Labels of the class: `soil`, `crop`, `weed`, species, organs, objects on the ground.
     pub labels: Vec<String>,
 }
 
-/// Classes; a class's number is its place. One that is ignored stands behind all others and is not counted.
+/// Classes; the number of a class is its index. The class `ignore`, if present, is the last one and has no number.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Classes(pub Vec<Class>);
 
 impl Default for Classes {
-    /// Soil, crop, weed.
+    /// Returns soil, crop and weed.
     fn default() -> Self {
         Self(SEMANTICS.map(|name| Class { name: name.into(), labels: vec![name.into()] }).to_vec())
     }
 }
 
 impl fmt::Display for Classes {
-    /// As [`Classes::parse`] reads it.
+    /// Writes the text that [`Classes::parse`] reads.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, Class { name, labels }) in self.0.iter().enumerate() {
             f.write_str(if i > 0 { "; " } else { "" })?;
@@ -65,12 +67,12 @@ impl fmt::Display for Classes {
 }
 
 impl Classes {
-    /// Whether the first class is soil and nothing else, as it is unless a user says otherwise.
+    /// Returns whether the first class is soil alone, as it is by default.
     pub fn begins_with_soil(&self) -> bool {
         self.0.first().is_some_and(|class| class.labels == SEMANTICS[..1])
     }
 
-    /// Reads `soil; beet=crop; other=weed,Galium aparine`.
+    /// Parses text such as `soil; beet=crop; other=weed,Galium aparine`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut classes: Vec<Class> = Vec::new();
         for part in text.split(';').map(str::trim).filter(|p| !p.is_empty()) {
@@ -78,15 +80,15 @@ impl Classes {
             let labels: Vec<String> =
                 labels.split(',').map(|l| l.trim().to_owned()).filter(|l| !l.is_empty()).collect();
             if name.trim().is_empty() || labels.is_empty() {
-                return Err(format!("`{part}` is no class: write `name` or `name=label,label`"));
+                return Err(format!("`{part}` is not a class: write `name` or `name=label,label`"));
             }
             for label in &labels {
                 if let Some(other) = classes.iter().find(|c| c.labels.contains(label)) {
-                    return Err(format!("the label `{label}` belongs to `{}` already", other.name));
+                    return Err(format!("the label `{label}` already belongs to `{}`", other.name));
                 }
             }
             if classes.iter().any(|c| c.name == name.trim()) {
-                return Err(format!("there are two classes `{}`", name.trim()));
+                return Err(format!("there are two classes named `{}`", name.trim()));
             }
             classes.push(Class { name: name.trim().into(), labels });
         }
@@ -95,25 +97,26 @@ impl Classes {
         classes.check().map(|()| classes)
     }
 
-    /// Refuses too few and too many, and names and labels that are there twice or say nothing.
+    /// Returns an error if there are fewer than 2 or more than 64 classes, if a name or a label occurs twice, if a name
+    /// is empty or has control characters, or if a class has no label.
     pub fn check(&self) -> Result<(), String> {
         match self.len() {
-            0 | 1 => return Err("two classes at least are needed, such as `soil; plant=crop,weed`".into()),
+            0 | 1 => return Err("at least two classes are needed, such as `soil; plant=crop,weed`".into()),
             2..=64 => {}
-            n => return Err(format!("{n} classes are too many: 64 at most")),
+            n => return Err(format!("{n} classes are too many: the maximum is 64")),
         }
         let named = self.0.iter().position(|class| class.name == IGNORED);
         if named.is_some_and(|place| place + 1 < self.0.len()) {
-            return Err(format!("`{IGNORED}` stands behind all other classes"));
+            return Err(format!("`{IGNORED}` must be the last class"));
         }
         if let Some(class) = self.0.iter().find(|class| class.name.contains(char::is_control)) {
-            return Err(format!("the name {:?} holds a character that ends lines or is not seen", class.name));
+            return Err(format!("the name {:?} contains a control character", class.name));
         }
         let names: BTreeSet<&str> = self.0.iter().map(|c| c.name.trim()).collect();
         let labels: Vec<&String> = self.0.iter().flat_map(|c| &c.labels).collect();
         let distinct: BTreeSet<&String> = labels.iter().copied().collect();
         if names.len() < self.0.len() || names.contains("") || self.0.iter().any(|c| c.labels.is_empty()) {
-            return Err("each class needs a name of its own, and labels".into());
+            return Err("each class needs a name of its own and at least one label".into());
         }
         if distinct.len() < labels.len() {
             return Err("a label belongs to one class alone".into());
@@ -121,12 +124,12 @@ impl Classes {
         Ok(())
     }
 
-    /// How many there are.
+    /// Returns the number of classes, without `ignore`.
     pub fn len(&self) -> usize {
         self.counted().len()
     }
 
-    /// Those that have a number.
+    /// Returns the classes that have a number.
     pub fn counted(&self) -> &[Class] {
         match self.0.split_last() {
             Some((last, rest)) if last.name == IGNORED => rest,
@@ -134,17 +137,18 @@ impl Classes {
         }
     }
 
-    /// Whether there is none.
+    /// Returns whether no class has a number.
     pub fn is_empty(&self) -> bool {
         self.counted().is_empty()
     }
 
-    /// Their names, in order.
+    /// Returns the names, in order.
     pub fn names(&self) -> Vec<String> {
         self.counted().iter().map(|c| c.name.clone()).collect()
     }
 
-    /// sRGB colours, in order: soil, crop and weed as in the label images, others spread around the colour circle.
+    /// Returns sRGB colours, in order: soil, crop and weed as in the label images, others spread around the colour
+    /// circle.
     pub fn colors(&self) -> Vec<[u8; 3]> {
         let known = furrow_render::scene::tag::Class::ALL.map(furrow_render::scene::tag::Class::color);
         let place = |c: &Class| SEMANTICS.iter().position(|s| c.labels.iter().any(|l| l == s));
@@ -160,19 +164,22 @@ impl Classes {
         colors
     }
 
-    /// Whether an organ or a thing on the ground is a class of its own, which only `parts.png` tells.
+    /// Returns whether a class has the label of an organ, an object on the ground or a model, which only `parts.png`
+    /// contains.
     pub fn needs_parts(&self) -> bool {
         self.0.iter().flat_map(|class| &class.labels).any(|label| is_part(label))
     }
 
-    /// Those that plants may have: all but those of soil, organs and things on the ground alone.
+    /// Returns the classes that plants can have: those with a label other than soil, organs, objects on the ground and
+    /// named models.
     pub fn of_plants(&self) -> Vec<u8> {
         let plant = |label: &String| label != SEMANTICS[0] && !is_part(label);
         let places = (0..).zip(self.counted()).filter(|(_, class)| class.labels.iter().any(plant));
         places.map(|(place, _)| place).collect()
     }
 
-    /// Which class every label is, in a set that numbers these species and names these models. An error for labels that it does not have.
+    /// Returns the class of every label in a dataset that has these species and models. An error for a label that the
+    /// dataset does not have, and for a species in two classes.
     pub fn of(&self, species: &[SpeciesRecord], models: &[String]) -> Result<Map> {
         let records = species;
         let species: Vec<[&str; 2]> = species.iter().map(|s| [s.name.as_str(), s.eppo.as_str()]).collect();
@@ -190,7 +197,7 @@ impl Classes {
             let claiming: Vec<&str> = self.0.iter().filter(claims).map(|class| class.name.as_str()).collect();
             if let [first, second, ..] = claiming[..] {
                 let words = format!("the species {} ({}) belongs to `{first}` and to `{second}`", names[0], names[1]);
-                return Err(Error::input(words).help("name it in one class alone, by its name or its EPPO code"));
+                return Err(Error::input(words).help("use it in one class only, by its name or its EPPO code"));
             }
         }
         let place = |claims: &dyn Fn(&str) -> bool| {
@@ -217,18 +224,18 @@ impl Classes {
     }
 }
 
-/// The number in `parts.png` of a label that no other map tells.
+/// Returns the number in `parts.png` of a label that is in no other map.
 fn part(label: &str) -> Option<u8> {
     let known = PartKind::NUMBERED.iter().find(|(_, name, ..)| *name == label && !SEMANTICS.contains(name));
     known.map(|(number, ..)| *number)
 }
 
-/// Whether only `parts.png` tells where a label is.
+/// Returns whether only `parts.png` contains a label.
 fn is_part(label: &str) -> bool {
     part(label).is_some() || label.starts_with(OF_NAME)
 }
 
-/// A label that the set does not have.
+/// Returns the error for a label that the dataset does not have.
 fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
     let parts = PartKind::NUMBERED.iter().map(|(_, name, ..)| *name).filter(|name| part(name).is_some());
     let others = SEMANTICS.into_iter().chain(parts).map(str::to_owned);
@@ -237,12 +244,12 @@ fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
         if s.eppo.is_empty() { s.name.clone() } else { format!("{} ({})", s.name, s.eppo) }
     };
     let species: Vec<String> = species.iter().map(told).collect();
-    let species = if species.is_empty() { "the set knows no species".into() } else { species.join(", ") };
-    let what = format!("the classes name the label `{label}`, which the set does not have");
-    Error::input(what).help(format!("its labels are {}; species: {species}", others.join(", ")))
+    let species = if species.is_empty() { "none".into() } else { species.join(", ") };
+    let what = format!("the classes use the label `{label}`, which the dataset does not have");
+    Error::input(what).help(format!("its labels are {}; its species: {species}", others.join(", ")))
 }
 
-/// A saturated colour by its place on the colour circle, in turns.
+/// Returns a saturated colour for a position on the colour circle, in turns.
 fn hue(turns: f32) -> [u8; 3] {
     let channel = |shift: f32| {
         let t = ((turns + shift).rem_euclid(1.0) * 6.0 - 3.0).abs() - 1.0;
@@ -251,7 +258,7 @@ fn hue(turns: f32) -> [u8; 3] {
     [channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)]
 }
 
-/// The classes of one set's labels.
+/// Class of each label of one dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Map {
     semantics: [Option<u8>; 3],
@@ -260,25 +267,26 @@ pub struct Map {
 }
 
 impl Map {
-    /// Whether species decide anything.
+    /// Returns whether a class depends on species.
     pub fn needs_species(&self) -> bool {
         self.species.iter().any(Option::is_some)
     }
 
-    /// Whether organs or things on the ground decide anything.
+    /// Returns whether a class depends on organs, objects on the ground or models.
     pub fn needs_parts(&self) -> bool {
         self.parts.iter().any(Option::is_some)
     }
 
-    /// The class of a whole plant by its number in `semantics.png` and its species' number, 0 for none.
+    /// Returns the class of a whole plant from its number in `semantics.png` and the number of its species, 0 for none.
+    /// `None` if no class or the class `ignore` claims it.
     pub fn of_plant(&self, semantic: u8, species: u16) -> Option<u8> {
         let special = usize::from(species).checked_sub(1).and_then(|n| self.species.get(n).copied().flatten());
         let class = special.or_else(|| self.semantics.get(usize::from(semantic)).copied().flatten());
         class.filter(|class| *class != IGNORE)
     }
 
-    /// The class of each pixel by its numbers in `semantics.png`, and in `species.png` and `parts.png` (empty where they do not matter);
-    /// [`IGNORE`] for none.
+    /// Returns the class of each pixel from its numbers in `semantics.png`, `species.png` and `parts.png`; the latter
+    /// two may be empty if no class depends on them. [`IGNORE`] for no class.
     pub fn labels(&self, semantics: &[u8], species: &[u8], parts: &[u8]) -> Vec<u8> {
         let class = |(i, semantic): (usize, &u8)| {
             let part = parts.get(i).and_then(|part| self.parts.get(usize::from(*part)).copied().flatten());
@@ -304,10 +312,11 @@ mod tests {
         for bad in ["", "soil", "soil; a=; b", "soil; a=crop; b=crop", "soil; soil=crop", "soil; ignore=weed"] {
             assert!(Classes::parse(bad).is_err(), "{bad}");
         }
-        assert!(Classes::parse("soil; a\nb=crop; weed").unwrap_err().contains("ends lines"));
+        assert!(Classes::parse("soil; a\nb=crop; weed").unwrap_err().contains("control character"));
     }
 
-    /// Expected: the most particular label decides; what is ignored has no number and takes none from the others.
+    /// Expected: the most specific label decides; ignored labels have no number and do not shift the numbers of the
+    /// classes.
     #[test]
     fn species_win_over_roles_and_parts_over_both() {
         let species = |name: &str, eppo: &str| SpeciesRecord {
@@ -335,8 +344,8 @@ mod tests {
         assert!(Classes::parse("soil; a=HORSE; weed").unwrap().of(&table, &[]).is_err());
     }
 
-    /// Expected: a named model has the class of its name, another one that of all models; without either it is the soil that it is drawn as. A
-    /// name that the set does not have is told with those that it has.
+    /// Expected: a named model has the class of its name, any other model that of `model`; without either it is soil,
+    /// as in `semantics.png`. The error for an unknown name lists the known ones.
     #[test]
     fn models_are_told_apart_by_their_names() {
         let names = ["robot".to_owned(), "box".to_owned()];

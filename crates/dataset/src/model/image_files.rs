@@ -1,14 +1,15 @@
-//! Which files an image has: one rule for whoever writes, reads, lists and checks them.
+//! Files of an image: one rule for all code that writes, reads, lists or checks them.
 //!
-//! The recipe decides. A file beside an image that has one of these names, and that the dataset goes without, does not belong to it: nobody
-//! reads it, and `verify` names it. Files of other names are the user's, such as further bands for training.
+//! The recipe determines the files. A file with one of the names in `NAMES` that the recipe excludes does not belong to
+//! the image: it is never read, and `verify` reports it. Files with other names belong to the user, such as additional
+//! bands for training.
 
 use crate::model::keep::{Kept, Omitted};
 use crate::model::recipe::{Made, Recipe};
 use furrow_output::ENDINGS;
 use std::path::{Path, PathBuf};
 
-/// Names of an image's files, in the order in which they are made and archives hold them: what is known of it comes last.
+/// File names of an image. Files are made and archived in this order, with the record last.
 pub(crate) const NAMES: [&str; 12] = [
     "rgb.png",
     "rgb.jpg",
@@ -24,8 +25,8 @@ pub(crate) const NAMES: [&str; 12] = [
     "record.json",
 ];
 
-/// Whether a file of this name belongs to the images of a dataset. Near infrared may belong to imported ones whose recipe is one of before and
-/// does not say it.
+/// Returns whether a file of this name belongs to the images of a dataset. If the recipe of an imported dataset,
+/// written by an earlier version, does not state whether there is near infrared, its files belong to the images.
 pub fn belongs(recipe: &Recipe, file: &str) -> bool {
     let rendering = match &recipe.made {
         Made::Rendered(rendering) => Some(rendering),
@@ -47,8 +48,8 @@ pub fn belongs(recipe: &Recipe, file: &str) -> bool {
     }
 }
 
-/// The photograph of this name, such as `rgb` or a band `nir`, in the folder of an image, as PNG or as JPEG; `None` where there is none, or none
-/// that belongs to the images of this recipe.
+/// Finds the image file `name` (such as `rgb`, or a band such as `nir`) in the folder of an image, as PNG or JPEG.
+/// Returns `None` if it does not exist, or does not belong to the images of `recipe`.
 pub fn photograph_in(folder: &Path, name: &str, recipe: Option<&Recipe>) -> Option<PathBuf> {
     let files = ENDINGS.iter().map(|ending| format!("{name}.{ending}"));
     let own = files.filter(|file| recipe.is_none_or(|recipe| belongs(recipe, file)));
@@ -65,7 +66,7 @@ mod tests {
         NAMES.into_iter().filter(|file| belongs(recipe, file)).collect()
     }
 
-    /// Files of images of version 0.1.0 whose recipe is changed.
+    /// Returns the files of an image for the recipe of a dataset of version 0.1.0, modified by `change`.
     fn rendered(change: impl FnOnce(&mut Rendering)) -> Vec<&'static str> {
         let text = include_str!("../../../../tests/data/dataset/dataset.json");
         let mut recipe: Recipe = serde_json::from_str(text).unwrap();
@@ -75,9 +76,9 @@ mod tests {
         of(&recipe)
     }
 
-    /// Rationale: what a dataset goes without must not be read from whatever lies there. Expected: photographs in one way to store them, no map that
-    /// is not kept, nothing that samples tell of labels alone, nothing of imported images that only rendered ones have; the user's
-    /// own files are not asked about. Source: the table of files in `docs/reference/files.md`.
+    /// Rationale: files that a dataset excludes must not be read if they happen to exist. Expected: images in one
+    /// encoding, no map that is not kept, no map from samples for labels only, and for imported images nothing that
+    /// only rendered ones have; user files always belong. Source: the table of files in `docs/reference/files.md`.
     #[test]
     fn the_recipe_tells_the_files_of_an_image() {
         let oldest = rendered(|_| ());

@@ -1,4 +1,4 @@
-//! What must hold of every image: checked before one is written, and again by `verify` on what lies on the disk.
+//! Invariants of every image, checked before an image is written, and again by `verify` on the files.
 
 use crate::model::annotate;
 use crate::model::recipe::{Made, Recipe};
@@ -8,25 +8,28 @@ use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
 use std::collections::BTreeMap;
 
-/// Share of a pixel, of 255, from which on its class is decided: more than lens blur and a few samples can undo.
+/// Smallest coverage, of 255, of the class of a decided pixel. The margin to 255 exceeds the effect of lens blur and of
+/// a few samples.
 const DECIDED: u8 = 243;
 
-/// Share of the decided pixels whose centre may show another class all the same. A leaf thinner than the pixels' footprint can
-/// lie on a row of centres.
+/// Fraction of the decided pixels whose centre may nevertheless show another class. A leaf thinner than the footprint
+/// of the pixels can lie along a row of pixel centres.
 const THIN: f64 = 0.005;
 
-/// The share that may do so for want of samples, for n samples FEW · 0.5ⁿ more: n samples of a pixel that an edge halves all miss what is at
-/// its centre with a chance of 0.5ⁿ. Where one pixel in four lies on an edge, the image is of little else.
+/// Further fraction of the decided pixels that is allowed because samples are few: FEW · 0.5ⁿ for n samples. If an edge
+/// halves a pixel, all n samples miss the class at its centre with probability 0.5ⁿ. An image with one pixel in four on
+/// an edge consists of little but edges.
 const FEW: f64 = 0.25;
 
-/// The same as a share of the decided pixels that lie on an edge between labels, where an image is of little else: feathery leaves finer than
-/// the pixels. Measured over 256 fields of `any-field.ron` at 480 × 360: at most 0.05 at 4 and 8 samples; maps that lie one pixel apart
-/// have 0.3 or more at 2 samples and above.
+/// Allowed fraction of the decided pixels on an edge between labels. It applies to images that consist of little but
+/// edges, such as feathery leaves finer than the pixels. Measured over 256 fields of `any-field.ron` at 480 × 360: at
+/// most 0.05 at 4 and 8 samples; maps shifted by one pixel have 0.3 or more at 2 samples and above.
 const THIN_ON_EDGES: f64 = 0.1;
-/// So many pixels may do so in an image of any size: in one of a single pixel a blade may pass beside the centre.
+/// Number of such pixels that is allowed in an image of any size: in an image of one pixel, a blade may miss the
+/// centre.
 const ALWAYS_ALLOWED: f64 = 2.0;
 
-/// Checks a sample; the error names the image and everything that does not hold.
+/// Checks a sample. The error names the image and all violated invariants.
 pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
     let faults = faults(recipe, sample);
     if faults.is_empty() {
@@ -35,10 +38,10 @@ pub fn check(recipe: &Recipe, sample: &Sample) -> Result<()> {
     Err(Error::damaged(format!("image {}: {}", sample.record.name, faults.join("; "))))
 }
 
-/// What does not hold, in words.
+/// Returns a description of each violated invariant.
 pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     let sizes = sizes(sample, recipe.labels_only());
-    // Nothing else can be asked of maps that do not lie on each other.
+    // Further checks need maps of equal size.
     if !sizes.is_empty() {
         return sizes;
     }
@@ -53,7 +56,8 @@ pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     all
 }
 
-/// Every map has the image's size, or is not there where it need not be; a photograph need not where images are labels alone.
+/// Checks that each map has the image's size, or is empty if it is optional. With `labels_only` the colour image is
+/// optional.
 fn sizes(sample: &Sample, labels_only: bool) -> Vec<String> {
     let n = sample.pixels();
     let maps = [
@@ -72,7 +76,8 @@ fn sizes(sample: &Sample, labels_only: bool) -> Vec<String> {
     wrong.map(|(name, len, _)| format!("{name} has {len} values for {n} pixels")).collect()
 }
 
-/// A leaf lies in its plant, a plant in its class and its species; without a plant nothing has either.
+/// Checks that classes are known, that each leaf pixel has a plant, and that a plant has one class and one species.
+/// Pixels without a plant have no species, and in rendered images they are soil.
 fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
     let mut of_plant: BTreeMap<u32, (u8, Option<u8>)> = BTreeMap::new();
     let (mut loose, mut mixed, mut bare, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
@@ -89,7 +94,7 @@ fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
         }
     }
     let told = [
-        (unknown, "have a class that there is none of"),
+        (unknown, "have an unknown class"),
         (loose, "have a leaf or a species but no plant"),
         (bare, "are crop or weed but no plant"),
         (mixed, "have another class or species than the rest of their plant, or are soil"),
@@ -97,7 +102,8 @@ fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
     told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} pixels {words}")).collect()
 }
 
-/// Species are in the recipe's table; the record belongs to this recipe; its numbers are numbers.
+/// Checks that species are in the recipe's table, that the record agrees with the recipe, that coordinates are finite,
+/// and that identities are unique.
 fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     let record = &sample.record;
     let mut all = Vec::new();
@@ -106,7 +112,7 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
         all.push(format!("species {most} is not among the {known} of the recipe"));
     }
     if record.split != recipe.split_of(record.index) {
-        all.push(format!("it is in the split {}, where it does not belong", record.split.name()));
+        all.push(format!("it is in the split {}, but its number belongs to another", record.split.name()));
     }
     let (field, capture) = recipe.field_of(record.index);
     let told = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
@@ -114,7 +120,7 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     let day = record.capture.as_ref().and_then(|capture| capture.day);
     let of_day = recipe.days().get((capture / recipe.captures_a_day()) as usize).copied();
     if told != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
-        all.push("it is not the image of its field that its number says".into());
+        all.push("its field, frame or day does not match its number".into());
     }
     let points = record
         .plants
@@ -127,7 +133,8 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     all
 }
 
-/// No two plants or leaves of an image have the same identity, and none is 0. Older records have none.
+/// Checks that no two plants or leaves of an image have the same identity, and that none is 0. Records of earlier
+/// versions have no identities.
 fn identities(sample: &Sample) -> Option<String> {
     let mut ids: Vec<u32> = sample
         .record
@@ -138,22 +145,23 @@ fn identities(sample: &Sample) -> Option<String> {
     ids.sort_unstable();
     let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
     let wrong = ids.first().copied().filter(|id| *id == 0).or(twice)?;
-    Some(format!("the identity {wrong} is not that of one plant or leaf alone"))
+    Some(format!("the identity {wrong} is 0 or belongs to several plants or leaves"))
 }
 
-/// What the record says is what the maps show: pixels, boxes, masks; and nothing is seen of more than there is.
+/// Checks that pixels, boxes and masks of the record are those of the maps, and that no plant or leaf has more visible
+/// pixels than it has without occlusion.
 fn counts(sample: &Sample) -> Vec<String> {
     let record = &sample.record;
     let mut all = Vec::new();
     let (mut classes, ignored) = annotate::classes(sample);
     if sample.coverage.is_empty() {
-        // The map was counted and not kept.
+        // The coverage was summed when the map existed; the map was not stored.
         for (share, told) in classes.iter_mut().zip(&record.classes) {
             share.covered = told.covered;
         }
     }
     if (&classes, ignored) != (&record.classes, record.ignored) {
-        all.push("the record's pixels of a class are not those of the map".into());
+        all.push("the record's pixel counts of the classes differ from the map".into());
     }
     let shown = annotate::plants(sample);
     let told: Vec<&Plant> = record.seen().collect();
@@ -164,7 +172,7 @@ fn counts(sample: &Sample) -> Vec<String> {
         fits && a.leaves.iter().zip(leaves).all(same_leaf)
     };
     if shown.len() != told.len() || !shown.iter().zip(&told).all(same_plant) {
-        all.push("the record's plants, boxes or masks are not those of the maps".into());
+        all.push("the record's plants, boxes or masks differ from the maps".into());
     }
     for plant in &record.plants {
         let leaves = plant.leaves.iter().map(|l| &l.seen);
@@ -187,7 +195,7 @@ fn in_order(seen: &Seen) -> bool {
     seen.pixels <= unoccluded && unoccluded <= seen.whole.unwrap_or(unoccluded)
 }
 
-/// Shares of a pixel sum to one, and agree with the label where they leave no doubt.
+/// Checks that the fractions of each pixel sum to one, and that they agree with the label where a class is decided.
 fn shares(sample: &Sample, spp: u32) -> Vec<String> {
     let mut all = Vec::new();
     let wrong = sample.coverage.iter().filter(|c| c.iter().map(|n| u32::from(*n)).sum::<u32>() != 255).count();
@@ -208,22 +216,23 @@ fn shares(sample: &Sample, spp: u32) -> Vec<String> {
     let missed = 0.5_f64.powi(spp.min(64) as i32);
     let allowed = (THIN + FEW * missed) * asked as f64;
     let allowed_on_edges = (THIN_ON_EDGES * on_edges as f64).max(by_chance(spp) * of_edges);
-    // Of few pixels a share is less than one of them.
+    // If few pixels are decided, the allowed fraction can be less than one pixel.
     if other as f64 > allowed.max(allowed_on_edges).max(ALWAYS_ALLOWED) {
         all.push(format!("{other} of {asked} pixels are of one class by their samples and of another by their centre"));
     }
     all
 }
 
-/// The largest chance that all n samples of a pixel show one thing and its centre another, where what is in it is much finer than the pixel: with
-/// a share p of the one, pⁿ(1 − p) + (1 − p)ⁿp. Up to three samples p = ½ is the worst, above that n / (n + 1).
+/// Returns the largest probability that all n samples of a pixel show one label and its centre another, if the
+/// structures in it are much finer than the pixel. With a fraction p of one label it is pⁿ(1 − p) + (1 − p)ⁿp. Up to
+/// three samples it is largest at p = ½, above that at about n / (n + 1).
 fn by_chance(spp: u32) -> f64 {
     let n = f64::from(spp.max(1));
     let p = if spp <= 3 { 0.5 } else { n / (n + 1.0) };
     p.powf(n) * (1.0 - p) + (1.0 - p).powf(n) * p
 }
 
-/// Which pixels have another label than a neighbour beside, above or below.
+/// Returns for each pixel whether the label of a horizontal or vertical neighbour differs.
 fn edges(sample: &Sample) -> Vec<bool> {
     let (width, labels) = (sample.size().0 as usize, &sample.semantics);
     let mut edges = vec![false; labels.len()];
@@ -238,7 +247,7 @@ fn edges(sample: &Sample) -> Vec<bool> {
     edges
 }
 
-/// Depths lie before the camera, normals are unit vectors, and neither is "not a number".
+/// Checks that depths are positive and not NaN, and that normals are unit vectors, or zero where nothing is visible.
 fn geometry(sample: &Sample) -> Vec<String> {
     let mut all = Vec::new();
     if sample.depth.iter().any(|d| d.is_nan() || *d <= 0.0) {
@@ -246,7 +255,7 @@ fn geometry(sample: &Sample) -> Vec<String> {
     }
     let unit = |n: &[f32; 3]| {
         let square: f32 = n.iter().map(|x| x * x).sum();
-        // Each axis may be rounded to 1/128.
+        // Each component may be rounded to 1/128.
         square == 0.0 || (square - 1.0).abs() < 2e-2
     };
     if !sample.normals.iter().all(unit) {

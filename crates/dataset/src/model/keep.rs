@@ -1,51 +1,52 @@
-//! Which maps images keep beside photograph, labels and record, and which label maps they go without.
+//! Maps that are stored in addition to image, labels and record, and label maps that are omitted.
 
 use furrow_base::{Error, Result};
 use furrow_output::half;
 use serde::{Deserialize, Serialize};
 
-/// A map that an image may go without.
+/// A map that is stored only if the recipe lists it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kept {
-    /// Near infrared.
+    /// Near-infrared image.
     Nir,
-    /// `coverage.png`.
+    /// Class fractions of each pixel, `coverage.png`.
     Coverage,
-    /// Depth in half precision, to one part in 2048.
+    /// Depth in half precision: relative error up to 1/2048.
     Depth,
     /// Depth in single precision.
     Depth32,
-    /// Normals to a hundred-and-twenty-eighth in each axis.
+    /// Normals, each component rounded to a multiple of 1/128.
     Normals,
     /// Normals in half precision.
     Normals16,
 }
 
 impl Kept {
-    /// All of them with their names and what they are.
+    /// All maps with their names on the command line and their descriptions.
     pub const NAMED: [(&str, Self, &str); 6] = [
-        ("nir", Self::Nir, "near infrared"),
-        ("coverage", Self::Coverage, "shares of soil, crop and weed in each pixel"),
-        ("depth", Self::Depth, "depth to one part in 2048 (half precision)"),
-        ("depth32", Self::Depth32, "depth in single precision, instead"),
-        ("normals", Self::Normals, "normals, each axis to 1/128"),
-        ("normals16", Self::Normals16, "normals in half precision, instead"),
+        ("nir", Self::Nir, "near-infrared image"),
+        ("coverage", Self::Coverage, "fractions of soil, crop and weed in each pixel"),
+        ("depth", Self::Depth, "depth in half precision, relative error up to 1/2048"),
+        ("depth32", Self::Depth32, "depth in single precision, instead of depth"),
+        ("normals", Self::Normals, "normals, each component to 1/128"),
+        ("normals16", Self::Normals16, "normals in half precision, instead of normals"),
     ];
 
-    /// What a new dataset keeps unless said otherwise.
+    /// Maps that a new dataset keeps by default.
     pub const USUAL: [Self; 3] = [Self::Nir, Self::Coverage, Self::Depth];
 
-    /// The same of a dataset whose images may be labels alone.
+    /// Returns the default maps; none for a dataset of labels only.
     pub fn usual(labels_only: bool) -> &'static [Self] {
         if labels_only { &[] } else { &Self::USUAL }
     }
 
-    /// What datasets of before kept, whose recipes do not say it.
+    /// Maps of datasets of earlier versions, whose recipes do not list them.
     pub const OLDEST: [Self; 4] = [Self::Nir, Self::Coverage, Self::Depth32, Self::Normals16];
 }
 
-/// A label map that an image may go without: its record tells the same, by masks and by the species of each plant.
+/// A label map that can be omitted: the record contains the same information, as masks and as the species of each
+/// plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Omitted {
@@ -58,27 +59,28 @@ pub enum Omitted {
 }
 
 impl Omitted {
-    /// All of them with their names and what they are.
+    /// All label maps that can be omitted, with their names on the command line and their descriptions.
     pub const NAMED: [(&str, Self, &str); 3] = [
-        ("species", Self::Species, "number of each pixel's species"),
-        ("plants", Self::Plants, "number of each pixel's plant"),
-        ("leaves", Self::Leaves, "number of each pixel's leaf"),
+        ("species", Self::Species, "species number of each pixel"),
+        ("plants", Self::Plants, "plant number of each pixel"),
+        ("leaves", Self::Leaves, "leaf number of each pixel"),
     ];
 
-    /// What no image goes without and may be named with them.
+    /// Files that are never omitted but can be named together with the others.
     pub const NEVER: [(&str, &str); 2] =
-        [("rgb", "the photograph; always kept"), ("semantics", "class of each pixel; always kept")];
+        [("rgb", "colour image; always kept"), ("semantics", "class of each pixel; always kept")];
 }
 
-/// What the words of `--keep` ask for, each a name above or `none`: the maps that images keep, and the label maps that they go without,
-/// `None` where nothing is said of label maps.
+/// Parses the words of `--keep`, which are the names above or `none`. Returns the maps to keep, and the label maps to
+/// omit, or `None` if the words name no label map.
 ///
-/// Who names one, `rgb` and `semantics` among them, goes without those that are not named.
+/// If a label map is named, `rgb` and `semantics` included, those that are not named are omitted. An error if `none` is
+/// combined with other names, or if depth or normals are requested in two precisions.
 pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Option<Vec<Omitted>>)> {
     let named = |name: &str| words.iter().any(|word| word == name);
     if words.len() > 1 && named("none") {
-        return Err(Error::misuse("--keep none keeps nothing more, and other maps are named beside it")
-            .help("write --keep none, or the maps without it"));
+        return Err(Error::misuse("--keep none keeps nothing more, so no other maps can be named")
+            .help("write --keep none, or only the names of the maps"));
     }
     let kept = Kept::NAMED.iter().filter(|(name, ..)| named(name)).map(|(_, map, _)| *map).collect();
     let mut labels = Omitted::NEVER.iter().map(|(name, _)| *name).chain(Omitted::NAMED.iter().map(|(name, ..)| *name));
@@ -87,14 +89,14 @@ pub fn asked(words: &[String]) -> Result<(Vec<Kept>, Option<Vec<Omitted>>)> {
     Ok((checked(kept)?, chosen.then(unnamed)))
 }
 
-/// The same in order, each once.
+/// Sorts the omitted maps and removes duplicates.
 pub fn in_order(mut omitted: Vec<Omitted>) -> Vec<Omitted> {
     omitted.sort_unstable();
     omitted.dedup();
     omitted
 }
 
-/// Kept maps in order, each once; an error where something is asked for in two precisions.
+/// Sorts the kept maps and removes duplicates; an error if depth or normals are requested in two precisions.
 pub fn checked(mut kept: Vec<Kept>) -> Result<Vec<Kept>> {
     kept.sort_unstable();
     kept.dedup();
@@ -106,8 +108,8 @@ pub fn checked(mut kept: Vec<Kept>) -> Result<Vec<Kept>> {
     Ok(kept)
 }
 
-/// What of it images keep that are labels alone: nothing unless depth or normals are asked for. An error for what only samples tell; the usual
-/// maps are what nobody asked for.
+/// Returns the maps that a labels-only dataset keeps: those of `kept`, which may contain depth and normals. The default
+/// maps count as not requested and give none. An error for near infrared and coverage, which need samples.
 pub fn of_labels(kept: &[Kept]) -> Result<Vec<Kept>> {
     if kept == Kept::USUAL {
         return Ok(Vec::new());
@@ -116,14 +118,14 @@ pub fn of_labels(kept: &[Kept]) -> Result<Vec<Kept>> {
         Kept::NAMED.iter().find(|(_, map, _)| matches!(map, Kept::Nir | Kept::Coverage) && kept.contains(map));
     match sampled {
         Some((name, ..)) => {
-            Err(Error::misuse(format!("--keep {name} is drawn by samples, and --labels-only takes none"))
+            Err(Error::misuse(format!("--keep {name} needs samples, which --labels-only does not take"))
                 .help("leave one of them out; depth and normals can be kept"))
         }
         None => Ok(kept.to_vec()),
     }
 }
 
-/// Depths as they are kept.
+/// Converts depths to the precision of `kept`; empty if depth is not kept.
 pub fn depths(kept: &[Kept], depth: &[f32]) -> Vec<f32> {
     match kept {
         kept if kept.contains(&Kept::Depth32) => depth.to_vec(),
@@ -132,7 +134,7 @@ pub fn depths(kept: &[Kept], depth: &[f32]) -> Vec<f32> {
     }
 }
 
-/// Normals as they are kept.
+/// Converts normals to the precision of `kept`; empty if normals are not kept.
 pub fn normals(kept: &[Kept], normals: impl Iterator<Item = [f32; 3]>) -> Vec<[f32; 3]> {
     match kept {
         kept if kept.contains(&Kept::Normals16) => normals.map(|n| n.map(half)).collect(),
@@ -141,14 +143,14 @@ pub fn normals(kept: &[Kept], normals: impl Iterator<Item = [f32; 3]>) -> Vec<[f
     }
 }
 
-/// Steps of a normal's axis from 0 to 1, each a number of half precision.
+/// Steps of a normal's component from 0 to 1; half precision represents each step exactly.
 const STEPS: f32 = 128.0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Expected: words of before mean what they did; a label map that is named leaves out those that are not.
+    /// Expected: options of earlier versions keep their meaning; naming a label map omits those that are not named.
     #[test]
     fn words_are_read_as_written() {
         let read = |words: &str| asked(&words.split(',').map(String::from).collect::<Vec<_>>()).unwrap();
@@ -163,7 +165,8 @@ mod tests {
         assert!(asked(&["rgb".into(), "depth".into(), "depth32".into()]).is_err());
     }
 
-    /// Expected: halves err by 2⁻¹² of a depth at most, steps by half of one, and what is not there stays so.
+    /// Expected: half precision has a relative error of at most 2⁻¹¹ in depth, steps have an error of at most half a
+    /// step, and maps that are not kept are empty.
     #[test]
     fn precision_is_as_promised() {
         let depth: Vec<f32> = (1..2000).map(|i| 0.3 + i as f32 * 0.0137).chain([f32::INFINITY]).collect();

@@ -1,4 +1,4 @@
-//! What a user may ask of the labels of a dataset's formats.
+//! Options of the labels in a dataset's formats.
 
 use crate::model::classes::Classes;
 use crate::model::record::Seen;
@@ -6,27 +6,29 @@ use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// What a user may ask of the labels of formats. No native file depends on it, but that there is `parts.png` where classes need it.
+/// Options of the labels in a dataset's formats. Native files do not depend on them, except that `parts.png` exists if
+/// the classes need it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Labelling {
-    /// The classes; soil, crop and weed unless given.
+    /// Classes; `None` for soil, crop and weed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub classes: Option<Classes>,
-    /// Plants and leaves of fewer pixels are in no list of a format.
+    /// Smallest number of visible pixels of a plant or leaf that formats list; `None` for 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_pixels: Option<u32>,
-    /// Nor are those of which less is shown: share of all of it, with what others hide and what lies beyond the frame; 0 to 1.
+    /// Smallest visible fraction of a plant or leaf that formats list, 0 to 1, relative to the whole, which includes
+    /// occluded parts and parts outside the frame; `None` for no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_visible: Option<f64>,
 }
 
 impl Labelling {
-    /// Whether it is what everybody gets who asks for nothing.
+    /// Returns whether all options have their default.
     pub fn is_usual(&self) -> bool {
         *self == Self::default()
     }
 
-    /// What is asked for now, and where nothing is, what was asked for before.
+    /// Returns these options, with the options of `before` in place of unset ones.
     #[must_use]
     pub fn over(self, before: &Self) -> Self {
         Self {
@@ -36,7 +38,7 @@ impl Labelling {
         }
     }
 
-    /// What decides the bytes of formats: SHA-256; `None` of the usual.
+    /// Returns the SHA-256, in hex, of the options, on which the bytes of formats depend; `None` for the defaults.
     pub fn fingerprint(&self) -> Result<Option<String>> {
         if self.is_usual() {
             return Ok(None);
@@ -45,7 +47,7 @@ impl Labelling {
         Ok(Some(hex::encode(Sha256::digest(text))))
     }
 
-    /// Whether a format lists what is seen like this.
+    /// Returns whether formats list a plant or a leaf with these pixels.
     pub fn lists(&self, seen: &Seen) -> bool {
         let least = self.min_pixels.unwrap_or(0).max(1);
         seen.pixels >= least && self.min_visible.is_none_or(|share| seen.shown_fraction() >= share)

@@ -1,13 +1,14 @@
-//! How photographs of a dataset are stored: PNG, which holds every value, or JPEG, which takes a third of the disk.
+//! Encoding of a dataset's images: PNG, which is lossless, or JPEG, which takes a third of the disk space.
 //!
-//! A photograph that is stored as JPEG is encoded once, and a sample then holds the pixels that its file decodes to: so whatever is made of an
-//! image while it is rendered is what would be made of its files. Colours are not subsampled (4:4:4) at any quality, for leaves are narrow.
+//! An image that is stored as JPEG is encoded once, and the sample then contains the pixels decoded from that file. So
+//! everything derived from an image while it is rendered equals what is derived from its files later. Chroma is not
+//! subsampled (4:4:4) at any quality, because leaves are narrow.
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
 
-/// How photographs are stored.
+/// Encoding of images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Photo {
@@ -18,14 +19,14 @@ pub enum Photo {
     Jpeg(u8),
 }
 
-/// Qualities of JPEG from the least to the best; below, edges of leaves are blocks.
+/// Range of JPEG qualities; at lower quality, leaf edges turn into blocks.
 const QUALITIES: std::ops::RangeInclusive<u8> = 50..=100;
 
-/// Most pixels across or down that a JPEG has.
+/// Maximum width and height of a JPEG, pixels.
 const MOST_SIDE: u32 = u16::MAX as u32;
 
 impl Photo {
-    /// Reads `png`, or `jpeg` with a quality behind it.
+    /// Parses `png`, or `jpeg` followed by a quality, such as `jpeg95`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let quality = |text: &str| text.parse().ok().filter(|quality| QUALITIES.contains(quality));
         match text.strip_prefix("jpeg") {
@@ -39,7 +40,7 @@ impl Photo {
         })
     }
 
-    /// Ending of the files' names.
+    /// Returns the file name extension.
     pub fn ending(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -47,13 +48,13 @@ impl Photo {
         }
     }
 
-    /// An error where it cannot hold pictures of this size.
+    /// Returns an error if images of this size cannot be encoded.
     pub(crate) fn check_size(self, width: u32, height: u32) -> Result<()> {
         if matches!(self, Self::Png) || width.max(height) <= MOST_SIDE {
             return Ok(());
         }
-        Err(Error::input(format!("{width} × {height} pixels, and a JPEG has at most {MOST_SIDE} across or down"))
-            .help("leave --photo out, so that photographs are PNG"))
+        Err(Error::input(format!("{width} × {height} pixels: the sides of a JPEG have at most {MOST_SIDE}"))
+            .help("omit --photo to store the images as PNG"))
     }
 }
 
@@ -80,7 +81,7 @@ impl TryFrom<String> for Photo {
     }
 }
 
-/// Photographs as their files hold them, where these are JPEG; empty where there is none.
+/// Contents of an image's JPEG files; empty if there is no such file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Jpegs {
     /// `rgb.jpg`.
@@ -89,7 +90,8 @@ pub struct Jpegs {
     pub nir: Vec<u8>,
 }
 
-/// Stores the photographs of an image of this size as a dataset's are: where that is JPEG, they become the pixels that the files decode to.
+/// Encodes the images of a sample if the dataset stores JPEG, replaces their pixels with those decoded from the files,
+/// and returns the files. Returns `None` for PNG, which needs no change of the pixels.
 pub(crate) fn store(
     (w, h): (u32, u32),
     rgb: &mut Vec<[u8; 3]>,
@@ -113,7 +115,7 @@ pub(crate) fn store(
 mod tests {
     use super::*;
 
-    /// Expected: what is read is written the same, in recipes too; other words are refused with what would do.
+    /// Expected: values are written as they are read, in recipes too; other words are refused with an example.
     #[test]
     fn words_are_read_as_they_are_written() {
         for (text, photo) in [("png", Photo::Png), ("jpeg50", Photo::Jpeg(50)), ("jpeg100", Photo::Jpeg(100))] {
@@ -126,7 +128,8 @@ mod tests {
         }
     }
 
-    /// Expected: the greatest side that the 16 bits of a JPEG's header hold is the last that is taken.
+    /// Expected: the largest side that the 16-bit fields of a JPEG header can hold is accepted, and the next one is
+    /// refused.
     #[test]
     fn sizes_beyond_a_jpeg_are_refused() {
         assert!(Photo::Jpeg(95).check_size(65_535, 1).is_ok() && Photo::Jpeg(95).check_size(1, 65_536).is_err());

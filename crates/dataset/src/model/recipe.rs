@@ -1,7 +1,8 @@
-//! What makes a dataset: its `dataset.json`.
+//! The recipe of a dataset: its `dataset.json`.
 //!
-//! Everything that decides a byte of an image stands here or in the `scene/` beside it, and nothing else does: no clock, no path
-//! of a machine, no number of threads. So any shard on any machine that has the folder can go on with it.
+//! Everything that affects a byte of an image is in the recipe or in the folder `scene/` beside it. Nothing else
+//! affects the images: no clock, no path of a machine, no number of threads. So any shard on any machine that has the
+//! folder can continue the dataset.
 
 use crate::model::classes::Classes;
 use crate::model::keep::{Kept, Omitted};
@@ -17,101 +18,106 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// A dataset's recipe.
+/// Recipe of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recipe {
-    /// The program's version.
+    /// Version of the program.
     pub furrow: String,
-    /// Where the images come from.
+    /// Origin of the images.
     pub made: Made,
-    /// How many there are.
+    /// Number of images.
     pub count: u64,
-    /// How they are split.
+    /// Proportions of the splits.
     pub split: Shares,
-    /// Formats beside the native one, by name.
+    /// Names of additional formats; the native format is always written.
     pub formats: Vec<String>,
-    /// Classes of the formats, and what they leave out.
+    /// Classes of the formats, and limits below which they omit plants and leaves.
     #[serde(default, skip_serializing_if = "Labelling::is_usual")]
     pub labelling: Labelling,
-    /// Images of an archive, where they do not lie in folders of their own.
+    /// Number of images per archive; omitted if each image has a folder of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pack: Option<u64>,
-    /// What others may do with it, in its owner's words.
+    /// Licence of the dataset, as free text.
     pub licence: String,
-    /// The species that `species.png` numbers from 1.
+    /// Species in the order of their numbers in `species.png`, from 1.
     pub species: Vec<SpeciesRecord>,
 }
 
-/// Where images come from.
+/// Origin of images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Made {
     /// Rendered from a scene file.
     Rendered(Box<Rendering>),
-    /// Brought from elsewhere.
+    /// Imported from another tool.
     Imported {
-        /// The format that they were in.
+        /// Name of the format that they were imported from.
         from: String,
-        /// SHA-256 of everything that told how they were read: options, names and lengths of files.
+        /// SHA-256 of everything that determined how they were read: options, names and lengths of files.
         source_sha256: String,
-        /// Whether they have near infrared: all of them or none. Recipes of before do not say.
+        /// Whether they have near infrared: all of them or none. Omitted in recipes of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         nir: Option<bool>,
     },
 }
 
-/// How images are rendered.
+/// Parameters of rendered images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rendering {
-    /// The scene file, below the dataset's folder.
+    /// Path of the scene file, relative to the dataset's folder.
     pub scene: String,
-    /// SHA-256 of the scene file and every species file, texture and table that it names.
+    /// SHA-256 of the scene file and of every species file, texture and table that it names.
     pub scene_sha256: String,
-    /// Seed; image k is field k of the scene file with this seed, or belongs to field k / `captures`.
+    /// Seed. Image k shows field k / `captures` of the scene file with this seed.
     pub seed: u64,
-    /// How many images are taken of each field, one after another.
+    /// Number of images of each field; they have consecutive numbers.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub captures: u64,
-    /// The days on which they are taken: all images of a day, then those of the next. Left out of fields that are seen as they are written.
+    /// Days on which images are taken: all images of one day, then those of the next. Omitted if fields have no days.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub days: Vec<u32>,
-    /// Pixels across.
+    /// Image width, pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Image height, pixels.
     pub height: u32,
-    /// What renders.
+    /// Render engine.
     pub engine: Engine,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub spp: u32,
-    /// Whether photographs are without the noise of few samples.
+    /// Whether images are denoised.
     pub denoise: bool,
-    /// Techniques left out.
+    /// Render techniques that are switched off.
     pub without: Vec<Technique>,
-    /// Most surfaces on a path, where it is not the default.
+    /// Maximum number of surfaces on a path; null for the default.
     pub max_depth: Option<u32>,
-    /// Most radiance of a path, where there is a limit.
+    /// Maximum radiance of a path; null for no limit.
     pub clamp: Option<f32>,
     /// Whether images have a `parts.png`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub parts: bool,
-    /// Names of its models from disk, in the order of their numbers in `parts.png`; left out where the scene file gives none.
+    /// Names of the scene's models from disk, in the order of their numbers in `parts.png`; omitted if the scene file
+    /// names none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
-    /// Maps that images keep beside photograph, labels and record; [`Kept::OLDEST`] where a recipe of before does not say.
+    /// Maps that are stored in addition to image, labels and record; [`Kept::OLDEST`] for recipes of earlier versions,
+    /// which do not list them.
     #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
     pub keep: Vec<Kept>,
-    /// Label maps that images go without, since their records tell the same; recipes of before name none.
+    /// Label maps that are not stored, since the records contain the same information; empty for recipes of earlier
+    /// versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub omit: Vec<Omitted>,
-    /// Whether images are labels alone: no photographs and nothing that samples tell, so `spp` says nothing.
+    /// Whether images are labels only, without rendered images and maps from samples; `spp` then has no effect.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub labels_only: bool,
-    /// How photographs are stored. Recipes of before do not say: theirs are PNG files, with the same comment as label maps.
+    /// Encoding of the images. Omitted in recipes of earlier versions: their images are PNG files with the same comment
+    /// as label maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub photo: Option<Photo>,
-    /// The ray tracing kernels and their instruction set, or the graphics card and its driver.
+    /// Ray tracing kernels with their instruction set, or graphics card with its driver.
     pub kernels: String,
-    /// What was changed of the field, by its name among [`ablation::EDITS`]. What an edit of the drawing changes stands above as well.
+    /// Name of the applied ablation among [`ablation::EDITS`]; its changes of render options are in the fields above as
+    /// well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edit: Option<String>,
 }
@@ -134,17 +140,17 @@ fn is_one(captures: &u64) -> bool {
 }
 
 impl Rendering {
-    /// The scene file below the dataset's folder; an error where the recipe names one elsewhere.
+    /// Returns the path of the scene file in the dataset's `folder`; an error if the recipe names a file elsewhere.
     pub fn scene_in(&self, folder: &Path) -> Result<PathBuf> {
         Ok(scope(folder).check(below(folder, &self.scene)?)?)
     }
 
-    /// The edit; [`ablation::FULL`] where nothing was changed.
+    /// Returns the applied ablation; [`ablation::FULL`] for none.
     pub fn edit(&self) -> Result<&'static Edit> {
         self.edit.as_deref().map_or(Ok(&ablation::FULL), Edit::named)
     }
 
-    /// Engine, quality and techniques, the edit's change of them included.
+    /// Returns engine, quality and techniques, including the changes by the ablation.
     pub fn options(&self) -> RenderOptions {
         let techniques = Techniques::new(&self.without, self.max_depth, self.clamp);
         RenderOptions {
@@ -155,59 +161,61 @@ impl Rendering {
     }
 }
 
-/// Where everything lies that the scene of a dataset names, whoever made it: in the dataset's folder.
+/// Returns the scope of the files that a dataset's scene may name: only the dataset's folder, since datasets may come
+/// from other people.
 pub(crate) fn scope(folder: &Path) -> Scope {
-    let help = "a dataset holds all that its scene names: restore it, or begin another from a scene file of your own";
+    let help = "a dataset contains all files of its scene: restore it, or create another from your own scene file";
     Scope::Below { folder: folder.into(), help }
 }
 
-/// Most images of a dataset: their names have eight digits at most.
+/// Maximum number of images in a dataset: their names have at most eight digits.
 pub const MOST_IMAGES: u64 = 99_999_999;
 
-/// The recipe's file, below the dataset's folder.
+/// Name of the recipe's file in the dataset's folder.
 pub const FILE: &str = "dataset.json";
 
-/// The manifest's file.
+/// Name of the manifest's file in the dataset's folder.
 pub const MANIFEST: &str = "manifest.json";
 
 impl Recipe {
-    /// Reads a dataset's recipe.
+    /// Reads the recipe of the dataset in `folder`.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
         let bytes = match furrow_base::input::contents(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                 return Err(Error::input(format!("this is no dataset, it has no {FILE}"))
                     .in_file(folder)
-                    .help("`trace dataset plan` begins one, `trace dataset import` brings one in"));
+                    .help("`trace dataset plan` creates one, `trace dataset import` imports one"));
             }
             other => other.map_err(Error::reading(&path))?,
         };
         let wrong = |what: String| {
             Error::damaged(what)
                 .in_file(&path)
-                .help("run the command that began the dataset again with another --out, or restore the file")
+                .help("repeat the command that created the dataset with another --out, or restore the file")
         };
         let recipe: Self =
             serde_json::from_slice(&bytes).map_err(|e| wrong(format!("this is not a dataset's recipe: {e}")))?;
         if recipe.count > MOST_IMAGES {
-            return Err(wrong(format!("it tells of {} images; datasets have at most {MOST_IMAGES}", recipe.count)));
+            return Err(wrong(format!("it has {} images; datasets have at most {MOST_IMAGES}", recipe.count)));
         }
         Ok(recipe)
     }
 
-    /// Its text.
+    /// Returns the contents of the recipe's file.
     pub fn text(&self) -> Result<Vec<u8>> {
         json(self)
     }
 
-    /// What decides the bytes of an image's native files: SHA-256 of the recipe without its length, formats and words.
+    /// Returns the SHA-256, in hex, of everything that affects the bytes of an image's native files: the recipe without
+    /// count, formats, labelling, pack size and licence.
     pub fn fingerprint(&self) -> Result<String> {
         let (formats, labelling, licence) = (Vec::new(), Labelling::default(), String::new());
         let same = Self { count: 0, formats, labelling, pack: None, licence, ..self.clone() };
         Ok(hex::encode(Sha256::digest(json(&same)?)))
     }
 
-    /// Of images that were never made, of these species.
+    /// Returns the recipe of an imported dataset without images, with these species.
     #[cfg(test)]
     pub(crate) fn of_species(species: Vec<SpeciesRecord>) -> Self {
         Self {
@@ -223,7 +231,7 @@ impl Recipe {
         }
     }
 
-    /// How many images are taken of each field; 1 of what was imported.
+    /// Returns the number of images of each field; 1 for imported images.
     pub fn captures(&self) -> u64 {
         match &self.made {
             Made::Rendered(rendering) => rendering.captures.max(1),
@@ -231,58 +239,59 @@ impl Recipe {
         }
     }
 
-    /// The field that an image shows, and which image of it this is.
+    /// Returns the field that an image shows, and the number of the image within the field.
     pub fn field_of(&self, index: u64) -> (u64, u64) {
         (index / self.captures(), index % self.captures())
     }
 
-    /// How many images are taken of each field on a day.
+    /// Returns the number of images of each field per day.
     pub fn captures_a_day(&self) -> u64 {
         (self.captures() / self.days().len().max(1) as u64).max(1)
     }
 
-    /// The days on which images are taken; none where fields are seen as they are written.
+    /// Returns the days on which images are taken; empty if fields have no days.
     pub fn days(&self) -> &[u32] {
         self.rendering().map_or(&[], |rendering| &rendering.days)
     }
 
-    /// Names that the scene file gives to models from disk; none for images from elsewhere.
+    /// Returns the names of the scene's models from disk; empty for imported images.
     pub fn models(&self) -> &[String] {
         self.rendering().map_or(&[], |rendering| &rendering.models)
     }
 
-    /// Number of the growing, among all, of the field that an image shows: fields grow anew for each of their days.
+    /// Returns the number of the scene, among all scenes that are built, that an image shows: a field is built once for
+    /// each of its days.
     pub fn growing_of(&self, index: u64) -> u64 {
         index / self.captures_a_day()
     }
 
-    /// Whether images tell which of their field they are.
+    /// Returns whether records state the position of the image in a drive, a rig or the days of its field.
     pub fn has_sequences(&self) -> bool {
         self.captures() > 1 || !self.days().is_empty()
     }
 
-    /// The split of an image: all images of a field are in one.
+    /// Returns the split of an image; all images of a field have the same one.
     pub fn split_of(&self, index: u64) -> Split {
         self.split.of(self.field_of(index).0)
     }
 
-    /// An error where classes are told apart by `parts.png` alone, and its images have none.
+    /// Returns an error if `classes` need `parts.png` and the images have none.
     pub fn check_parts(&self, classes: &Classes) -> Result<()> {
         let has_parts = matches!(&self.made, Made::Rendered(rendering) if rendering.parts);
         if has_parts || !classes.needs_parts() {
             return Ok(());
         }
-        let what = "classes of organs or of things on the ground need parts.png, which these images lack";
-        let help = "leave those labels out of --classes, or begin another dataset with these --classes";
+        let what = "classes of organs or of objects on the ground need parts.png, which these images lack";
+        let help = "omit those labels from --classes, or create another dataset with these --classes";
         Err(Error::misuse(what).help(help))
     }
 
-    /// Whether its images are labels alone, without photographs.
+    /// Returns whether the images are labels only, without rendered images.
     pub fn labels_only(&self) -> bool {
         matches!(&self.made, Made::Rendered(rendering) if rendering.labels_only)
     }
 
-    /// How its photographs are stored.
+    /// Returns the encoding of the images.
     pub fn photo(&self) -> Photo {
         match &self.made {
             Made::Rendered(rendering) => rendering.photo.unwrap_or_default(),
@@ -290,12 +299,13 @@ impl Recipe {
         }
     }
 
-    /// Whether its photographs hold a comment, as those of before do; without one, they are the very bytes that formats hold.
+    /// Returns whether the image files contain a comment, as in earlier versions. Without a comment, formats contain
+    /// the same bytes.
     pub fn has_comments(&self) -> bool {
         matches!(&self.made, Made::Rendered(rendering) if rendering.photo.is_none())
     }
 
-    /// How it is rendered; an error for images from elsewhere.
+    /// Returns the render parameters; an error for imported images.
     pub fn rendering(&self) -> Result<&Rendering> {
         match &self.made {
             Made::Rendered(rendering) => Ok(rendering),
@@ -308,7 +318,8 @@ impl Recipe {
         }
     }
 
-    /// Whether images keep a map. Imported ones do that came with it; where their recipe is one of before, near infrared may be among them.
+    /// Returns whether the images have a map, if its file exists. Rendered images have the maps in `keep`. Imported
+    /// images have the maps that they came with; if their recipe does not state near infrared, they may have it.
     pub fn keeps(&self, map: Kept) -> bool {
         match &self.made {
             Made::Rendered(rendering) => rendering.keep.contains(&map),
@@ -316,18 +327,19 @@ impl Recipe {
         }
     }
 
-    /// Whether images go without a label map, which their records tell.
+    /// Returns whether the images omit a label map; their records contain the same information.
     pub fn omits(&self, map: Omitted) -> bool {
         matches!(&self.made, Made::Rendered(rendering) if rendering.omit.contains(&map))
     }
 
-    /// The name of a species by its number in `species.png`; `None` for 0 and numbers of no species.
+    /// Returns the name of a species by its number in `species.png`; `None` for 0 and unknown numbers.
     pub fn species_name(&self, number: u16) -> Option<&str> {
         let place = usize::from(number).checked_sub(1)?;
         self.species.get(place).map(|s| s.name.as_str())
     }
 
-    /// Whether `other` makes the same images as far as both go: it may be longer and have other formats.
+    /// Checks that `other` can continue this dataset: it must make the same images, but may have more of them, other
+    /// formats, other labels and another licence; images in folders may be packed. The error lists the differences.
     pub fn check_goes_on(&self, folder: &Path, other: &Self) -> Result<()> {
         let (before, now) = (fields(self)?, fields(other)?);
         let free = ["count", "formats", "licence", "classes", "min_pixels", "min_visible"];
@@ -338,7 +350,7 @@ impl Recipe {
         let differing: Vec<&String> = keys
             .into_iter()
             .filter(|key| !free.contains(&key.as_str()) && before.get(*key) != now.get(*key))
-            // Images that lie in folders may be packed later.
+            // Images in folders may be packed later.
             .filter(|key| *key != "pack" || self.pack.is_some())
             .collect();
         let differs: Vec<String> = differing
@@ -355,15 +367,15 @@ impl Recipe {
         };
         let maps = differing.iter().any(|key| ["keep", "omit"].contains(&key.as_str()));
         let help = if maps {
-            "without --keep it goes on with the maps that it has; formats read label maps that were left out from the records"
+            "omit --keep to continue with the dataset's maps; formats take omitted label maps from the records"
         } else {
-            "give another --out, or the same arguments to go on with it; --count may grow and --format may be longer"
+            "give another --out, or the same arguments to continue it; --count may be larger, and --format may list more"
         };
-        Err(Error::misuse(format!("another dataset lies in this folder: {what}")).in_file(folder).help(help))
+        Err(Error::misuse(format!("another dataset is in this folder: {what}")).in_file(folder).help(help))
     }
 }
 
-/// What a value of the recipe is to whoever has not read it.
+/// Returns the description of a value of the recipe for error messages.
 fn in_words(key: &str) -> &str {
     match key {
         "keep" => "maps of --keep",
@@ -373,7 +385,7 @@ fn in_words(key: &str) -> &str {
     }
 }
 
-/// The recipe's values by name, those of its rendering as well.
+/// Returns the recipe's values by name, including those of its rendering.
 fn fields(recipe: &Recipe) -> Result<std::collections::BTreeMap<String, String>> {
     let mut all = std::collections::BTreeMap::new();
     let mut todo = vec![(String::new(), serde_json::to_value(recipe).map_err(failed)?)];
@@ -390,14 +402,14 @@ fn failed(e: impl std::fmt::Display) -> Error {
     Error::failed(format!("cannot write JSON: {e}"))
 }
 
-/// Readable JSON with a line's end.
+/// Serializes a value as indented JSON with a final newline.
 pub(crate) fn json(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value).map_err(failed)?;
     bytes.push(b'\n');
     Ok(bytes)
 }
 
-/// JSON on one line.
+/// Serializes a value as JSON on one line, with a final newline.
 pub(crate) fn compact(value: &impl Serialize) -> Result<Vec<u8>> {
     let mut bytes = serde_json::to_vec(value).map_err(failed)?;
     bytes.push(b'\n');

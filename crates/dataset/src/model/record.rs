@@ -1,4 +1,4 @@
-//! What is known of one image in words and numbers: its `record.json`.
+//! Labels and metadata of one image: its `record.json`.
 
 use crate::model::rle::{Box2, Rle};
 use crate::model::split::Split;
@@ -9,59 +9,63 @@ use furrow_render::film::Sampling;
 use furrow_render::scene::tag::{Class, lowercase};
 use serde::{Deserialize, Serialize, Serializer, ser};
 
-/// One image.
+/// Record of one image.
 ///
-/// Pixels count from the top left; a point is in continuous pixel coordinates, where the first pixel's centre is (0.5, 0.5).
+/// Pixels count from the top left. Points are in continuous pixel coordinates, where the centre of the first pixel is
+/// (0.5, 0.5).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Its number in the dataset.
+    /// Number of the image in the dataset, from 0.
     pub index: u64,
-    /// Its name: the number in six digits or more.
+    /// Name of the image: its number in six digits or more.
     pub name: String,
-    /// What its file was called where it was imported from.
+    /// Original file name of an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
-    /// Which split it is in.
+    /// Split of the image.
     pub split: Split,
-    /// Which image of its field it is, where several are taken.
+    /// Position of the image in the drive, the rig or the days of its field; `None` if each field has one image and no
+    /// days.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capture: Option<CaptureRecord>,
-    /// Pixels across.
+    /// Image width, pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Image height, pixels.
     pub height: u32,
-    /// Pixels of each class, in the order of their numbers.
+    /// Pixels of each class, in the order of the class numbers.
     pub classes: Vec<ClassShare>,
-    /// Pixels that have no label (imported images only).
+    /// Number of pixels without a label (imported images only).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub ignored: u64,
-    /// Its plants, by number: those that the image shows and those that others hide in it.
+    /// Plants by number: the visible ones, and those within the frame that are occluded.
     pub plants: Vec<Plant>,
-    /// What was drawn for it: camera, lights, soil, rows, stage; null for an imported image.
+    /// Sampled values of the field: camera, lights, soil, rows, growth stage; null for an imported image.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "sorted")]
     pub conditions: Option<Conditions>,
-    /// Leaf area over the ground that it shows; null in older records, for an imported image, and where the camera sees the horizon.
+    /// Leaf area above the visible ground; null in records of earlier versions, for an imported image, and if the
+    /// camera sees the horizon.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub canopy: Option<Canopy>,
-    /// How the sensor was set; null for an imported image, and for one that is labels alone.
+    /// Exposure of the sensor; null for imported and labels-only images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<Exposure>,
-    /// How well it is sampled; left out where that is not known, and of a denoised image.
+    /// Sampling noise of the image; omitted if it is unknown, and for a denoised image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
-    /// What whoever made it should know.
+    /// Warnings for the author of the scene file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 
 impl Record {
-    /// Whether there is a photograph of it; a field that was labelled alone has none.
+    /// Returns whether a colour image belongs to the record; labels-only images have none.
     pub fn has_photograph(&self) -> bool {
         self.exposure.is_some() || self.conditions.is_none()
     }
 }
 
-/// Writes conditions as records have always had them: keys in the order of the alphabet, numbers with the digits of double precision.
+/// Serializes conditions in the format of all versions: keys in alphabetical order, numbers with the digits of double
+/// precision.
 #[expect(clippy::ref_option, reason = "serde calls it with a reference to the field")]
 fn sorted<S: Serializer>(conditions: &Option<Conditions>, serializer: S) -> Result<S::Ok, S::Error> {
     serde_json::to_value(conditions).map_err(ser::Error::custom)?.serialize(serializer)
@@ -72,96 +76,98 @@ fn is_zero(n: &u64) -> bool {
     *n == 0
 }
 
-/// One image of a drive, of a rig or of a day.
+/// Position of an image in a drive, a rig or the days of a field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaptureRecord {
     /// Number of the field.
     pub field: u64,
-    /// The day on which it was taken, counted from the emergence of the field's first crop; left out of fields that have no days.
+    /// Day of the image, counted from the emergence of the field's first crop; omitted for fields without days.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub day: Option<u32>,
-    /// How many images its camera took before, on all days.
+    /// Number of images that its camera took before, on all days.
     pub frame: u32,
     /// Name of the camera.
     pub camera: String,
-    /// When, seconds after the first image.
+    /// Time since the first image, seconds.
     pub time_s: f64,
 }
 
-/// How the sensor was set: by these numbers the photographs are the radiance's.
+/// Exposure of the sensor: factors from radiance to pixel values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
-    /// Linear level (1 is white) of green per radiance, per W·m⁻²·sr⁻¹·nm⁻¹.
+    /// Linear level of green (1 is white) per radiance in W·m⁻²·sr⁻¹·nm⁻¹.
     pub gain: f32,
-    /// The same in near infrared.
+    /// The same for near infrared.
     pub nir_gain: f32,
-    /// Gains of the white balance on R, G, B.
+    /// White-balance gains of R, G and B.
     pub white_balance: [f32; 3],
 }
 
-/// How much of an image a class has.
+/// Pixels of one class in an image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClassShare {
     /// The class.
     #[serde(with = "lowercase")]
     pub class: Class,
-    /// Pixels whose centre shows it.
+    /// Number of pixels whose centre shows the class.
     pub pixels: u64,
-    /// Sum over pixels of the share of it in each, in pixels; null without coverage.
+    /// Sum over all pixels of the fraction covered by the class, in pixels; null without coverage.
     pub covered: Option<f64>,
 }
 
 /// One plant in an image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
-    /// Its number in `plants.png`.
+    /// Number of the plant in `plants.png`.
     pub number: u32,
-    /// Its identity, 32 bit and never 0: the same in every image of its field, whatever the camera, the resolution and the other
-    /// plants in view; no other plant or leaf of the field has it. Null in older records and for an imported plant.
+    /// Identity: 32 bits, never 0, unique among the plants and leaves of the field. It is the same in every image of
+    /// the field, independent of the camera, the resolution and the other plants in view. Null in records of earlier
+    /// versions and for an imported plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u32>,
     /// Crop or weed.
     #[serde(with = "lowercase")]
     pub class: Class,
-    /// Its species' number in the dataset's table; 0 for one that has none.
+    /// Number of the species in the dataset's table; 0 for none.
     pub kind: u16,
-    /// What the camera sees of it.
+    /// Pixels of the plant in the image.
     pub seen: Seen,
-    /// Where its stem meets the ground.
+    /// Point where the stem meets the ground.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stem: Option<Keypoint>,
-    /// What grew; null for an imported plant.
+    /// Properties of the grown plant; null for an imported plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grown: Option<Grown>,
-    /// Its leaves, by number.
+    /// Leaves by number.
     pub leaves: Vec<Leaf>,
 }
 
-/// What is known of a plant beyond its pixels.
+/// Properties of a plant beyond its pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grown {
-    /// Common name as the species file has it, or the name of the model.
+    /// Common name from the species file, or the name of the model.
     pub species: String,
     /// EPPO code; empty for a model.
     pub eppo: String,
-    /// Growth stage, BBCH.
+    /// Growth stage on the BBCH scale.
     pub bbch: u32,
     /// Days after emergence.
     pub age_days: f32,
-    /// Where its stem meets the ground, world, metres.
+    /// Point where the stem meets the ground, world space, metres.
     pub position_m: [f32; 3],
-    /// The axis that it was sown with, world, unit; `lean_deg` of its species comes on top.
+    /// Unit vector of the growth axis that the plant was sown with, world space; `lean_deg` of its species is added to
+    /// it.
     pub axis: [f32; 3],
-    /// Its height, metres.
+    /// Height, metres.
     pub height_m: f32,
-    /// Radius of the upright cylinder about its stem that holds it, metres.
+    /// Radius of the vertical cylinder around the stem that contains the plant, metres.
     pub radius_m: f32,
-    /// Number of its leaves, seed leaves included, seen or not.
+    /// Number of leaves, including cotyledons, visible or not.
     pub leaves: u16,
-    /// Its leaf area and cover; null in older records and for a model.
+    /// Leaf area and cover; null in records of earlier versions and for a model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traits: Option<PlantTraits>,
-    /// Its condition (holes, dead tissue, dust, wilting), where its scene file gave one.
+    /// Condition (holes, dead tissue, dust, wilting), if the scene file sets one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub condition: Option<Condition>,
 }
@@ -169,54 +175,56 @@ pub struct Grown {
 /// One leaf in an image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Leaf {
-    /// Its number in `leaves.png`.
+    /// Number of the leaf in `leaves.png`.
     pub number: u16,
-    /// Its identity, as a plant's.
+    /// Identity, as for a plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u32>,
-    /// What the camera sees of it.
+    /// Pixels of the leaf in the image.
     pub seen: Seen,
-    /// Where its blade begins.
+    /// Base of the blade.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<Keypoint>,
-    /// Where its blade ends.
+    /// Tip of the blade.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<Keypoint>,
-    /// Its area, size and angles; null in older records and for a leaf of a model or of an imported plant.
+    /// Area, size and angles; null in records of earlier versions, and for leaves of models and of imported plants.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traits: Option<LeafTraits>,
 }
 
-/// How much of a plant or a leaf an image shows.
+/// Pixels of a plant or a leaf in an image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
-    /// Pixels whose centre shows it.
+    /// Number of pixels whose centre shows it.
     pub pixels: u32,
-    /// Pixels whose centre would show it if nothing stood before it; null where that is not known.
+    /// Number of pixels whose centre would show it without occlusion; null if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unoccluded: Option<u32>,
-    /// The same if the image also went on beyond its frame.
+    /// The same if, in addition, the image extended beyond its frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub whole: Option<u32>,
-    /// The smallest box that holds its pixels: x, y, width, height; null where none is seen.
+    /// Bounding box of its pixels: x, y, width, height; null if none is visible.
     #[serde(rename = "box")]
     pub bounds: Option<Box2>,
-    /// Its pixels.
+    /// Mask of its pixels.
     pub mask: Option<Rle>,
 }
 
 impl Seen {
-    /// Share of it, within the frame, that nothing hides: pixels over unoccluded pixels. 1 where that is not known.
+    /// Returns the fraction of the part within the frame that is not occluded, `pixels` / `unoccluded`. 1 if unknown.
     pub fn visible_fraction(&self) -> f64 {
         fraction(self.pixels, self.unoccluded)
     }
 
-    /// Share of all of it that the image shows, hidden parts and parts beyond the frame counted. 1 where that is not known.
+    /// Returns the visible fraction of the whole, including occluded parts and parts outside the frame, `pixels` /
+    /// `whole`. 1 if unknown.
     pub fn shown_fraction(&self) -> f64 {
         fraction(self.pixels, self.whole)
     }
 
-    /// Share of it that lies within the frame, hidden or not. 1 where that is not known.
+    /// Returns the fraction of the whole that is within the frame, occluded or not, `unoccluded` / `whole`. 1 if
+    /// unknown.
     pub fn inside_fraction(&self) -> f64 {
         self.unoccluded.map_or(1.0, |n| fraction(n, self.whole))
     }
@@ -229,33 +237,33 @@ fn fraction(part: u32, all: Option<u32>) -> f64 {
 /// A point of a plant in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Keypoint {
-    /// From the left edge, pixels; may lie outside the image.
+    /// Distance from the left edge, pixels; may be outside the image.
     pub x: f32,
-    /// From the top edge, pixels.
+    /// Distance from the top edge, pixels; may be outside the image.
     pub y: f32,
-    /// Whether it can be seen.
+    /// Visibility.
     pub state: PointState,
 }
 
-/// Whether a point can be seen.
+/// Visibility of a keypoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PointState {
     /// Outside the image.
     Outside,
-    /// In the image, behind something.
+    /// In the image, occluded.
     Hidden,
-    /// In the image, in sight.
+    /// In the image, not occluded.
     Visible,
 }
 
 impl Record {
-    /// The plants that the image shows.
+    /// Returns the plants with at least one visible pixel.
     pub fn seen(&self) -> impl Iterator<Item = &Plant> {
         self.plants.iter().filter(|p| p.seen.pixels > 0)
     }
 
-    /// Plants and leaves that the image shows, each leaf with its plant; in the order of their numbers.
+    /// Returns the visible leaves of the visible plants, each with its plant, in the order of their numbers.
     pub fn leaves(&self) -> impl Iterator<Item = (&Plant, &Leaf)> {
         self.seen().flat_map(|p| p.leaves.iter().filter(|l| l.seen.pixels > 0).map(move |l| (p, l)))
     }

@@ -1,34 +1,34 @@
-//! Masks as COCO writes them: run lengths down the columns, the first of zeros, packed into text.
+//! Masks in COCO's compressed format: run lengths down the columns, starting with zeros, packed into text.
 //!
-//! The packing is that of the reference implementation (pycocotools, `rleToString`): each run is told as its difference to the
-//! run before the last, in groups of five bits from the lowest, a sixth bit says whether another follows, and 48 is added to
-//! make it a printable character.
+//! The packing is that of the reference implementation (pycocotools, `rleToString`). From the fourth run on, each run
+//! is stored as its difference to the run two places before. The numbers are split into groups of five bits from the
+//! lowest; a sixth bit marks that another group follows, and 48 is added to make a printable character.
 //!
-//! By hand: no maintained crate writes this packing, and its bytes must not move.
+//! It is implemented here because no maintained crate writes this packing, and its bytes must not change.
 
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// A mask of one thing in an image.
+/// Mask of one object in an image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rle {
     /// Height and width of the image, pixels.
     pub size: [u32; 2],
-    /// The runs.
+    /// Packed run lengths.
     pub counts: String,
 }
 
-/// A box that holds pixels: x, y of its first column and row, and how many of each; never empty.
+/// Bounding box of pixels: first column, first row, number of columns, number of rows; never empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Box2(pub [u32; 4]);
 
 impl Box2 {
-    /// The box of one pixel.
+    /// Returns the box of one pixel.
     pub fn of(x: u32, y: u32) -> Self {
         Self([x, y, 1, 1])
     }
 
-    /// Grows to hold a pixel.
+    /// Extends the box to contain a pixel.
     pub fn add(&mut self, x: u32, y: u32) {
         let [x0, y0, w, h] = self.0;
         let (x1, y1) = ((x0 + w).max(x + 1), (y0 + h).max(y + 1));
@@ -36,19 +36,19 @@ impl Box2 {
         self.0 = [x0, y0, x1 - x0, y1 - y0];
     }
 
-    /// Its columns.
+    /// Returns the range of columns.
     pub fn columns(&self) -> std::ops::Range<u32> {
         self.0[0]..self.0[0] + self.0[2]
     }
 
-    /// Its rows.
+    /// Returns the range of rows.
     pub fn rows(&self) -> std::ops::Range<u32> {
         self.0[1]..self.0[1] + self.0[3]
     }
 }
 
 impl Rle {
-    /// The mask of the pixels in `bounds` for which `inside(x, y)` holds.
+    /// Encodes the mask of the pixels in `bounds` for which `inside(x, y)` holds.
     pub fn encode(width: u32, height: u32, bounds: Box2, inside: impl Fn(u32, u32) -> bool) -> Self {
         let mut runs: Vec<u64> = Vec::new();
         let (mut now, mut from) = (false, 0);
@@ -60,7 +60,7 @@ impl Rle {
                     (now, from) = (value, column + y);
                 }
             };
-            // Above the box nothing is inside; what is below ends where the next column begins.
+            // Pixels above and below the box are outside. A run that reaches the last row continues in the next column.
             set(0, bounds.0[1] == 0 && inside(x, 0));
             for y in bounds.rows() {
                 set(u64::from(y), inside(x, y));
@@ -81,12 +81,13 @@ impl Rle {
         Self { size: [height, width], counts: pack(&runs) }
     }
 
-    /// Of run lengths that are not packed, zeros first.
+    /// Packs run lengths, starting with zeros.
     pub fn of_runs(size: [u32; 2], runs: &[u64]) -> Self {
         Self { size, counts: pack(runs) }
     }
 
-    /// Run lengths, zeros first. An error where the text is none or does not fill the image.
+    /// Returns the run lengths, starting with zeros. An error if the text is not packed run lengths, or if they do not
+    /// fill the image.
     pub fn runs(&self) -> Result<Vec<u64>> {
         let runs = unpack(&self.counts).ok_or_else(|| self.fault("its `counts` are not COCO's run lengths"))?;
         let all = u64::from(self.size[0]) * u64::from(self.size[1]);
@@ -94,12 +95,12 @@ impl Rle {
         if sum == Some(all) { Ok(runs) } else { Err(self.fault("its runs do not fill the image")) }
     }
 
-    /// Number of pixels inside.
+    /// Returns the number of pixels inside the mask.
     pub fn area(&self) -> Result<u64> {
         Ok(self.runs()?.iter().skip(1).step_by(2).sum())
     }
 
-    /// One value a pixel, row by row from the top.
+    /// Returns one value per pixel, row by row from the top.
     pub fn decode(&self) -> Result<Vec<bool>> {
         let [height, width] = self.size.map(|n| n as usize);
         let mut mask = vec![false; width * height];
@@ -107,14 +108,14 @@ impl Rle {
         Ok(mask)
     }
 
-    /// The pixels inside, each as its place among all, which are counted row by row from the top.
+    /// Returns the indices of the pixels inside the mask, counted row by row from the top.
     pub fn pixels(&self) -> Result<impl Iterator<Item = usize>> {
         let [height, width] = self.size.map(|n| n as usize);
         let mut at = 0;
         let inside = self.runs()?.into_iter().enumerate().flat_map(move |(i, run)| {
             let from = at;
             at += run as usize;
-            // Runs go down the columns, the first of what is outside.
+            // Runs go down the columns; the first one is outside the mask.
             (if i % 2 == 1 { from..at } else { at..at }).map(move |k| k % height * width + k / height)
         });
         Ok(inside)

@@ -1,4 +1,4 @@
-//! One image and everything that is known of it, in memory: what formats are made of.
+//! One image with all its labels and metadata, in memory: the source of every format.
 
 use crate::model::photo::Jpegs;
 use crate::model::record::Record;
@@ -7,12 +7,13 @@ use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
 use std::collections::BTreeMap;
 
-/// One image of a dataset. Maps hold one value a pixel, row by row from the top; a map that is not known is empty.
+/// One image of a dataset. Maps contain one value per pixel, row by row from the top; a map that is not available is
+/// empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// What is known in words and numbers.
+    /// Labels and metadata.
     pub record: Record,
-    /// 8-bit sRGB; empty where images are labels alone.
+    /// 8-bit sRGB; empty for labels-only images.
     pub rgb: Vec<[u8; 3]>,
     /// 8-bit near infrared.
     pub nir: Vec<u8>,
@@ -20,80 +21,84 @@ pub struct Sample {
     pub semantics: Vec<u8>,
     /// Number of the species in the dataset's table, 0 for none.
     pub species: Vec<u8>,
-    /// Number of what is there among [`PartKind::NUMBERED`](furrow_field::PartKind::NUMBERED), 0 for nothing.
+    /// Number of the visible part among [`PartKind::NUMBERED`](furrow_field::PartKind::NUMBERED), 0 for none.
     pub parts: Vec<u8>,
     /// Number of the plant, 0 for none.
     pub plants: Vec<u32>,
     /// Number of the leaf on its plant, 0 for none.
     pub leaves: Vec<u16>,
-    /// Share of soil, crop and weed in the pixel, of 255; they sum to 255.
+    /// Fractions of soil, crop and weed in the pixel; they sum to 255.
     pub coverage: Vec<[u8; 3]>,
-    /// Distance along the optical axis, metres; infinite where nothing is.
+    /// Distance along the optical axis, metres; infinite where nothing is visible.
     pub depth: Vec<f32>,
-    /// Unit normal in the world, facing the camera; zero where nothing is.
+    /// Unit normal in world space, facing the camera; zero where nothing is visible.
     pub normals: Vec<[f32; 3]>,
-    /// The files that `rgb` and `nir` are the pixels of, where photographs are stored as JPEG.
+    /// JPEG files whose pixels are in `rgb` and `nir`; `None` if images are stored as PNG.
     pub jpeg: Option<Jpegs>,
-    /// What was rendered; only in the process that rendered it.
+    /// Results of the renderer; only in the process that rendered the image.
     pub film: Option<Rendered>,
 }
 
 impl Sample {
-    /// What only the renderer knows of it; an error that names the `format` which asks, for an image that was not rendered now.
+    /// Returns the results of the renderer. If the image was not rendered by this process, returns an error that names
+    /// the `format` that needs them.
     pub fn rendered(&self, format: &str) -> Result<&Rendered> {
         self.film.as_ref().ok_or_else(|| {
-            Error::misuse(format!("image {}: only the renderer knows what --format {format} holds", self.record.name))
+            Error::misuse(format!("image {}: --format {format} needs results of the renderer", self.record.name))
         })
     }
 }
 
-/// What formats for compositing (layers, Cryptomattes) hold beyond a photograph.
+/// Results of the renderer that are not stored with the image but used by some formats, such as Cryptomattes in
+/// `layers`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
-    /// Linear radiance, its variance, what each sample met; none where images are labels alone.
+    /// Linear radiance, its variance and the parts that the samples hit; `None` for labels-only images.
     pub film: Option<Film>,
-    /// Which part lies at each pixel's centre, and who that is.
+    /// Part, depth and normal at each pixel's centre.
     pub labels: LabelMap,
     /// Class, plant and leaf of each part.
     pub tags: Vec<furrow_render::scene::tag::Tag>,
-    /// What each part is.
+    /// Kind of each part.
     pub kinds: Vec<furrow_field::PartKind>,
-    /// What grows.
+    /// Plants of the field.
     pub plants: Vec<furrow_field::PlantRecord>,
-    /// Who looked.
+    /// Camera of the image.
     pub camera: furrow_optics::sensor::Camera,
-    /// Where what this image shows lies in others of its field; none unless a format asks for it.
+    /// Optical flow to other images of the field; empty unless a format needs it.
     pub flows: Vec<Flow>,
-    /// What is wrong with the leaf at each pixel's centre; none unless a format asks for it.
+    /// Damage of the leaf at each pixel's centre; empty unless a format needs it.
     pub damage: Vec<furrow_render::material::Damage>,
 }
 
-/// Where what is at each pixel's centre lies in another image of the same field.
+/// Optical flow from one image to another of the same field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flow {
-    /// Which image: `next` of the same camera, or another camera of the same frame by its name.
+    /// Other image: `next` for the next frame of the same camera, or the name of another camera for the same frame.
     pub to: String,
-    /// From here to there, pixels right and down; not a number where nothing is, or behind the other lens.
+    /// Displacement of the point at each pixel's centre, pixels right and down; NaN where nothing is visible or the
+    /// point is behind the other camera.
     pub pixels: Vec<[f32; 2]>,
-    /// Whether the other image shows it.
+    /// Whether the point is visible in the other image.
     pub visible: Vec<bool>,
 }
 
-/// Stands for "no label" in [`Sample::semantics`].
+/// Value for "no label" in [`Sample::semantics`].
 pub const IGNORE: u8 = 255;
 
 impl Sample {
-    /// Width and height, pixels.
+    /// Returns width and height, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.record.width, self.record.height)
     }
 
-    /// Number of pixels.
+    /// Returns the number of pixels.
     pub fn pixels(&self) -> usize {
         self.record.width as usize * self.record.height as usize
     }
 
-    /// A number for every leaf that is unique in the image, 0 for none: leaves count through the image by plant and leaf.
+    /// Returns a leaf number for each pixel that is unique in the image, 0 for none. Leaves are numbered in the order
+    /// of their plants and of their numbers on the plant.
     pub fn leaf_instances(&self) -> Vec<u32> {
         let numbers: BTreeMap<(u32, u16), u32> = self
             .record

@@ -1,20 +1,20 @@
-//! Training, validation and test images.
+//! Training, validation and test sets.
 //!
-//! Every field has plants and ground of its own, and all its images are in one split, so no plant and no patch of soil is in two. Splits
-//! alternate in a fixed pattern over the numbers of the fields: a longer dataset begins with the same images in the same splits, and
-//! every stretch of it is shared out alike.
+//! Every field has plants and ground of its own, and all its images are in one split, so no plant and no patch of soil
+//! is in two splits. Splits alternate in a fixed pattern over the field numbers: a longer dataset starts with the same
+//! images in the same splits, and every stretch of it has the same proportions.
 
 use serde::{Deserialize, Serialize};
 
-/// Which part of a dataset an image belongs to.
+/// The set that an image belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
-    /// To train on.
+    /// Training set.
     Train,
-    /// To watch the training by.
+    /// Validation set.
     Val,
-    /// To judge by.
+    /// Test set.
     Test,
 }
 
@@ -22,7 +22,7 @@ impl Split {
     /// All splits.
     pub const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
 
-    /// Lower-case name, as folders have it.
+    /// Returns the lower-case name, as in names of folders.
     pub fn name(self) -> &'static str {
         match self {
             Self::Train => "train",
@@ -32,7 +32,8 @@ impl Split {
     }
 }
 
-/// Shares of the splits: of any `train + val + test` images in a row, the first are for training, then validation, then test.
+/// Proportions of the splits: of each `train + val + test` consecutive fields, the first are for training, the next for
+/// validation, the last for testing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shares(pub [u32; 3]);
 
@@ -43,9 +44,9 @@ impl Default for Shares {
 }
 
 impl Shares {
-    /// Reads `8,1,1` or `80,10,10`.
+    /// Parses proportions such as `8,1,1`, and reduces them: `80,10,10` is the same.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || "write the shares of train,val,test such as 8,1,1; one of them at least above 0".to_owned();
+        let wrong = || "write proportions of train,val,test, such as 8,1,1; at least one must be above 0".to_owned();
         let numbers: Option<Vec<u32>> = text.split(',').map(|t| t.trim().parse().ok()).collect();
         let shares: [u32; 3] = numbers.and_then(|n| n.try_into().ok()).ok_or_else(wrong)?;
         let divisor = shares.into_iter().fold(0, gcd);
@@ -55,7 +56,7 @@ impl Shares {
         Ok(Self(shares.map(|n| n / divisor)))
     }
 
-    /// The split of a field.
+    /// Returns the split of the field with this number.
     pub fn of(self, index: u64) -> Split {
         let [train, val, test] = self.0.map(u64::from);
         let place = index % (train + val + test).max(1);

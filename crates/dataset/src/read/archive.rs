@@ -1,22 +1,23 @@
-//! Files of images in tar archives, named as the package `webdataset` groups them: `000123.rgb.png` is `images/000123/rgb.png` of the
-//! dataset, `000123` its key.
+//! Image files in tar archives, with names that the package `webdataset` groups by image: the file
+//! `images/000123/rgb.png` of the dataset is the member `000123.rgb.png`, with the key `000123`.
 
 use std::io::{self, Write};
 
-/// Bytes of a tar archive's blocks: a file begins with one, its header, and fills whole ones.
+/// Block size of tar archives, bytes. A file starts with a header of one block, and its contents are padded to whole
+/// blocks.
 pub(crate) const BLOCK: u64 = 512;
 
-/// Adds a file of an image, by its path below the dataset's folder.
+/// Adds a file of an image to an archive; `path` is relative to the dataset's folder.
 pub(crate) fn append(archive: &mut tar::Builder<impl Write>, path: &str, bytes: &[u8]) -> io::Result<()> {
     archive.append(&header(path, bytes.len() as u64)?, bytes)
 }
 
-/// The name in an archive of an image's file.
+/// Returns the name of an image's file in an archive.
 pub(crate) fn entry_name(path: &str) -> String {
     path.trim_start_matches("images/").replace('/', ".")
 }
 
-/// A file's header, which tells nothing of this machine.
+/// Returns the header of a file, without information about this machine.
 fn header(path: &str, bytes: u64) -> io::Result<tar::Header> {
     let mut header = tar::Header::new_ustar();
     header.set_path(entry_name(path))?;

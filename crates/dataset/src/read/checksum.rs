@@ -1,48 +1,48 @@
-//! What tells a file: its length and its SHA-256.
+//! Checksum of a file: its length and its SHA-256.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io;
 use std::path::Path;
 
-/// What tells a file.
+/// Length and SHA-256 of a file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checksum {
-    /// SHA-256, hex.
+    /// SHA-256, in hex.
     pub sha256: String,
-    /// Length.
+    /// Length, bytes.
     pub bytes: u64,
 }
 
 impl Checksum {
-    /// Of a file's contents.
+    /// Returns the checksum of the contents of a file.
     pub fn of(bytes: &[u8]) -> Self {
         Self { sha256: hex::encode(Sha256::digest(bytes)), bytes: bytes.len() as u64 }
     }
 
-    /// Of a file, read piece by piece: an archive may be larger than memory.
+    /// Returns the checksum of a file. The file is read in pieces, since an archive may be larger than memory.
     pub fn of_file(path: &Path) -> io::Result<Self> {
         let mut hash = Sha256::new();
         let bytes = io::copy(&mut furrow_base::input::open(path)?, &mut hash)?;
         Ok(Self { sha256: hex::encode(hash.finalize()), bytes })
     }
 
-    /// Whether the file is there and has these contents.
+    /// Returns whether the file exists and has this checksum.
     pub fn holds(&self, path: &Path) -> bool {
         self.fault(path).is_none()
     }
 
-    /// What is wrong with the file, in words.
+    /// Describes how a file differs from this checksum; `None` if it does not.
     pub fn fault(&self, path: &Path) -> Option<String> {
         self.fault_of(std::fs::metadata(path).map(|about| about.len()), || Self::of_file(path))
     }
 
-    /// Whether a file has these contents.
+    /// Returns whether the contents of a file have this checksum.
     pub fn is_of(&self, bytes: &[u8]) -> bool {
         Self::of(bytes) == *self
     }
 
-    /// What is wrong with a file of this length and with what its contents are told by, in words.
+    /// Compares a file's length, and then the checksum that `found` computes, and describes the first difference.
     pub(crate) fn fault_of(&self, length: io::Result<u64>, found: impl FnOnce() -> io::Result<Self>) -> Option<String> {
         self.fault_of_length(length).or_else(|| match found() {
             Err(e) => Some(format!("cannot be read: {e}")),
@@ -51,7 +51,7 @@ impl Checksum {
         })
     }
 
-    /// What is wrong with a file of this length, in words.
+    /// Compares a file's length, and describes a difference.
     pub(crate) fn fault_of_length(&self, length: io::Result<u64>) -> Option<String> {
         match length {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Some("is missing".into()),
@@ -67,14 +67,15 @@ mod tests {
     use super::*;
     use furrow_base::input::LARGEST;
 
-    /// A pack of a thousand large images is larger than any file that is read whole. Expected: its bytes are looked at all the same.
+    /// A pack of a thousand large images can be larger than any file that is read whole. Expected: its bytes are
+    /// checked nevertheless.
     #[test]
     #[ignore = "takes the checksum of 4 GiB"]
     fn files_of_any_length_are_looked_at() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let sum = Checksum { bytes: LARGEST + 1, ..Checksum::of(b"") };
         assert_eq!(sum.fault(file.path()), Some(format!("has 0 bytes instead of {}", sum.bytes)));
-        // Of holes alone: it takes no room.
+        // A sparse file, which takes no disk space.
         file.as_file().set_len(LARGEST + 1).unwrap();
         assert_eq!(sum.fault(file.path()), Some("was changed: its SHA-256 differs".into()));
     }

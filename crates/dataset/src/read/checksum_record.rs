@@ -1,6 +1,6 @@
-//! Which files make an image, each with its SHA-256: an image is there when its record of checksums is and every file agrees with it.
+//! Checksum records: an image is complete if its record exists and every file listed in it has the recorded SHA-256.
 //!
-//! It is written last and holds a hash of itself, so a damaged record is none.
+//! The record is written last and contains a hash of itself, so a damaged record counts as missing.
 
 use crate::File;
 use crate::model::recipe::{Recipe, compact};
@@ -14,21 +14,21 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What an image is made of.
+/// Checksums of the files of an image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChecksumRecord {
-    /// Its number.
+    /// Number of the image.
     pub index: u64,
-    /// [`Recipe::fingerprint`] of what made it.
+    /// [`Recipe::fingerprint`] of the recipe that made the image.
     pub recipe: String,
-    /// [`Labelling::fingerprint`](crate::model::labelling::Labelling::fingerprint) of its formats' labels.
+    /// [`Labelling::fingerprint`](crate::model::labelling::Labelling::fingerprint) of the labels in its formats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labelling: Option<String>,
-    /// Its files by path below the dataset's folder.
+    /// Files by their path relative to the dataset's folder.
     pub files: BTreeMap<String, Checksum>,
 }
 
-/// A record of checksums as it lies on disk.
+/// A checksum record as it is stored on disk.
 #[derive(Serialize, Deserialize)]
 struct Written {
     #[serde(flatten)]
@@ -38,23 +38,23 @@ struct Written {
 }
 
 impl ChecksumRecord {
-    /// Of files that were just made.
+    /// Returns the record of files that were just made.
     pub fn of(index: u64, recipe: &Recipe, files: &[File]) -> Result<Self> {
         let files = files.iter().map(|f| (f.path.clone(), Checksum::of(&f.bytes))).collect();
         Ok(Self { index, recipe: recipe.fingerprint()?, labelling: recipe.labelling.fingerprint()?, files })
     }
 
-    /// Where the checksums of an image lie.
+    /// Returns the path of an image's record in the dataset's `folder`.
     pub fn path(folder: &Path, index: u64) -> PathBuf {
         folder.join(Self::path_below(index))
     }
 
-    /// The same below the dataset's folder.
+    /// Returns the same path, relative to the dataset's folder.
     pub(crate) fn path_below(index: u64) -> String {
         format!("seals/{}.json", native::image_name(index))
     }
 
-    /// Reads an image's checksums; `None` where there is none or it is damaged.
+    /// Reads the record of an image; `None` if it is missing or damaged.
     pub fn read(folder: &Path, index: u64) -> Option<Self> {
         let bytes = furrow_base::input::contents(&Self::path(folder, index)).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
@@ -62,18 +62,18 @@ impl ChecksumRecord {
         (own == written.seal_sha256 && written.checksums.index == index).then_some(written.checksums)
     }
 
-    /// Writes it: after everything that it names.
+    /// Writes the record, which must happen after all files listed in it are written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let written = Written { checksums: self.clone(), seal_sha256: self.hash()? };
         write_atomically(&below(folder, &Self::path_below(self.index))?, &compact(&written)?)
     }
 
-    /// SHA-256 over everything in it, hex.
+    /// Returns the SHA-256 of all fields, in hex.
     pub fn hash(&self) -> Result<String> {
         Ok(hex::encode(Sha256::digest(compact(self)?)))
     }
 
-    /// The same over its native files alone, whatever formats there are.
+    /// Returns the same hash of the native files alone, independent of the formats.
     pub fn image_hash(&self) -> Result<String> {
         let mut own = self.clone();
         own.files.retain(|path, _| path.starts_with("images/"));
@@ -82,16 +82,17 @@ impl ChecksumRecord {
     }
 }
 
-/// Bytes from which on a file takes more than one block of a disk.
+/// Block size of a disk, bytes. Only larger files are replaced by hard links.
 pub(crate) const BLOCK: usize = 4096;
 
-/// Writes files, all of them or none. Those of the same bytes, such as the photograph in several formats, are one file with several
-/// names.
+/// Writes all files or none. Files with equal contents, such as the image in several formats, become hard links to one
+/// file.
 pub(crate) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
     write_files_beside(folder, files, &BTreeMap::new())
 }
 
-/// The same; files of the same bytes as some that lie there, of which these checksums are known, become further names of those.
+/// Writes files in the same way. If a file has the contents of an existing one, whose checksum is in `there`, it
+/// becomes a hard link to that one.
 pub(crate) fn write_files_beside(folder: &Path, files: &[File], there: &BTreeMap<String, Checksum>) -> Result<()> {
     let known = if there.is_empty() { BTreeMap::new() } else { lying(folder, files, there)? };
     let add_all = |together: &mut Together| {
@@ -114,7 +115,8 @@ pub(crate) fn write_files_beside(folder: &Path, files: &[File], there: &BTreeMap
     write_together(folder, add_all).map(drop)
 }
 
-/// Large files whose bytes lie there already, and where: none in archives. A checksum says which to look at, the bytes themselves decide.
+/// Finds the files above `BLOCK` whose contents already exist on disk, and returns the paths by contents. Archives are
+/// not searched. Checksums select the candidates; their bytes are then compared.
 fn lying<'a>(
     folder: &Path,
     files: &'a [File],

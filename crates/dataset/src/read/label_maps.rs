@@ -1,39 +1,43 @@
-//! Label maps made of an image's record, for images that go without their files: masks tell each pixel of every plant and leaf.
+//! Makes label maps from an image's record, for images that omit the files: masks give the pixels of every plant and
+//! leaf.
 //!
-//! [`crate::model::invariants`] see to it that masks are the maps' before an image is written, so the maps come back value by value.
+//! [`crate::model::invariants`] checks before an image is written that the masks equal the maps, so the maps are
+//! restored exactly.
 
 use crate::model::record::{Record, Seen};
 use furrow_base::{Error, Result};
 
-/// Number of the plant of each pixel, 0 for none.
+/// Returns the plant number of each pixel, 0 for none.
 pub(crate) fn plants(record: &Record) -> Result<Vec<u32>> {
     painted(record, record.seen().map(|plant| (&plant.seen, plant.number)))
 }
 
-/// Number of the leaf of each pixel on its plant, 0 for none.
+/// Returns the number of the leaf on its plant for each pixel, 0 for none.
 pub(crate) fn leaves(record: &Record) -> Result<Vec<u16>> {
     painted(record, record.leaves().map(|(_, leaf)| (&leaf.seen, leaf.number)))
 }
 
-/// Number of the species of each pixel in the recipe's table, 0 for none; empty of an imported image, whose source tells no species.
+/// Returns the number of the species in the recipe's table for each pixel, 0 for none. Empty for an imported image,
+/// which has no species.
 pub(crate) fn species(record: &Record) -> Result<Vec<u8>> {
     if record.conditions.is_none() {
         return Ok(Vec::new());
     }
-    // A recipe holds no more species than 8 bits number.
+    // Species numbers of a recipe have 8 bits.
     if record.seen().any(|plant| plant.kind > u8::MAX.into()) {
-        return Err(Error::damaged("a plant is of a species that no table holds"));
+        return Err(Error::damaged("a plant has a species number above 255"));
     }
     painted(record, record.seen().map(|plant| (&plant.seen, plant.kind as u8)))
 }
 
-/// A map of numbers where masks are, row by row from the top. Masks that meet, or are not as large as the record says, are damage.
+/// Returns a map with the number of each plant or leaf in the pixels of its mask, row by row from the top. An error if
+/// masks overlap, or if their size or number of pixels differs from the record.
 fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item = (&'a Seen, T)>) -> Result<Vec<T>> {
     let all = record.width as usize * record.height as usize;
     let (mut map, mut taken) = (vec![T::default(); all], vec![false; all]);
     for (seen, number) in things {
         let mask = seen.mask.as_ref().filter(|mask| mask.size == [record.height, record.width]);
-        let mask = mask.ok_or_else(|| Error::damaged("it has no mask of its size of a plant or leaf that it shows"))?;
+        let mask = mask.ok_or_else(|| Error::damaged("a visible plant or leaf has no mask of the image's size"))?;
         let mut pixels = 0;
         for pixel in mask.pixels().map_err(|e| Error::damaged(e.to_string()))? {
             map[pixel] = number;
@@ -43,7 +47,7 @@ fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item
             pixels += 1;
         }
         if pixels != seen.pixels {
-            return Err(Error::damaged(format!("a mask has {pixels} pixels, and its plant or leaf {}", seen.pixels)));
+            return Err(Error::damaged(format!("a mask has {pixels} pixels instead of the recorded {}", seen.pixels)));
         }
     }
     Ok(map)
@@ -56,7 +60,7 @@ mod tests {
     use crate::model::sample::Sample;
     use crate::model::split::Split;
 
-    /// An imported image of 3 × 2 pixels.
+    /// Returns an imported image of 3 × 2 pixels.
     fn image(plants: [u32; 6], leaves: [u16; 6]) -> Sample {
         let record = Record {
             index: 0,
@@ -94,14 +98,14 @@ mod tests {
         sample
     }
 
-    /// Rationale: maps that are left out must be known all the same. Expected: those that the record was made of; a record without masks is an
-    /// error, not a map without plants.
+    /// Rationale: omitted maps must remain available. Expected: the maps that the record was made from; a record
+    /// without masks is an error, not a map without plants.
     #[test]
     fn maps_come_back_from_masks() {
         let mut sample = image([0, 70_000, 70_000, 4, 4, 0], [0, 2, 0, 1, 1, 0]);
         assert_eq!(plants(&sample.record).unwrap(), sample.plants);
         assert_eq!(leaves(&sample.record).unwrap(), sample.leaves);
-        assert!(species(&sample.record).unwrap().is_empty(), "nobody knows the species of an imported plant");
+        assert!(species(&sample.record).unwrap().is_empty(), "the species of an imported plant is unknown");
         sample.record.height = 3;
         assert!(plants(&sample.record).unwrap_err().to_string().contains("mask"));
         sample.record.height = 2;
@@ -110,7 +114,8 @@ mod tests {
         assert_eq!(plants(&image([0; 6], [0; 6]).record).unwrap(), [0; 6]);
     }
 
-    /// Rationale: a record that was changed must not become labels. Expected: masks that meet, and areas that are not theirs, are refused.
+    /// Rationale: a modified record must not be used as labels. Expected: overlapping masks, and masks with a wrong
+    /// number of pixels, are refused.
     #[test]
     fn masks_that_cannot_be_are_refused() {
         let sample = image([0, 7, 7, 4, 4, 0], [0, 2, 0, 1, 1, 0]);

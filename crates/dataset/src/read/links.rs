@@ -1,7 +1,9 @@
-//! Symbolic links in a dataset's folder: behind one that leads to another folder, files would be written and removed elsewhere.
+//! Refuses symbolic links to folders in a dataset: files would be written and removed in the folder that the link
+//! points to.
 //!
-//! All folders of a dataset are looked through when it is opened; [`below`](furrow_base::input::below) looks again wherever a file is written or
-//! removed, at the folders on its path. Links to files may stay: a file is replaced, and never written through.
+//! All folders of a dataset are searched when it is opened. Whenever a file is written or removed,
+//! [`below`](furrow_base::input::below) checks the folders on its path again. Links to files are allowed: writing
+//! replaces the link and never changes the file that it points to.
 
 use crate::model::recipe::Recipe;
 use furrow_base::Result;
@@ -9,14 +11,14 @@ use furrow_base::input::link_error;
 use std::fs::{DirEntry, FileType};
 use std::path::{Path, PathBuf};
 
-/// Folders of a dataset beside those of its formats. That for job files may be anywhere: `cluster` looks at it.
+/// Folders of a dataset besides those of its formats. The folder of job files may be anywhere; `cluster` checks it.
 const FOLDERS: [&str; 6] = [IMAGES, "ledger", "packs", "pushed", "scene", "seals"];
 
-/// The one whose folders are many, and hold files alone.
+/// Folder with many subfolders, which contain only files.
 const IMAGES: &str = "images";
 
-/// An error where a folder of this dataset, or one in it, is a symbolic link to a folder. The dataset's own folder may be one, and so may
-/// what else lies in it: that is the user's.
+/// Returns an error if a folder that belongs to the dataset, or a folder in one, is a symbolic link to a folder. The
+/// dataset's own folder may be a link; other entries in it belong to the user and may be links too.
 pub(crate) fn refuse(folder: &Path, recipe: &Recipe) -> Result<()> {
     let formats = recipe.formats.iter().map(String::as_str);
     let names: Vec<&str> = FOLDERS.into_iter().chain(formats).collect();
@@ -34,8 +36,8 @@ pub(crate) fn refuse(folder: &Path, recipe: &Recipe) -> Result<()> {
     Ok(())
 }
 
-/// The folders and links in a folder, without a look at each of its files. A folder that is gone by now holds none; in one that cannot be
-/// listed they are found where something is written.
+/// Returns the folders and links in a folder, without examining its files. A folder that no longer exists has none. If
+/// a folder cannot be listed, its links are found when something is written to it.
 fn in_folder(folder: &Path) -> impl Iterator<Item = (PathBuf, FileType)> {
     let no_file = |entry: DirEntry| {
         let kind = entry.file_type().ok()?;

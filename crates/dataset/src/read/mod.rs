@@ -1,4 +1,4 @@
-//! Reading a dataset from disk: checksums, archives, image folders, and which images remain to be made.
+//! Reading a dataset from disk: checksums, archives, image folders.
 
 pub mod archive;
 pub mod checksum;
@@ -8,4 +8,3 @@ pub mod links;
 pub mod native;
 pub mod packs;
 pub mod set;
-pub mod task;

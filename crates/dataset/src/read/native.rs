@@ -1,19 +1,19 @@
-//! A sample as the files of its folder `images/NAME/`, and back.
+//! Writes a sample as the files of its folder `images/NAME/`, and reads it from them.
 //!
-//! | file | holds |
+//! | file | contents |
 //! |---|---|
-//! | `rgb.png`, `nir.png` | the photographs, 8 bit; `rgb.jpg`, `nir.jpg` where the recipe says so; none where images are labels alone |
+//! | `rgb.png`, `nir.png` | colour and near-infrared image, 8 bit; `rgb.jpg`, `nir.jpg` for JPEG; none for labels-only images |
 //! | `semantics.png` | class, indexed: 0 soil, 1 crop, 2 weed, 255 no label |
 //! | `species.png` | number of the species in `dataset.json`, 8 bit, 0 for none |
-//! | `parts.png` | what is there, indexed: organs and things on the ground, as `parts/names.json` of the format parts; where classes need it |
-//! | `plants.png` | number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where the image shows a plant above 65,535 |
+//! | `parts.png` | organ or object on the ground, indexed, numbered as in `parts/names.json` of the format parts; if classes need it |
+//! | `plants.png` | number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B if a visible plant is above 65,535 |
 //! | `leaves.png` | number of the leaf on its plant, 0 for none; 16 bit |
-//! | `coverage.png` | share of soil, crop, weed in the pixel as R, G, B; sums to 255 |
-//! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), in the precision that the recipe keeps |
-//! | `record.json` | what is known in words and numbers |
+//! | `coverage.png` | fraction of soil, crop, weed in the pixel as R, G, B; sums to 255 |
+//! | `geometry.exr` | `depth.Z` (metres along the optical axis), `normal.X/Y/Z` (world), with the precision in the recipe |
+//! | `record.json` | labels and metadata |
 //!
-//! Which of them an image has, [`image_files`] says by the recipe; others of these names are neither written nor read. Where `species.png`,
-//! `plants.png` or `leaves.png` is left out, the record tells it.
+//! [`image_files`] determines from the recipe which of them an image has; other files with these names are neither
+//! written nor read. If `species.png`, `plants.png` or `leaves.png` is omitted, the map is made from the record.
 
 use crate::File;
 use crate::model::image_files::{self, NAMES};
@@ -30,17 +30,18 @@ use furrow_render::scene::tag::Class;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The name of an image: its number.
+/// Returns the name of an image: its number in six digits or more.
 pub fn image_name(index: u64) -> String {
     format!("{index:06}")
 }
 
-/// The folder of an image, below that of the dataset.
+/// Returns the folder of an image, relative to the dataset's folder.
 pub fn folder(name: &str) -> String {
     format!("images/{name}")
 }
 
-/// Colours of `semantics.png`: the classes' in their order, grey up to 255 for pixels without a label.
+/// Returns the palette of `semantics.png`: the colours of the classes by number, and with `with_ignore` grey for all
+/// further numbers up to 255, no label.
 pub fn palette(with_ignore: bool) -> Vec<[u8; 3]> {
     let mut colors: Vec<[u8; 3]> = Class::ALL.iter().map(|c| c.color()).collect();
     if with_ignore {
@@ -49,8 +50,8 @@ pub fn palette(with_ignore: bool) -> Vec<[u8; 3]> {
     colors
 }
 
-/// The files of a sample that belong to images of a recipe; `text` goes into the comments of label maps, and of photographs where the recipe is
-/// one of before.
+/// Returns the files of a sample that belong to images of this recipe. `text` is the comment of label maps, and of
+/// colour and near-infrared images if the recipe was written by an earlier version.
 pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> {
     let (w, h) = sample.size();
     let base = folder(&sample.record.name);
@@ -101,22 +102,22 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
     Ok(files)
 }
 
-/// Files that images are read from.
+/// Source of the files of images.
 pub trait Files {
-    /// Contents of a file by its path below the dataset's folder.
+    /// Returns the contents of a file; `path` is relative to the dataset's folder.
     fn contents(&self, path: &str) -> io::Result<Vec<u8>>;
 
-    /// Where it lies, or would, for messages.
+    /// Returns the path of a file for error messages, whether it exists or not.
     fn place(&self, path: &str) -> PathBuf;
 
-    /// What says which files belong to images; `None` where nobody does, and all of them do.
+    /// Returns the recipe, which determines the files of images. If there is `None`, all files belong to the images.
     fn recipe(&self) -> Option<&Recipe>;
 }
 
-/// A folder whose images lie in folders of their own. Its recipe is read once for all of them.
+/// A dataset with a folder for each image. Its recipe is read once.
 struct Folder<'a> {
     path: &'a Path,
-    /// `None` where there is none that can be read.
+    /// `None` if no recipe can be read.
     recipe: Option<Recipe>,
 }
 
@@ -140,36 +141,40 @@ impl Files for Folder<'_> {
     }
 }
 
-/// Reads an image of a dataset that lies in a folder of its own.
+/// Reads an image that has a folder of its own.
 pub fn read(dataset: &Path, name: &str) -> Result<Sample> {
     sample(&Folder::open(dataset), name)
 }
 
-/// Reads what is known of an image that lies in a folder of its own, without its maps.
+/// Reads the record of an image that has a folder of its own, without its maps.
 pub fn read_record(dataset: &Path, name: &str) -> Result<Record> {
-    // Every image has a record.
+    // The recipe is not needed, since every image has a record.
     record(&Folder { path: dataset, recipe: None }, name)
 }
 
-/// The photograph in near infrared, without its ending.
+/// Name of the near-infrared image without extension.
 const NIR: &str = "nir";
 
-/// A picture in gray that lies in a file.
+/// A grey image that was read from a file.
 pub struct GrayFile {
-    /// What errors call the file.
+    /// Path of the file for error messages.
     pub place: PathBuf,
+    /// Width, pixels.
     pub width: u32,
+    /// Height, pixels.
     pub height: u32,
+    /// Grey values, row by row from the top.
     pub values: Vec<u8>,
 }
 
-/// The files of one image.
+/// Reader of the files of one image.
 pub struct Image<'a, F: Files> {
     files: &'a F,
     name: &'a str,
 }
 
 impl<'a, F: Files> Image<'a, F> {
+    /// Returns the reader of the image with this name.
     pub fn of(files: &'a F, name: &'a str) -> Self {
         Self { files, name }
     }
@@ -178,17 +183,17 @@ impl<'a, F: Files> Image<'a, F> {
         format!("{}/{file}", folder(self.name))
     }
 
-    /// Where a file lies, or would, for messages.
+    /// Returns the path of a file for error messages, whether it exists or not.
     pub fn place(&self, file: &str) -> PathBuf {
         self.files.place(&self.path(file))
     }
 
-    /// Whether a file of this name belongs to the image.
+    /// Returns whether a file with this name belongs to the image.
     pub fn owns(&self, file: &str) -> bool {
         self.files.recipe().is_none_or(|recipe| image_files::belongs(recipe, file))
     }
 
-    /// Contents of a file; there is none that does not belong to the image, whatever lies there.
+    /// Returns the contents of a file. A file that does not belong to the image counts as missing, even if it exists.
     fn contents(&self, file: &str) -> io::Result<Vec<u8>> {
         if self.owns(file) {
             return self.files.contents(&self.path(file));
@@ -196,7 +201,7 @@ impl<'a, F: Files> Image<'a, F> {
         Err(io::Error::new(io::ErrorKind::NotFound, "images of this dataset have no such file"))
     }
 
-    /// A file that may be left out, with what errors call it.
+    /// Returns the path for error messages and the contents of a file; `None` if it is missing.
     pub fn optional(&self, file: &str) -> Result<Option<(PathBuf, Vec<u8>)>> {
         let place = self.place(file);
         match self.contents(file) {
@@ -212,12 +217,12 @@ impl<'a, F: Files> Image<'a, F> {
         Ok((place, bytes))
     }
 
-    /// Whether there is such a file.
+    /// Returns whether the file exists and belongs to the image.
     pub fn has(&self, file: &str) -> Result<bool> {
         Ok(self.optional(file)?.is_some())
     }
 
-    /// The photograph in colour, as PNG or as JPEG: width, height, pixels.
+    /// Reads the colour image, PNG or JPEG. Returns width, height and pixels.
     pub fn photograph(&self) -> Result<(u32, u32, Vec<[u8; 3]>)> {
         match self.stored("rgb")? {
             Some(stored) => stored.rgb(),
@@ -225,24 +230,24 @@ impl<'a, F: Files> Image<'a, F> {
         }
     }
 
-    /// The error of an image whose photograph in colour is not there.
+    /// Returns the error for a missing colour image.
     fn no_photograph(&self) -> Error {
         let file = if self.owns("rgb.png") || !self.owns("rgb.jpg") { "rgb.png" } else { "rgb.jpg" };
-        let source = io::Error::new(io::ErrorKind::NotFound, "the photograph is not there");
+        let source = io::Error::new(io::ErrorKind::NotFound, "the colour image is missing");
         Error::reading(&self.place(file))(source)
     }
 
-    /// A band in gray, such as `nir`, as PNG or as JPEG, where there is one.
+    /// Reads a grey band such as `nir`, PNG or JPEG; `None` if there is none.
     pub fn band(&self, name: &str) -> Result<Option<GrayFile>> {
         let read = |stored: Stored| {
-            // Any other band is a file of the user's.
+            // Bands other than near infrared are user files.
             let (width, height, values) = stored.gray().map_err(|e| if name == NIR { e.in_dataset() } else { e })?;
             Ok(GrayFile { place: stored.place, width, height, values })
         };
         self.stored(name)?.map(read).transpose()
     }
 
-    /// A photograph of this name without its ending, where there is one.
+    /// Reads the image file with this name, given without extension; `None` if there is none.
     fn stored(&self, name: &str) -> Result<Option<Stored>> {
         for ending in furrow_output::ENDINGS {
             if let Some((place, bytes)) = self.optional(&format!("{name}.{ending}"))? {
@@ -252,8 +257,9 @@ impl<'a, F: Files> Image<'a, F> {
         Ok(None)
     }
 
-    /// Numbers of species, from their picture or, where there is none, from the record of an image of this size, which may be `known`
-    /// already: width, height, values. No values of an imported image.
+    /// Returns width, height and species numbers, from `species.png` or, if it is missing, from the record, which must
+    /// have the given `size`. `known` is the record if it was read before. An imported image without the file has no
+    /// values.
     pub fn species(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u8>)> {
         match self.optional("species.png")? {
             Some((place, bytes)) => furrow_output::decode_gray(&place, &bytes).map_err(Error::in_dataset),
@@ -261,7 +267,7 @@ impl<'a, F: Files> Image<'a, F> {
         }
     }
 
-    /// Numbers of plants, in the same way.
+    /// Returns plant numbers in the same way.
     pub fn plants(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u32>)> {
         match self.optional("plants.png")? {
             Some((place, bytes)) => furrow_output::decode_numbers(&place, &bytes).map_err(Error::in_dataset),
@@ -269,7 +275,7 @@ impl<'a, F: Files> Image<'a, F> {
         }
     }
 
-    /// Numbers of leaves, in the same way.
+    /// Returns leaf numbers in the same way.
     fn leaves(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u16>)> {
         match self.optional("leaves.png")? {
             Some((place, bytes)) => furrow_output::decode_gray16(&place, &bytes).map_err(Error::in_dataset),
@@ -277,7 +283,7 @@ impl<'a, F: Files> Image<'a, F> {
         }
     }
 
-    /// A label map of an image of this size that the record tells.
+    /// Makes a label map from the record, which must have the given `size`.
     fn told<T>(
         &self,
         size: (u32, u32),
@@ -287,23 +293,23 @@ impl<'a, F: Files> Image<'a, F> {
         let read = if known.is_none() { Some(record(self.files, self.name)?) } else { None };
         let mut values = Vec::new();
         if let Some(record) = known.or(read.as_ref()) {
-            // A map may be as large as its record says: first what was read of it.
+            // The record determines the size of the map in memory, so it is compared with `size` first.
             check(&self.place("semantics.png"), (record.width, record.height), size)?;
             values = map(record).map_err(|e| e.in_file(self.place("record.json")))?;
         }
         Ok((size.0, size.1, values))
     }
 
-    /// An 8-bit indexed picture.
+    /// Reads an 8-bit indexed image.
     pub fn indexed(&self, file: &str) -> Result<(u32, u32, Vec<u8>)> {
         let (place, bytes) = self.needed(file)?;
         furrow_output::decode_indexed(&place, &bytes).map_err(Error::in_dataset)
     }
 }
 
-/// The file of a photograph.
+/// File of a colour or grey image.
 struct Stored {
-    /// Where it lies, for messages.
+    /// Path for error messages.
     place: PathBuf,
     bytes: Vec<u8>,
     is_jpeg: bool,
@@ -324,10 +330,10 @@ impl Stored {
     }
 }
 
-/// Colours, near infrared and the files that they are the pixels of where these are JPEG, of an image of this size.
+/// Pixels of the colour image, pixels of the near-infrared image, and their files if these are JPEG.
 type Photographs = (Vec<[u8; 3]>, Vec<u8>, Option<Jpegs>);
 
-/// The photographs of an image.
+/// Reads the colour and the near-infrared image.
 fn photographs(image: &Image<'_, impl Files>, record: &Record) -> Result<Photographs> {
     let size = (record.width, record.height);
     let (rgb, nir) = (image.stored("rgb")?, image.stored(NIR)?);
@@ -353,7 +359,7 @@ fn photographs(image: &Image<'_, impl Files>, record: &Record) -> Result<Photogr
     Ok((pixels.0, pixels.1, jpeg))
 }
 
-/// Reads an image.
+/// Reads an image with all its maps.
 pub(crate) fn sample(files: &impl Files, name: &str) -> Result<Sample> {
     let image = Image::of(files, name);
     let record = record(files, name)?;
@@ -403,23 +409,23 @@ pub(crate) fn sample(files: &impl Files, name: &str) -> Result<Sample> {
     })
 }
 
-/// Reads what is known of an image, without its maps.
+/// Reads the record of an image, without its maps.
 pub(crate) fn record(files: &impl Files, name: &str) -> Result<Record> {
     let path = format!("{}/record.json", folder(name));
     let place = files.place(&path);
     let bytes = files.contents(&path).map_err(Error::io(&place))?;
     let record: Record = serde_json::from_slice(&bytes)
-        .map_err(|e| Error::damaged(format!("this is no record: {e}")).in_file(place.clone()))?;
-    // Formats name their files by it.
+        .map_err(|e| Error::damaged(format!("this is not a record: {e}")).in_file(place.clone()))?;
+    // Formats derive file names from it.
     if record.name != name || image_name(record.index) != name {
         return Err(Error::damaged(format!("this is the record of image `{}`, number {}", record.name, record.index))
-            .help(format!("restore the one of image {name}, or render it again"))
+            .help(format!("restore the record of image {name}, or render the image again"))
             .in_file(place));
     }
     Ok(record)
 }
 
-/// The values of a picture that has its record's size.
+/// Returns the values of a map after checking that it has the size in the record.
 fn sized<T>(
     image: &Image<'_, impl Files>,
     file: &str,
@@ -435,20 +441,20 @@ fn check(path: &Path, expected: (u32, u32), found: (u32, u32)) -> Result<()> {
         return Ok(());
     }
     let ((w, h), (x, y)) = (expected, found);
-    Err(Error::damaged(format!("it has {x} × {y} pixels, its record says {w} × {h}")).in_file(path))
+    Err(Error::damaged(format!("it has {x} × {y} pixels instead of {w} × {h} as in its record")).in_file(path))
 }
 
-/// Whether a file is an image's own, and of no format.
+/// Returns whether a file is a native file of an image, instead of a file of a format.
 pub(crate) fn is_native(path: &str) -> bool {
     path.starts_with("images/")
 }
 
-/// Whether a file is an image's own photograph in colour.
+/// Returns whether a file is the native colour image of an image.
 pub(crate) fn is_photograph(path: &str) -> bool {
     is_native(path) && furrow_output::ENDINGS.iter().any(|ending| path.ends_with(&format!("/rgb.{ending}")))
 }
 
-/// Paths of an image's own files in the order of archives.
+/// Sorts the paths of an image's native files into the order of archives.
 pub(crate) fn in_order<'a>(paths: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
     let mut all: Vec<&String> = paths.collect();
     all.sort_by_key(|path| NAMES.iter().position(|name| path.ends_with(&format!("/{name}"))));
@@ -460,8 +466,9 @@ mod tests {
     use super::*;
     use crate::model::recipe::FILE;
 
-    /// Rationale: a recipe that is read anew for each map costs as much as the smaller maps do. Expected: one that was read is asked again for a file
-    /// of any image when it is gone from the disk; a folder without one has every file.
+    /// Rationale: reading the recipe again for each map would double the time for small maps. Expected: a recipe that
+    /// was read once still decides about the files after its own file is deleted; in a folder without a recipe, all
+    /// files belong to images.
     #[test]
     fn the_recipe_of_a_folder_is_read_once() {
         let keep = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! A dataset that lies in a folder: its recipe, its images by name, the files that belong to all of them.
+//! A dataset in a folder: its recipe, its images by name, and the files that belong to all images.
 
 use crate::model::recipe::Recipe;
 use crate::model::record::Record;
@@ -25,63 +25,65 @@ use std::path::{Path, PathBuf};
 /// A dataset on disk.
 #[derive(Clone, Debug)]
 pub struct Set {
-    /// Its folder.
+    /// Folder of the dataset.
     pub folder: PathBuf,
-    /// What makes it.
+    /// Recipe of the dataset.
     pub recipe: Recipe,
-    /// Archives that images lie in.
+    /// Archives that contain images.
     pub(crate) packs: Packs,
 }
 
 impl Set {
-    /// The dataset of this recipe in a folder.
+    /// Returns the dataset with this recipe in `folder`, without accessing the disk.
     pub fn new(folder: &Path, recipe: Recipe) -> Self {
         Self { folder: folder.into(), recipe, packs: Packs::default() }
     }
 
-    /// Opens the dataset in a folder; an error where a folder in it is a symbolic link, for it may come from others.
+    /// Opens the dataset in `folder`. An error if a folder in it is a symbolic link, since datasets may come from other
+    /// people.
     pub fn open(folder: &Path) -> Result<Self> {
         let recipe = Recipe::read(folder)?;
         links::refuse(folder, &recipe)?;
         Ok(Self::new(folder, recipe))
     }
 
-    /// The name of an image: its number in six digits or more.
+    /// Returns the name of an image: its number in six digits or more.
     pub fn name(index: u64) -> String {
         native::image_name(index)
     }
 
-    /// The names of a split's images, in the order of their numbers.
+    /// Returns the names of a split's images, in the order of their numbers.
     pub fn names(&self, split: Split) -> Vec<String> {
         (0..self.recipe.count).filter(|k| self.recipe.split_of(*k) == split).map(Self::name).collect()
     }
 
-    /// The records of a split's images, read in the order of their numbers.
+    /// Reads the records of a split's images, in the order of their numbers.
     pub fn records(&self, split: Split) -> impl Iterator<Item = Result<Record>> + '_ {
         in_parallel((0..self.recipe.count).filter(move |k| self.recipe.split_of(*k) == split), |k| self.record(k))
     }
 
-    /// The records of all images, read in the order of their numbers.
+    /// Reads the records of all images, in the order of their numbers.
     pub fn all(&self) -> impl Iterator<Item = Result<Record>> + '_ {
         in_parallel(0..self.recipe.count, |k| self.record(k))
     }
 
-    /// The checksums of all images in the order of their numbers; `None` for those that are not there.
+    /// Reads the checksum records of all images, in the order of their numbers; `None` if a record is missing or
+    /// damaged.
     pub(crate) fn all_checksums(&self) -> impl Iterator<Item = Option<ChecksumRecord>> + '_ {
         in_parallel(0..self.recipe.count, |k| self.checksums(k))
     }
 
-    /// An image.
+    /// Reads an image with all its maps.
     pub fn sample(&self, index: u64) -> Result<Sample> {
         native::sample(self, &Self::name(index))
     }
 
-    /// What is known of an image, without its maps.
+    /// Reads the record of an image, without its maps.
     pub fn record(&self, index: u64) -> Result<Record> {
         native::record(self, &Self::name(index))
     }
 
-    /// The checksums of an image, in its folder or in its pack; `None` where there are none or they are damaged.
+    /// Reads the checksum record of an image, from its own file or from its pack; `None` if it is missing or damaged.
     pub fn checksums(&self, index: u64) -> Option<ChecksumRecord> {
         ChecksumRecord::read(&self.folder, index).or_else(|| {
             let id = Packing::of(&self.recipe)?.id(index);
@@ -89,17 +91,17 @@ impl Set {
         })
     }
 
-    /// The files of an image that are missing or changed, each with what is wrong with it.
+    /// Returns the missing and the changed files of an image, each with a description of the difference.
     pub fn faults(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
         self.faults_where(image, |_| true)
     }
 
-    /// The same of the files that lie beside packs: those of formats.
+    /// Returns the same for the files outside packs, which are those of formats.
     pub(crate) fn faults_beside_packs(&self, image: &ChecksumRecord) -> Vec<(String, String)> {
         self.faults_where(image, |path| !native::is_native(path))
     }
 
-    /// The same of its record alone, from which all that belongs to many images is made.
+    /// Returns the same for the image's record alone; all files that cover many images are made from records.
     pub(crate) fn fault_of_record(&self, image: &ChecksumRecord) -> Option<(String, String)> {
         self.faults_where(image, |path| native::is_native(path) && path.ends_with("/record.json")).pop()
     }
@@ -112,7 +114,7 @@ impl Set {
         image.files.iter().filter(|(path, _)| which(path)).filter_map(fault).collect()
     }
 
-    /// Length of a file of an image, which lies in the dataset's folder or in a pack.
+    /// Returns the length of an image's file, which is in the dataset's folder or in a pack.
     pub(crate) fn length(&self, path: &str) -> io::Result<u64> {
         self.find(
             path,
@@ -124,7 +126,7 @@ impl Set {
         )
     }
 
-    /// First in the folder, for what lies there is made anew; then in the pack.
+    /// Searches the folder first, since its files are newer than those of the pack, then the pack.
     fn find<T>(
         &self,
         path: &str,
@@ -140,7 +142,7 @@ impl Set {
         }
     }
 
-    /// The pack that a file belongs into.
+    /// Returns the pack that a file belongs to.
     fn pack_of(&self, path: &str) -> Option<Id> {
         let packing = Packing::of(&self.recipe)?;
         let (name, _) = path.strip_prefix("images/")?.split_once('/')?;
@@ -166,10 +168,11 @@ impl Files for Set {
     }
 }
 
-/// Images that are read at once: enough for all threads, and little memory.
+/// Number of images that are read at a time: enough for all threads, with little memory.
 const AT_ONCE: usize = 256;
 
-/// What is read of each image, in the order of the numbers; several at once, of few packs.
+/// Calls `read` for each image on several threads and returns the results in the order of the numbers. Images are read
+/// in batches of `AT_ONCE`, which are in few packs.
 pub(crate) fn in_parallel<'a, T: Send + 'a>(
     mut numbers: impl Iterator<Item = u64> + 'a,
     read: impl Fn(u64) -> T + Sync + 'a,
@@ -181,20 +184,20 @@ pub(crate) fn in_parallel<'a, T: Send + 'a>(
     std::iter::from_fn(next).flatten()
 }
 
-/// Where the files that belong to all images go; keeps what tells them.
+/// Writer of the files that belong to all images; collects their checksums.
 pub struct Whole<'a> {
     folder: &'a Path,
-    /// The files so far, by path below the dataset's folder.
+    /// Checksums of the files written so far, by path relative to the dataset's folder.
     pub files: BTreeMap<String, Checksum>,
 }
 
 impl<'a> Whole<'a> {
-    /// For a dataset's folder.
+    /// Returns a writer for the dataset in `folder`.
     pub fn new(folder: &'a Path) -> Self {
         Self { folder, files: BTreeMap::new() }
     }
 
-    /// Writes a file piece by piece, so that it may be larger than memory; it appears whole or not at all.
+    /// Writes a file in pieces, so that it may be larger than memory. The file appears complete or not at all.
     pub fn file(&mut self, path: &str, write: impl FnOnce(&mut Stream<'_>) -> Result<()>) -> Result<()> {
         let full = below(self.folder, path)?;
         let mut sum = None;
@@ -209,7 +212,7 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// A file under way.
+/// A file that is being written.
 pub struct Stream<'a> {
     path: &'a Path,
     file: &'a mut (dyn Write + Send),
@@ -218,23 +221,23 @@ pub struct Stream<'a> {
 }
 
 impl Stream<'_> {
-    /// Bytes so far.
+    /// Returns the number of bytes written so far.
     pub(crate) fn written(&self) -> u64 {
         self.bytes
     }
 
-    /// Adds text or bytes.
+    /// Writes text or bytes.
     pub fn put(&mut self, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.write_all(bytes.as_ref()).map_err(Error::io(self.path))
     }
 
-    /// Adds a value as JSON, on one line.
+    /// Writes a value as JSON, on one line.
     pub fn json(&mut self, value: &impl Serialize) -> Result<()> {
         let path = self.path;
         serde_json::to_writer(&mut *self, value).map_err(|e| Error::io(path)(e.into()))
     }
 
-    /// Adds values as the items of a JSON list, one a line: what stands between the brackets.
+    /// Writes values as the items of a JSON list, one per line, without the brackets of the list.
     pub fn items<T: Serialize>(&mut self, items: impl Iterator<Item = Result<T>>) -> Result<()> {
         for (i, item) in items.enumerate() {
             self.put(if i == 0 { "\n" } else { ",\n" })?;

@@ -1,4 +1,4 @@
-//! The dataset card: what the images are, where they come from, how they are read, what they cannot be used for.
+//! The dataset card: contents, provenance, reading the files, limits.
 
 use super::statistics::{Species, Statistics};
 use crate::format;
@@ -11,7 +11,7 @@ use furrow_render::settings::Engine;
 use furrow_report::{count, keyed, legend, list, pairs, percent, whole};
 use maud::{Markup, html};
 
-/// The scene file's name without folder and ending, or where the images come from.
+/// Returns the title: the scene file's name without folder and extension, or the format of imported images.
 pub(super) fn title(recipe: &Recipe) -> String {
     match &recipe.made {
         Made::Rendered(rendering) => {
@@ -22,7 +22,7 @@ pub(super) fn title(recipe: &Recipe) -> String {
     }
 }
 
-/// One sentence on what it is.
+/// Returns a one-sentence description of the dataset.
 pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
     let sizes: Vec<String> = found.sizes.keys().map(|(w, h)| format!("{w} × {h}")).collect();
     let size = match sizes.as_slice() {
@@ -31,14 +31,14 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
     };
     match &recipe.made {
         Made::Rendered(rendering) if rendering.labels_only => {
-            format!("Labels of procedurally grown crop fields at {size}, exact by their geometry, without photographs.")
+            format!("Labels of procedurally grown crop fields at {size}, exact from the geometry, without images.")
         }
         Made::Rendered(rendering) => {
             let Rendering { engine, spp, .. } = &**rendering;
             let how = if *engine == Engine::Trace { "path traced" } else { "rasterized" };
             format!(
-                "Procedurally grown crop fields, {how} with {} a pixel in colour and near infrared at {size}, every pixel labelled \
-                 exactly by the geometry that was drawn.",
+                "Procedurally grown crop fields, {how} with {} per pixel in colour and near infrared at {size}. Every pixel is \
+                 labelled exactly from the rendered geometry.",
                 count(u64::from(*spp), "sample", "samples")
             )
         }
@@ -46,7 +46,7 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
     }
 }
 
-/// What decides the images.
+/// Returns the provenance: everything that determines the images.
 pub(super) fn provenance(recipe: &Recipe) -> Markup {
     let mut rows: Vec<(&str, Markup)> = Vec::new();
     match &recipe.made {
@@ -57,10 +57,10 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
             rows.push(("image size", html! { (made.width) " × " (made.height) " pixels" }));
             let engine = if made.engine == Engine::Trace { "path tracer" } else { made.engine.name() };
             if made.labels_only {
-                rows.push(("drawn", html! { "labels alone, one ray a pixel" }));
+                rows.push(("rendered", html! { "labels alone, one ray per pixel" }));
             } else {
                 rows.push(("engine", html! { (engine) }));
-                rows.push(("samples a pixel", html! { (made.spp) }));
+                rows.push(("samples per pixel", html! { (made.spp) }));
                 rows.push(("denoised", html! { (if made.denoise { "yes, Open Image Denoise" } else { "no" }) }));
             }
             let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", t.name())).collect();
@@ -79,11 +79,11 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
     pairs(&rows)
 }
 
-/// Splits with their numbers of images.
+/// Returns the table of splits with their numbers of images.
 pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> Markup {
     let words = match &recipe.made {
-        Made::Rendered(_) => "Every image is a field of its own: no plant and no patch of soil is in two splits.",
-        Made::Imported { .. } => "Whether one plant or one field is in two splits only the source can tell.",
+        Made::Rendered(_) => "Fields are never divided between splits: no plant and no patch of soil is in two splits.",
+        Made::Imported { .. } => "Only the source can state whether a plant or a field is in two splits.",
     };
     html! {
         table {
@@ -103,7 +103,7 @@ pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> 
     }
 }
 
-/// Species with what the images show of them.
+/// Returns the table of species with the numbers of visible plants and pixels.
 pub(super) fn species(recipe: &Recipe, found: &Statistics) -> Markup {
     let of = |(k, one): (usize, &'_ furrow_field::record::SpeciesRecord)| {
         (k as u16 + 1, one.name.clone(), one.eppo.clone(), one.class.name())
@@ -122,7 +122,7 @@ pub(super) fn species(recipe: &Recipe, found: &Statistics) -> Markup {
             table {
                 thead {
                     tr {
-                        th { "species" } th { "EPPO" } th { "class" } th { "plants seen" } th { "images" } th { "pixels" } th { "BBCH" }
+                        th { "species" } th { "EPPO" } th { "class" } th { "visible plants" } th { "images" } th { "pixels" } th { "BBCH" }
                     }
                 }
                 tbody {
@@ -152,30 +152,30 @@ fn stages(of: &Species) -> String {
     }
 }
 
-/// The files of an image, and how they are opened.
+/// Returns the list of an image's files, with an example of reading them.
 pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let has = |file: &str| belongs(recipe, file);
     let jpeg = recipe.photo() != Photo::Png;
     let mut rows = Vec::new();
     if !recipe.labels_only() {
-        rows.push((if jpeg { "rgb.jpg" } else { "rgb.png" }, html! { "photograph in colour, 8-bit sRGB" }));
+        rows.push((if jpeg { "rgb.jpg" } else { "rgb.png" }, html! { "colour image, 8-bit sRGB" }));
     }
     if nir {
-        rows.push((if jpeg { "nir.jpg" } else { "nir.png" }, html! { "photograph in near infrared, 8 bit" }));
+        rows.push((if jpeg { "nir.jpg" } else { "nir.png" }, html! { "near-infrared image, 8 bits" }));
     }
     rows.push(("semantics.png", html! { "class, indexed: 0 soil, 1 crop, 2 weed, 255 no label" }));
     if has("species.png") {
         rows.push(("species.png", html! { "number of the species in the table above, 0 for none" }));
     }
     if has("plants.png") {
-        let plants = "number of the plant, 0 for none; 16 bit, or R + 256 G + 65536 B where one is above 65535";
+        let plants = "number of the plant, 0 for none; 16 bits, or R + 256 G + 65536 B if a number exceeds 65535";
         rows.push(("plants.png", html! { (plants) }));
     }
     if has("leaves.png") {
-        rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bit, 0 for none" }));
+        rows.push(("leaves.png", html! { "number of the leaf on its plant, 16 bits, 0 for none" }));
     }
     if has("coverage.png") {
-        let coverage = "share of soil, crop, weed in the pixel as R, G, B; they sum to 255";
+        let coverage = "fractions of soil, crop and weed in the pixel as R, G, B; their sum is 255";
         rows.push(("coverage.png", html! { (coverage) }));
     }
     if has("geometry.exr") {
@@ -185,7 +185,7 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
         rows.push(("geometry.exr", geometry));
     }
     let record =
-        "plants and leaves with boxes, masks, visible fractions and keypoints; the conditions drawn for the image";
+        "plants and leaves with boxes, masks, visible fractions and keypoints; the conditions sampled for the image";
     rows.push(("record.json", html! { (record) }));
     let example = if has("plants.png") { EXAMPLE } else { WITHOUT_PLANTS };
     html! {
@@ -196,13 +196,13 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
             " checks them and every label."
         }
         @if !recipe.formats.is_empty() {
-            p { "The same images for other tools, each in the folder of its name:" }
+            p { "The same images in other formats, each in the folder of its name:" }
             (pairs(&recipe.formats.iter().map(|name| (name, told(name))).collect::<Vec<_>>()))
         }
     }
 }
 
-/// What a format is, and how it is opened.
+/// Returns the description of a format, and how to open it.
 fn told(name: &str) -> Markup {
     let of = |table: &[(&str, &'static str)]| table.iter().find(|(n, _)| *n == name).map_or("", |(_, text)| text);
     html! { (of(format::NAMES)) br; code { (of(format::READ)) } }
@@ -228,49 +228,49 @@ for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], np.sum(plants == plant[\"number\"]))
 ";
 
-/// The same where images go without `plants.png`.
+/// The example for datasets without `plants.png`.
 const WITHOUT_PLANTS: &str = "semantics = np.array(Image.open(read(\"semantics.png\")))
 record = json.load(read(\"record.json\"))
 for plant in record[\"plants\"]:
     print(plant[\"number\"], plant[\"class\"], plant[\"seen\"][\"pixels\"], plant[\"seen\"][\"mask\"])
 ";
 
-/// What whoever uses it should know.
+/// Returns the list of limits that users of the dataset should know.
 pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
     let mut all: Vec<String> = Vec::new();
     match &recipe.made {
         Made::Rendered(made) => {
             all.push(
-                "The images are synthetic. What they are worth for real fields shows only on real images: keep some as a test set."
+                "The images are synthetic. Only real images can show their value for real fields: keep some as a test set."
                     .into(),
             );
             all.push(
-                "A label is that of the surface at the pixel's centre; coverage tells what share of an edge pixel each class has."
+                "A label is that of the surface at the pixel's centre; coverage gives the fraction of each class in pixels at edges."
                     .into(),
             );
-            all.push("Stones, straw and everything else that is no plant is soil.".into());
+            all.push("Stones, straw and everything else that is not a plant are soil.".into());
             if !made.labels_only {
                 all.push(if made.denoise {
-                    "Denoising blurs what is finer than a pixel.".into()
+                    "Denoising blurs structures finer than a pixel.".into()
                 } else {
-                    format!("The photographs hold the noise of {} samples a pixel, beside the sensor's.", made.spp)
+                    format!("The images contain the noise of {} samples per pixel, and sensor noise.", made.spp)
                 });
             }
-            all.push("Wind and diseases are not modelled. Damage by insects, dead tissue and motion blur are there where the scene file says so.".into());
+            all.push("Wind and diseases are not modelled. Insect damage, dead tissue and motion blur occur if the scene file requests them.".into());
         }
         Made::Imported { .. } => {
-            all.push("The labels are those of the source, as exact as whoever drew them.".into());
+            all.push("The labels and their accuracy are those of the source.".into());
             if !found.has_plants() {
-                all.push("The source tells classes; no plant is told from another.".into());
+                all.push("The source labels classes; it does not distinguish plants.".into());
             }
-            all.push("How much of a plant others hide is not known: visible fractions stand at 1.".into());
+            all.push("Occlusion is unknown: all visible fractions are 1.".into());
         }
     }
     all.extend(found.warnings.iter().map(|(words, n)| format!("{}: {words}", count(*n, "image", "images"))));
     list(&all)
 }
 
-/// Whose work it stands on.
+/// Returns the literature on which the dataset is based.
 pub(super) fn sources(recipe: &Recipe) -> Markup {
     match &recipe.made {
         Made::Rendered(_) => html! {
@@ -281,11 +281,11 @@ pub(super) fn sources(recipe: &Recipe) -> Markup {
                  Sky: Hošek & Wilkie 2012. Rays: Embree, Wald et al. 2014."
             }
         },
-        Made::Imported { .. } => html! { p { "Cite the source of the images, and keep to its licence." } },
+        Made::Imported { .. } => html! { p { "Cite the source of the images, and comply with its licence." } },
     }
 }
 
-/// The bar of what the pixels show.
+/// Returns the bar of the pixels' classes, with its legend.
 pub(super) fn pixels(found: &Statistics) -> Markup {
     let all: u64 = found.pixels.iter().sum::<u64>() + found.ignored;
     let mut parts: Vec<(&str, u64)> = Class::ALL.iter().map(|c| (c.name(), found.pixels[*c as usize])).collect();

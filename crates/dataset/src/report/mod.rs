@@ -1,15 +1,15 @@
-//! What is in a dataset, for people: `report.html`.
+//! The report of a dataset, `report.html`.
 //!
-//! One page that needs no network and nothing beside it: style, charts and pictures lie inside. It holds no clock time and no
-//! path, so equal datasets have equal reports. Records are read one by one and few pictures are shown, so it stays small
-//! however many images there are.
+//! It is a single self-contained page with embedded styles, charts and images, and works without a network. It contains
+//! no clock time and no path, so equal datasets have equal reports. Records are read one by one and few images are
+//! shown, so its size is limited whatever the number of images.
 //!
-//! | file | idea |
+//! | file | contents |
 //! |---|---|
-//! | `statistics`, `photographs` | what the images say together |
-//! | `sheet`, `card` | pictures, words |
+//! | `statistics`, `photographs` | statistics of the records and of the pixel values |
+//! | `sheet`, `card` | contact sheet, dataset card |
 //!
-//! Charts and the page around them are those of [`furrow_report`].
+//! The charts and the page layout are those of [`furrow_report`].
 
 mod card;
 mod photographs;
@@ -33,7 +33,7 @@ const SCRIPT: &str = include_str!("sheet.js");
 /// The report's file, below the dataset's folder.
 pub const FILE: &str = "report.html";
 
-/// Writes the report of a dataset whose images are all there.
+/// Writes the report of a dataset with all its images.
 pub fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
     let mut found = Statistics::new(set.recipe.count);
     for record in set.all() {
@@ -45,7 +45,7 @@ pub fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
     out.file(FILE, |page| page.put(html(set, &found, &photographs, &names, &sheet)))
 }
 
-/// The page.
+/// Returns the HTML of the page.
 fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<String>; 3], sheet: &Markup) -> String {
     let recipe = &set.recipe;
     let body = html! {
@@ -54,14 +54,14 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
         (section("Images", html! {
             input type="checkbox" id="labels";
             label for="labels" class="switch" { "Show labels on all" }
-            span.hint { "or point at one image, or tap it" }
+            span.hint { "or point at an image, or tap it" }
             (sheet)
         }))
         (section("Labels", grid(labels(found))))
         (section("Plants", html! { (card::species(recipe, found)) (grid(plants(found))) }))
         (section("Light", grid(light(found))))
         (section("Soil", grid(soil(found))))
-        (section("Camera and photographs", grid(camera(found, photographs))))
+        (section("Camera and exposure", grid(camera(found, photographs))))
         (section("Dataset card", html! {
             div.two {
                 div { h3 { "Where it comes from" } (card::provenance(recipe)) }
@@ -77,29 +77,29 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
         .html(&recipe.furrow)
 }
 
-/// The numbers at the top.
+/// Returns the figures at the top of the page.
 fn figures(found: &Statistics) -> Markup {
     let [crop, weed] = sums(&found.plants);
     let leaves: u64 = found.leaf_pixels.iter().map(Tally::n).sum();
     let all = [
         Number::count("images", found.images, "images"),
-        Number::count("plants.crop", crop, "crop plants seen"),
-        Number::count("plants.weed", weed, "weeds seen"),
-        Number::count("leaves", leaves, "leaves seen"),
+        Number::count("plants.crop", crop, "visible crop plants"),
+        Number::count("plants.weed", weed, "visible weeds"),
+        Number::count("leaves", leaves, "visible leaves"),
         Number::count("plants.cut", found.cut, "plants cut by the frame"),
-        Number::count("plants.hidden", found.hidden, "plants wholly hidden"),
+        Number::count("plants.hidden", found.hidden, "fully hidden plants"),
     ];
-    // Nobody counted what was not told apart.
+    // Without plant labels only the number of images is known.
     let known = if found.has_plants() { all.len() } else { 1 };
     numbers(all.into_iter().take(known))
 }
 
-/// Plants over all images, by class.
+/// Returns the total number of plants in all images, by class.
 fn sums(plants: &Pair) -> [u64; 2] {
     plants.each_ref().map(|tally| (tally.mean() * tally.n() as f64).round() as u64)
 }
 
-/// A chart with a row for crop and a row for weed.
+/// Returns a chart with a row for crop and a row for weed.
 fn pair(key: &str, title: &str, unit: &str, values: &Pair) -> Markup {
     let rows = PLANTS.into_iter().zip(values).map(|(class, values)| Series {
         name: class.name(),
@@ -109,7 +109,7 @@ fn pair(key: &str, title: &str, unit: &str, values: &Pair) -> Markup {
     histograms(key, title, unit, &rows.collect::<Vec<_>>())
 }
 
-/// A chart with one row.
+/// Returns a chart with one row.
 fn one(key: &str, title: &str, unit: &str, class: &str, values: &Tally) -> Markup {
     histograms(key, title, unit, &[Series { name: "", class, values }])
 }
@@ -118,14 +118,14 @@ fn labels(found: &Statistics) -> Vec<Markup> {
     let [_, crop, weed] = &found.shares;
     let row = |name, values| Series { name, class: name, values };
     let shares = [row("crop", crop), row("weed", weed)];
-    let mut all = vec![histograms("share", "Share of an image", "% of its pixels; images", &shares)];
+    let mut all = vec![histograms("share", "Fraction of an image", "% of its pixels; images", &shares)];
     if found.has_plants() {
-        all.push(pair("plants", "Plants in an image", "images", &found.plants));
+        all.push(pair("plants", "Plants per image", "images", &found.plants));
     }
-    let hidden = |things: &str| format!("%, 100 where nothing hides it; {things}");
+    let hidden = |things: &str| format!("%, 100 if nothing hides it; {things}");
     all.extend([
-        pair("plant_pixels", "Size of a plant", "pixels seen; plants", &found.plant_pixels),
-        pair("leaf_pixels", "Size of a leaf", "pixels seen; leaves", &found.leaf_pixels),
+        pair("plant_pixels", "Size of a plant", "visible pixels; plants", &found.plant_pixels),
+        pair("leaf_pixels", "Size of a leaf", "visible pixels; leaves", &found.leaf_pixels),
         pair("plant_visible", "Visible fraction of a plant", &hidden("plants"), &found.plant_visible),
         pair("leaf_visible", "Visible fraction of a leaf", &hidden("leaves"), &found.leaf_visible),
     ]);
@@ -148,10 +148,10 @@ fn light(found: &Statistics) -> [Markup; 6] {
     [
         chart::suns(&light.suns),
         one("sun_elevation_deg", "Elevation of the sun", "degrees; images", "light", &light.elevation_deg),
-        one("irradiance", "Light on the ground", "mean of R, G, B, W·m⁻²·nm⁻¹; images", "light", &light.irradiance),
+        one("irradiance", "Irradiance on the ground", "mean RGB, W·m⁻²·nm⁻¹; images", "light", &light.irradiance),
         one("cloud", "Cloud cover", "%; images", "light", &light.cloud),
-        one("turbidity", "Turbidity", "2 clear, 10 hazy; images", "light", &light.turbidity),
-        chart::shares("Lights", "share of all lights", if kinds.len() > 1 { &kinds } else { &[] }),
+        one("turbidity", "Turbidity", "2 is clear, 10 hazy; images", "light", &light.turbidity),
+        chart::shares("Lights", "fraction of all lights", if kinds.len() > 1 { &kinds } else { &[] }),
     ]
 }
 
@@ -163,9 +163,9 @@ fn soil(found: &Statistics) -> [Markup; 5] {
         soil.layers.iter().map(|(file, sum)| (name(file), "soil", sum / all.max(1e-12))).collect();
     [
         one("moisture", "Moisture", "% of saturation; images", "soil", &soil.moisture),
-        chart::shares("Layers", "mean share of the ground", &layers),
+        chart::shares("Layers", "mean fraction of the ground", &layers),
         one("roughness_mm", "Roughness", "rms height of the ground, mm; images", "soil", &soil.roughness_mm),
-        one("clods", "Clods", "longer than 5 mm, on a square metre; images", "soil", &soil.clods),
+        one("clods", "Clods", "longer than 5 mm, per m²; images", "soil", &soil.clods),
         one("straw", "Straw", "% of the ground; images", "soil", &soil.straw),
     ]
 }
@@ -175,9 +175,9 @@ fn camera(found: &Statistics, photographs: &Photographs) -> [Markup; 7] {
     let unit = |words: &str| format!("{words}; {} images", whole(photographs.measured));
     [
         one("camera_height_m", "Height of the camera", "m; images", "plain", &camera.height_m),
-        one("tilt_deg", "Tilt of the camera", "degrees from straight down; images", "plain", &camera.tilt_deg),
+        one("tilt_deg", "Tilt of the camera", "degrees from vertical; images", "plain", &camera.tilt_deg),
         one("pixel_mm", "Size of a pixel on the ground", "mm; images", "plain", &camera.pixel_mm),
-        chart::colors("Mean colours of photographs", &unit("dark to bright"), &photographs.colors),
+        chart::colors("Mean colours of images", &unit("dark to bright"), &photographs.colors),
         one("brightness", "Brightness", &unit("mean of R, G, B, of 255"), "plain", &photographs.brightness),
         one("nir", "Brightness in near infrared", &unit("of 255"), "plain", &photographs.nir),
         one("clipped", "Overexposed pixels", &unit("% of an image"), "plain", &photographs.clipped),

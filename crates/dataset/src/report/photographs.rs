@@ -1,4 +1,4 @@
-//! How bright the photographs are and of what colour, measured on some of them.
+//! Brightness and colour statistics of a sample of the images.
 
 use crate::Set;
 use crate::read::native;
@@ -6,31 +6,31 @@ use furrow_base::Result;
 use furrow_report::Tally;
 use rayon::prelude::*;
 
-/// Most images that are measured, spread over the dataset: to decode a hundred thousand would take an hour.
+/// Largest number of measured images, spread over the dataset: decoding a hundred thousand would take an hour.
 const MOST: u64 = 240;
 
-/// What was measured.
+/// Statistics of the measured images.
 pub(super) struct Photographs {
-    /// How many.
+    /// Number of measured images.
     pub(super) measured: u64,
-    /// Mean of R, G, B of an image, of 255.
+    /// Mean of R, G, B of each image, from 0 to 255.
     pub(super) brightness: Tally,
-    /// Mean near infrared of an image, of 255.
+    /// Mean near infrared of each image, from 0 to 255.
     pub(super) nir: Tally,
-    /// Percent of an image's pixels with a channel at 255.
+    /// Percentage of pixels of each image with a channel at 255.
     pub(super) clipped: Tally,
-    /// Mean colours, dark ones first.
+    /// Mean colour of each image, darkest first.
     pub(super) colors: Vec<[u8; 3]>,
 }
 
-/// Means of one image: R, G, B, share clipped, NIR.
+/// Means of one image: R, G, B; fraction of clipped pixels; near infrared.
 struct Means([f64; 3], f64, Option<f64>);
 
-/// Measures photographs of a dataset.
+/// Measures images of a dataset.
 pub(super) fn measure(set: &Set) -> Result<Photographs> {
     let count = if set.recipe.labels_only() { 0 } else { set.recipe.count };
     let measured = count.min(MOST);
-    // Numbers of images, spread evenly.
+    // Indices of the measured images, spread evenly.
     let places: Vec<u64> =
         (0..measured).map(|k| (u128::from(k) * u128::from(count) / u128::from(measured)) as u64).collect();
     let all: Vec<Means> = places.par_iter().map(|k| means(set, &Set::name(*k))).collect::<Result<_>>()?;

@@ -1,5 +1,6 @@
 "use strict";
-// Filters, sorts and enlarges the images of the sheet. Without this script all of them are shown, and their links lead to the files.
+// Filters, sorts and enlarges the images of the contact sheet. Without this script all images are shown, and their
+// links open the files.
 (() => {
   const byId = (id) => document.getElementById(id);
   const sheet = document.querySelector(".sheet");

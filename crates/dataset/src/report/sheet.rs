@@ -1,4 +1,5 @@
-//! The contact sheet: some images of each split, their labels over them, to be filtered, sorted, searched and enlarged.
+//! The contact sheet: some images of each split with overlaid labels, which can be filtered, sorted, searched and
+//! enlarged.
 
 use crate::Set;
 use crate::model::record::Record;
@@ -13,16 +14,16 @@ use furrow_report::{count, data_url, percent};
 use maud::{Markup, html};
 use rayon::prelude::*;
 
-/// Most images.
+/// Largest number of images.
 const MOST: usize = 24;
-/// Most pixels of a side.
+/// Largest side of an image, pixels.
 const SIDE: u32 = 360;
-/// What stands for a photograph where there is none.
+/// Background colour of datasets of labels alone.
 const EARTH: [u8; 3] = [70, 62, 54];
-/// Quality of the JPEGs.
+/// JPEG quality of the images.
 const QUALITY: u8 = 82;
 
-/// The sheet. `names` are the images of each split, in the order of [`Split::ALL`].
+/// Returns the contact sheet. `names` are the images of each split, in the order of [`Split::ALL`].
 pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
     let all: Vec<&String> = chosen(names.each_ref().map(Vec::len))
         .into_iter()
@@ -49,13 +50,13 @@ pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
     })
 }
 
-/// What images are filtered and sorted by.
+/// Properties for filtering and sorting images.
 struct Facts {
-    /// Shares of the image under crop and weed, percent.
+    /// Fractions of the image covered by crop and by weed, percent.
     cover: [f64; 2],
-    /// Growth stage of the oldest crop plant.
+    /// BBCH stage of the oldest crop plant.
     stage: Option<u32>,
-    /// Species in view, in order, each once.
+    /// Species in view, sorted and without duplicates.
     species: Vec<String>,
 }
 
@@ -79,7 +80,8 @@ impl Facts {
     }
 }
 
-/// How far each image is from the others: the largest distance of one of its values from their mean, in standard deviations.
+/// Returns a measure of how unusual each image is: the largest distance of one of its values from the mean, in standard
+/// deviations.
 fn unusual(facts: &[Facts]) -> Vec<f64> {
     let mut far = vec![0.0_f64; facts.len()];
     for k in 0..3 {
@@ -97,7 +99,7 @@ fn unusual(facts: &[Facts]) -> Vec<f64> {
     far
 }
 
-/// What filters and sorts the images; without scripts it is not shown.
+/// Returns the controls for filtering and sorting; they are hidden without scripts.
 fn tools(facts: &[Facts]) -> Markup {
     let mut species: Vec<&String> = facts.iter().flat_map(|f| &f.species).collect();
     species.sort();
@@ -124,11 +126,12 @@ fn tools(facts: &[Facts]) -> Markup {
     }
 }
 
-/// Which images of splits of these sizes are shown: of each the same number as far as they go, spread over it.
+/// Returns the indices of the images to show for splits of these sizes: the same number from each split if it has
+/// enough, spread evenly over it.
 fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
     let mut quota = [0; Split::ALL.len()];
     while quota.iter().sum::<usize>() < MOST && quota != sizes {
-        // Of the splits with images left, the one that shows the fewest.
+        // Chooses the split with the fewest chosen images among those with images left.
         let left = (0..sizes.len()).filter(|k| quota[*k] < sizes[*k]).min_by_key(|k| quota[*k]);
         if let Some(k) = left {
             quota[k] += 1;
@@ -137,10 +140,10 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
     std::array::from_fn(|k| (0..quota[k]).map(|i| i * sizes[k] / quota[k]).collect())
 }
 
-/// One image: photograph, labels, words.
+/// Returns the card of one image: image, labels, caption.
 fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
-    // Labels alone lie on plain earth.
+    // Labels without a rendered image are shown on a uniform background.
     let earth = if sample.rgb.is_empty() { vec![EARTH; sample.pixels()] } else { Vec::new() };
     let photograph = if sample.jpeg.is_some() { "rgb.jpg" } else { "rgb.png" };
     let (shown, full) = if earth.is_empty() { (&sample.rgb, photograph) } else { (&earth, "semantics.png") };
@@ -168,12 +171,12 @@ fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result
     })
 }
 
-/// Two decimals, so that equal datasets have equal pages.
+/// Formats a value with two decimals, so that equal datasets have equal pages.
 fn rounded(value: f64) -> String {
     format!("{value:.2}")
 }
 
-/// What an image shows: plants, or shares of classes where nobody has told plants apart.
+/// Returns the caption of an image: its numbers of plants, or the fractions of the classes if plants are not labelled.
 fn words(record: &Record) -> String {
     let pixels = f64::from(record.width) * f64::from(record.height);
     let share = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels;
@@ -196,10 +199,11 @@ fn words(record: &Record) -> String {
     )
 }
 
-/// Labels as colours to lay over a photograph of this size: classes tinted, one plant a little other than the next, each outlined.
+/// Returns the labels as a translucent overlay of `w` × `h` pixels: tinted by class, with a different shade for
+/// adjacent plant numbers, and outlined.
 fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
     let (width, height) = sample.size();
-    // The pixel that the middle of the small one lies in.
+    // Index of the full-size pixel at the centre of a small pixel.
     let of = |x: u32, y: u32| {
         let at = |k: u32, small: u32, large: u32| (2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small));
         (at(y, h, height) * u64::from(width) + at(x, w, width)) as usize
@@ -219,7 +223,7 @@ fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
     out
 }
 
-/// The colour over a pixel of a class and a plant.
+/// Returns the overlay colour of a class and plant.
 fn tint((class, plant): (u8, u32), edge: bool) -> [u8; 4] {
     const CROP: [[u8; 3]; 3] = [[40, 200, 80], [20, 160, 120], [130, 210, 50]];
     const WEED: [[u8; 3]; 3] = [[235, 60, 50], [215, 50, 120], [250, 125, 40]];

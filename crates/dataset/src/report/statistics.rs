@@ -1,4 +1,5 @@
-//! What the records of a dataset say together, added up one by one: of any number of images in little memory.
+//! Statistics of a dataset's records, accumulated record by record, so that memory does not depend on the number of
+//! images.
 
 use crate::model::record::{Plant, Record};
 use furrow_grow::soil::SoilRecord;
@@ -8,7 +9,7 @@ use furrow_render::scene::tag::Class;
 use furrow_report::Tally;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most suns that a chart shows, spread over the images.
+/// Largest number of suns in the chart, spread over the images.
 pub(super) const MOST_SUNS: u64 = 600;
 
 /// Crop and weed.
@@ -17,93 +18,93 @@ pub(super) const PLANTS: [Class; 2] = [Class::Crop, Class::Weed];
 /// One tally for crop, one for weed.
 pub(super) type Pair = [Tally; 2];
 
-/// What is known of all images.
+/// Statistics of all images.
 pub(super) struct Statistics {
-    /// Number of images; how many there are in the dataset.
+    /// Number of images added so far; `of` is the number in the dataset.
     pub(super) images: u64,
     of: u64,
-    /// Images by width and height.
+    /// Number of images by width and height.
     pub(super) sizes: BTreeMap<(u32, u32), u64>,
-    /// Pixels by class, and without a label.
+    /// Number of pixels by class; `ignored` is the number without a label.
     pub(super) pixels: [u64; Class::ALL.len()],
     pub(super) ignored: u64,
-    /// Share of each image, by class; percent, as all shares here.
+    /// Fraction of each image covered by each class, percent.
     pub(super) shares: [Tally; Class::ALL.len()],
-    /// Plants, each with at least one pixel, in an image.
+    /// Number of plants with at least one visible pixel in each image.
     pub(super) plants: Pair,
-    /// Pixels of a plant, of a leaf.
+    /// Number of visible pixels of each plant and of each leaf.
     pub(super) plant_pixels: Pair,
     pub(super) leaf_pixels: Pair,
-    /// Share of a plant, of a leaf, that nothing hides, within the frame; those wholly hidden as well.
+    /// Visible fraction within the frame of each plant and each leaf, percent; includes fully hidden ones.
     pub(super) plant_visible: Pair,
     pub(super) leaf_visible: Pair,
-    /// Plants that others hide wholly, and plants that the frame cuts.
+    /// Number of fully hidden plants, and number of plants cut by the frame.
     pub(super) hidden: u64,
     pub(super) cut: u64,
-    /// Of each plant seen.
+    /// Growth stage, age and height of each visible plant.
     pub(super) bbch: Pair,
     pub(super) age_days: Pair,
     pub(super) height_cm: Pair,
-    /// By number in the dataset's table; 0 is of none.
+    /// Species by number in the dataset's table; 0 is an unknown species.
     pub(super) species: BTreeMap<u16, Species>,
-    /// What was drawn for the images.
+    /// Sampled conditions of the images.
     pub(super) light: Light,
     pub(super) soil: Soil,
     pub(super) camera: Camera,
-    /// What was to be known of images, and of how many.
+    /// Number of images with each warning.
     pub(super) warnings: BTreeMap<String, u64>,
 }
 
-/// One species in all images.
+/// Statistics of a species.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Species {
-    /// Plants seen, their pixels, images that show one.
+    /// Number of visible plants, of their pixels, and of images that show the species.
     pub(super) plants: u64,
     pub(super) pixels: u64,
     pub(super) images: u64,
-    /// Least and most growth stage.
+    /// Lowest and highest BBCH stage.
     pub(super) bbch: Option<(u32, u32)>,
 }
 
-/// Light over all images.
+/// Statistics of the lights.
 pub(super) struct Light {
-    /// Images by what shines.
+    /// Number of lights of each kind.
     pub(super) kinds: BTreeMap<String, u64>,
-    /// Azimuth, elevation (degrees) and cloud of some suns.
+    /// Azimuth and elevation in degrees and cloud cover of at most [`MOST_SUNS`] suns.
     pub(super) suns: Vec<[f64; 3]>,
     pub(super) elevation_deg: Tally,
     pub(super) cloud: Tally,
     pub(super) turbidity: Tally,
-    /// What the ground gets of all lights, mean of R, G, B, W·m⁻²·nm⁻¹.
+    /// Irradiance on the ground from all lights, mean of R, G, B, W·m⁻²·nm⁻¹.
     pub(super) irradiance: Tally,
 }
 
-/// Soil over all images.
+/// Statistics of the soil.
 pub(super) struct Soil {
     pub(super) moisture: Tally,
     pub(super) roughness_mm: Tally,
     pub(super) straw: Tally,
     pub(super) clods: Tally,
-    /// Sum over images of a layer's share, by its name.
+    /// Sum over all images of each layer's fraction, by layer name.
     pub(super) layers: BTreeMap<String, f64>,
 }
 
-/// Cameras over all images.
+/// Statistics of the cameras.
 pub(super) struct Camera {
     pub(super) height_m: Tally,
-    /// Between the optical axis and straight down.
+    /// Angle between the optical axis and the downward vertical, degrees.
     pub(super) tilt_deg: Tally,
-    /// Height over focal length: what a pixel spans straight below.
+    /// Size of a pixel on the ground vertically below the camera: height / focal length, mm.
     pub(super) pixel_mm: Tally,
 }
 
 impl Statistics {
-    /// Whether plants are told apart, or only classes.
+    /// Returns `true` if plants are labelled, and not only classes.
     pub(super) fn has_plants(&self) -> bool {
         self.species.values().any(|s| s.plants > 0) || self.pixels[1..].iter().all(|n| *n == 0)
     }
 
-    /// Of nothing yet; `of` images will come.
+    /// Creates empty statistics for a dataset of `of` images.
     pub(super) fn new(of: u64) -> Self {
         let pair = |one: fn() -> Tally| [one(), one()];
         Self {
@@ -148,7 +149,7 @@ impl Statistics {
         }
     }
 
-    /// Counts an image.
+    /// Adds the record of an image.
     pub(super) fn add(&mut self, record: &Record) {
         *self.sizes.entry((record.width, record.height)).or_default() += 1;
         let pixels = f64::from(record.width) * f64::from(record.height);
@@ -225,7 +226,7 @@ impl Statistics {
                 continue;
             };
             light.elevation_deg.add(*sun_elevation_deg);
-            // Every n-th image, so that any number of them fits a chart.
+            // Takes every n-th image, so that the chart has at most `MOST_SUNS` suns.
             if self.images.is_multiple_of(self.of.div_ceil(MOST_SUNS).max(1)) {
                 light.suns.push([*sun_azimuth_deg, *sun_elevation_deg, f64::from(*cloud)]);
             }

@@ -1,4 +1,4 @@
-//! What the report shows of conditions is there: an image with every kind of condition fills every one of its statistics.
+//! Conditions in the report: an image with every kind of condition contributes to every statistic.
 
 use super::statistics::Statistics;
 use crate::model::record::Record;
@@ -8,7 +8,7 @@ use furrow_field::assemble::{Options, field_of};
 use furrow_field::record::Conditions;
 use furrow_optics::light::LightRecord;
 
-/// The conditions of a field with a sun, soil and camera.
+/// Returns the conditions of a field with a sun, soil and camera.
 fn conditions() -> Conditions {
     let text = r#"Field(
         seed: 3,
@@ -52,7 +52,7 @@ fn record(conditions: Option<Conditions>) -> Record {
 #[test]
 fn every_condition_that_the_report_shows_is_counted() {
     let record = record(Some(conditions()));
-    // As it is read from the disk.
+    // Converted to JSON and back, as from disk.
     let record: Record = serde_json::from_slice(&serde_json::to_vec(&record).unwrap()).unwrap();
     let mut found = Statistics::new(1);
     found.add(&record);
@@ -79,7 +79,7 @@ fn every_condition_that_the_report_shows_is_counted() {
     for key in ["sun_elevation_deg", "irradiance", "cloud", "turbidity", "moisture", "roughness_mm", "clods", "straw"] {
         assert!(page.contains(&format!("data-key=\"{key}\"")), "{key}");
     }
-    // Imported images have no conditions, and count none.
+    // Imported images have no conditions and do not contribute.
     found.add(&self::record(None));
     assert_eq!((found.images, found.light.cloud.n(), found.camera.height_m.n()), (2, 1, 1));
 }

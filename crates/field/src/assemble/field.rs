@@ -1,7 +1,7 @@
 //! The built field: scene, records, captures, and conversion of its films to images.
 
+use super::record::{Conditions, SpeciesRecord};
 use crate::drive::Capture;
-use crate::record::{Conditions, SpeciesRecord};
 use crate::{PartKind, PlantRecord};
 use furrow_base::math::Spectrum;
 use furrow_base::sampling::rng::mix;

@@ -2,7 +2,7 @@
 
 use super::builder::Builder;
 use super::models::{self, called};
-use crate::record::{CropRecord, SpeciesRecord, WeedRecord};
+use super::record::{CropRecord, SpeciesRecord, WeedRecord};
 use crate::{PartKind, PlantRecord};
 use furrow_base::ron_file::Step;
 use furrow_base::sampling::Purpose;

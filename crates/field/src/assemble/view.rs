@@ -142,8 +142,8 @@ impl Builder<'_> {
         Ok(reach)
     }
 
-    /// Returns the ground that one camera sees. Adds a warning if some of it is not planted, unless an earlier capture already has one,
-    /// which `told` states.
+    /// Returns the ground that one camera sees. Adds a warning if some of it is not planted, unless `told` is `true`:
+    /// an earlier capture has added it.
     fn view_of(&mut self, capture: &Capture, told: bool) -> Result<View> {
         let (camera, reach) = (&capture.camera, self.reach()?);
         let (w, h) = (camera.width() as f32, camera.height() as f32);

@@ -5,8 +5,8 @@
 //! 2.5 from 5R to 10Y (Newhall, Nickerson & Judd 1943); they are interpolated linearly. Chroma 0 is the white of
 //! illuminant C.
 //!
-//! The conversion from illuminant C to D65 uses Bradford's transform, which maps white to white. The notation says
-//! nothing about near infrared: NIR is red times the NIR/R ratio of the measured soil with the most similar colour.
+//! The conversion from illuminant C to D65 uses Bradford's transform, which maps white to white. The notation does
+//! not include near infrared: NIR is red times the NIR/R ratio of the measured soil with the most similar colour.
 
 use super::{bands, soil};
 use furrow_base::math::Spectrum;

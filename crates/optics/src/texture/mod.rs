@@ -152,13 +152,6 @@ impl Texture {
         [self.decode[r as usize], self.decode[g as usize], self.decode[b as usize], f32::from(a) / 255.0]
     }
 
-    /// Returns rows of R, G, B, A bytes of the finest level, top row first. Where opacity is 0 the colours are filled
-    /// in from nearby texels.
-    pub fn to_rgba8(&self) -> Vec<[u8; 4]> {
-        let finest = &self.pyramid.levels[0];
-        (0..self.height()).flat_map(|y| (0..self.width()).map(move |x| finest.get(x, y))).collect()
-    }
-
     /// Returns the mask of texels that are at least half opaque; `None` if all are.
     pub fn alpha_mask(&self) -> Option<AlphaMask> {
         if self.opaque { None } else { self.alpha_mask_from(128) }

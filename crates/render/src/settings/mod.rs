@@ -1,7 +1,7 @@
 //! Rendering options: engine, sampling quality and techniques.
 //!
 //! These types contain no engine code. The command line, dataset recipes, ablations and experiments all use them to
-//! specify a rendering, so each name and default is defined once. [`furrow_job`] executes them.
+//! specify a rendering, so each name and default is defined once. `furrow_job` executes them.
 //!
 //! | file | idea |
 //! |---|---|

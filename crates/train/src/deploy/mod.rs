@@ -18,7 +18,6 @@ use super::data::Band;
 use super::run::ModelCard;
 use serde::Serialize;
 
-pub mod enlarge;
 pub mod onnx;
 pub mod overlay;
 pub mod pictures;

@@ -3,9 +3,10 @@
 //! Reader and writer threads run beside the network, so that it does not wait for input or output. An unreadable image is reported and does
 //! not stop the prediction of the others.
 
+use super::overlay;
 use super::pictures::{PREDICTION, Picture, Prediction, files};
-use super::{enlarge, overlay};
 use crate::data::resize::{self, Input};
+use crate::enlarge;
 use crate::ensemble::Ensemble;
 use crate::refine::{Appearance, Refine};
 use crate::run::ModelCard;

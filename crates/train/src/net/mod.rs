@@ -11,6 +11,7 @@ mod lite_unet;
 mod parameters;
 mod pretrained;
 mod segnet;
+mod tiny_unet;
 mod unet;
 mod vit_unet;
 
@@ -173,6 +174,7 @@ networks! {
     BasicSegnet, basic_segnet, "basic-segnet", "Basic SegNet of Kendall et al. 2015: four 7 × 7 convolutions of 64 channels down, four up.";
     Segnet, segnet, "segnet", "SegNet of Badrinarayanan et al. 2017: the 13 convolutions of VGG16 with batch norm, and their mirror.";
     LiteUnet, lite_unet, "lite-unet", "U-Net with the encoder of EfficientNet-Lite0 (Tan & Le 2019), optionally with ImageNet weights.";
+    TinyUnet, tiny_unet, "tiny-unet", "U-Net of two levels with 8 and 16 channels: trains in seconds, to try a pipeline out.";
     Unet, unet, "unet", "U-Net (Ronneberger et al. 2015) with the residual encoder of ResNet-18 (He et al. 2016).";
     VitUnet, vit_unet, "vit-unet", "U-Net decoder over a ViT-S/14 (Dosovitskiy et al. 2021), optionally initialised from a file with DINOv2 weights (Oquab et al. 2023).";
 }
@@ -183,6 +185,7 @@ impl Network {
     pub fn least_side(self) -> u32 {
         match self {
             Self::BasicSegnet => 16,
+            Self::TinyUnet => 4,
             Self::Segnet | Self::LiteUnet => 32,
             Self::Unet | Self::VitUnet => 1,
         }

@@ -104,7 +104,7 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
         Network::Unet => unet::published(&parameter.name),
         Network::Segnet => segnet::published(&parameter.name),
         Network::VitUnet => vit_unet::published(&parameter.name),
-        Network::BasicSegnet => None,
+        Network::BasicSegnet | Network::TinyUnet => None,
     };
     let Some(name) = published else {
         return Err(Error::misuse(format!("there are no published weights for {}", network.name()))
@@ -114,7 +114,7 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
         Network::LiteUnet => "efficientnet_lite_pytorch's efficientnet-lite0",
         Network::Unet => "torchvision's resnet18",
         Network::VitUnet => "timm's vit_small_patch14_dinov2",
-        Network::Segnet | Network::BasicSegnet => "torchvision's vgg16_bn",
+        Network::Segnet | Network::BasicSegnet | Network::TinyUnet => "torchvision's vgg16_bn",
     };
     let wrong = |what: String| {
         Error::input(format!("these are not weights of the encoder of {}: {what}", network.name()))

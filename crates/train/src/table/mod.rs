@@ -53,19 +53,11 @@ mod sets;
 mod work;
 
 pub use desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc, TestDesc, TrainDesc};
-#[doc(hidden)]
 pub use evaluation::StoredEvaluation;
-#[doc(hidden)]
 pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
-#[doc(hidden)]
 pub use names::slug;
-#[doc(hidden)]
 pub use pixels::check_pixel_sizes;
-#[doc(hidden)]
 pub use print::{RUNS, TIMES, Tables, listing, tables};
-#[doc(hidden)]
 pub use rows::{Learner, Row, rows};
-#[doc(hidden)]
 pub use sets::{Bound, Real};
-#[doc(hidden)]
 pub use work::{Callbacks, Only, Order, PAGE, Predictor, State, check_weights, run};

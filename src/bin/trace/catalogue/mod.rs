@@ -4,18 +4,12 @@
 //! Each species is one sheet with one column per stage: above, the camera looks straight down; below, from about 30°
 //! above the ground. All images of a column show the same plant. The sheet's PNG comment records what it was rendered
 //! from; a sheet that would come out the same is kept.
-//!
-//! With a folder of photographs these are shown next to the stages, and the outlines of cut-outs and of rendered plants
-//! of the same stages are measured in the same way.
 
-mod beside;
-mod outline;
 mod page;
 mod sheet;
 mod view;
 
 use crate::quality::threads;
-use beside::Photograph;
 use furrow_base::geometry::Window;
 use furrow_base::input::shipped;
 use furrow_base::math::Vec3;
@@ -23,23 +17,19 @@ use furrow_base::sampling::Points;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
 use furrow_field::species_text::SpeciesFile;
-use furrow_field::{Field, PlantRecord, assemble};
+use furrow_field::{Field, assemble};
 use furrow_output::Picture;
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::integrator::{PathTracer, World};
 use furrow_render::render::{self, Settings, Watch};
-use outline::{Measures, Silhouette};
 use page::{Entry, Look, Stage};
 use sheet::{Bar, Column, Layout, Sheet, Shot};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use view::{VIEW_DEG, View};
 
 /// Camera distance, metres, above which the field is detailed only to pixel size, because a tall plant covers a large
 /// area.
 const FAR: f32 = 3.0;
-
-/// Number of plants per stage whose outlines are measured.
-const MEASURED: u64 = 10;
 
 /// Folder of species files within the working directory, if present.
 const SPECIES: &str = "scenes/species";
@@ -56,12 +46,6 @@ pub(crate) struct Args {
     /// Folder of the species files. Default: scenes/species, or the shipped species if there is no such folder.
     #[arg(long, alias = "pages", value_name = "DIR")]
     species_dir: Option<PathBuf>,
-    /// Folder of photographs to show next to the stages: PNG or JPEG, named sugar_beet.png, sugar_beet-2.png,
-    /// sugar_beet-bbch16.jpg. A photograph with a stage in its name is compared with that stage, others with all. The
-    /// outlines of PNGs with transparent parts are measured, and those of ten rendered plants of each stage they are
-    /// compared with.
-    #[arg(long, value_name = "DIR")]
-    beside: Option<PathBuf>,
     /// Samples per pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     spp: u32,
@@ -81,14 +65,12 @@ pub(crate) struct Args {
 
 /// Renders the sheets that are missing or would differ, then writes the page. Returns their paths.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    args.check_folders()?;
+    cli::check_folder(&args.out)?;
     let pages = args.pages()?;
-    // Read all of them first, so that an unreadable file does not waste rendering time.
-    let photographs = pages.iter().map(|page| args.photographs(page)).collect::<Result<Vec<_>>>()?;
     let pool = render::pool(args.threads)?;
     let (mut entries, mut paths) = (Vec::new(), Vec::new());
-    for (page, photographs) in pages.iter().zip(photographs) {
-        let (path, entry) = pool.install(|| args.species(page, photographs, signals))?;
+    for page in &pages {
+        let (path, entry) = pool.install(|| args.species(page, signals))?;
         paths.push(path);
         entries.push(entry);
     }
@@ -99,16 +81,6 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 }
 
 impl Args {
-    /// Checks that sheets can be written and would not overwrite photographs.
-    fn check_folders(&self) -> Result<()> {
-        cli::check_folder(&self.out)?;
-        if self.beside.as_deref().is_some_and(|beside| place(beside) == place(&self.out)) {
-            let words = "--out names the folder of the photographs: a sheet could overwrite a photograph";
-            return Err(Error::misuse(words).in_file(&self.out).help("name another folder with --out"));
-        }
-        Ok(())
-    }
-
     /// Selected species files, sorted by name.
     fn pages(&self) -> Result<Vec<PathBuf>> {
         let folder = self.folder()?;
@@ -138,19 +110,13 @@ impl Args {
         }
     }
 
-    /// Photographs of a species.
-    fn photographs(&self, page: &Path) -> Result<Vec<Photograph>> {
-        let Some(folder) = &self.beside else { return Ok(Vec::new()) };
-        beside::photographs(folder, &name(page))
-    }
-
     /// Renders one species. Returns the path of its sheet, and its entry on the page.
-    fn species(&self, page: &Path, photographs: Vec<Photograph>, signals: &Signals) -> Result<(PathBuf, Entry)> {
+    fn species(&self, page: &Path, signals: &Signals) -> Result<(PathBuf, Entry)> {
         let file = SpeciesFile::read(page)?;
         let desc = file.parse()?;
         let mut stages = Vec::new();
         for stage in &desc.plant.stages {
-            let bare = self.field((page, self.seed), stage.bbch, None)?;
+            let bare = self.field(page, stage.bbch, None)?;
             let plant = bare.plants.first().cloned();
             let plant = plant.ok_or_else(|| Error::input("no plant grows").in_file(page))?;
             stages.push((plant, View::both(&points(&bare)), bare.provenance()));
@@ -159,7 +125,7 @@ impl Args {
         let (spp, size) = (self.spp, self.size);
         let layout = Layout { rows: view::KINDS, size: size as usize };
         let from: Vec<&str> = stages.iter().map(|(.., of)| of.as_str()).collect();
-        let from = format!("{}\nspp: {spp}\nsize: {size}\nwords: stages and bars\nview: the plant", from.join("\n"));
+        let from = format!("{}\nspp: {spp}\nsize: {size}\ntext: stages and bars\nview: the plant", from.join("\n"));
         let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
         if !kept {
             let mut columns = Vec::new();
@@ -175,17 +141,6 @@ impl Args {
         if !self.quiet {
             furrow_cli::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
-        let name = name(page);
-        let is_stage = |bbch: &u32| stages.iter().any(|(plant, ..)| plant.bbch == *bbch);
-        for photo in &photographs {
-            if let Some(bbch) = photo.bbch.filter(|bbch| !is_stage(bbch)) {
-                furrow_cli::tell!("warning: {} is not shown: {name} has no stage BBCH {bbch}", photo.name);
-            }
-        }
-        let measures = |plant: &PlantRecord| {
-            if beside::compare(&photographs, plant.bbch) { self.measures(page, plant.bbch) } else { Ok(None) }
-        };
-        let measures = stages.iter().map(|(plant, ..)| measures(plant)).collect::<Result<Vec<_>>>()?;
         let (width, height, pixels) = furrow_output::read_rgb(&path)?;
         let sheet = Sheet { width: width as usize, height: height as usize, pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, views, _))| {
@@ -194,14 +149,14 @@ impl Args {
                 Ok(Look { jpeg: furrow_output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
             };
             let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
-            Ok(Stage { plant, looks, measures: measures[i] })
+            Ok(Stage { plant, looks })
         });
         let stages = stages.collect::<Result<Vec<Stage>>>()?;
-        Ok((path, Entry { desc, stages, photographs }))
+        Ok((path, Entry { desc, stages }))
     }
 
     /// Builds a field with one plant: on bare ground if it is rendered, otherwise without ground.
-    fn field(&self, (page, seed): (&Path, u64), bbch: u32, view: Option<&View>) -> Result<Field> {
+    fn field(&self, page: &Path, bbch: u32, view: Option<&View>) -> Result<Field> {
         let text = |path: &Path| format!("{:?}", path.to_string_lossy());
         let none = || (VIEW_DEG, "Nadir(height_m: 1)".to_owned(), String::new());
         let (angle, pose, soil) = view.map_or_else(none, |view| {
@@ -227,31 +182,12 @@ impl Args {
             )",
             text(page)
         );
-        assemble::field_of(&scene, &assemble::Options { seed: Some(seed), ..Default::default() })
-    }
-
-    /// Mean measures of the outline of a stage from above, over [`MEASURED`] plants.
-    fn measures(&self, page: &Path, bbch: u32) -> Result<Option<Measures>> {
-        let mut all = Vec::new();
-        for seed in self.seed..self.seed + MEASURED {
-            let points = points(&self.field((page, seed), bbch, None)?);
-            if points.is_empty() {
-                continue;
-            }
-            let field = self.field((page, seed), bbch, Some(&View::above(&points)))?;
-            let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
-            let window = Window::full(self.size, self.size);
-            let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);
-            let inside = labels.tags.iter().map(|tag| tag.plant > 0).collect();
-            let whole = Silhouette { width: self.size as usize, height: self.size as usize, inside };
-            all.extend(Measures::of(&whole.shrunk(beside::LONGEST)));
-        }
-        Ok(Measures::mean(&all))
+        assemble::field_of(&scene, &assemble::Options { seed: Some(self.seed), ..Default::default() })
     }
 
     /// Renders one image.
     fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Shot> {
-        let field = self.field((page, self.seed), bbch, Some(view))?;
+        let field = self.field(page, bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
         let world = World { scene: &field.scene, geometry: &geometry };
         let window = Window::full(self.size, self.size);
@@ -260,24 +196,6 @@ impl Args {
         let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
         Ok(field.photograph(&film).rgb.as_chunks::<3>().0.to_vec())
     }
-}
-
-/// Canonical path of a folder that may not exist yet: without links and `..`.
-fn place(folder: &Path) -> PathBuf {
-    let mut place = PathBuf::new();
-    for part in std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()).components() {
-        match part {
-            Component::ParentDir => drop(place.pop()),
-            part => place.push(part),
-        }
-        place = place.canonicalize().unwrap_or(place);
-    }
-    place
-}
-
-/// Name of a species, from its file.
-fn name(page: &Path) -> String {
-    page.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
@@ -308,7 +226,6 @@ mod tests {
             out: PathBuf::new(),
             species: Vec::new(),
             species_dir: None,
-            beside: None,
             spp: 1,
             size: 64,
             seed: 3,
@@ -319,9 +236,9 @@ mod tests {
             [("maize", 63), ("sunflower", 65), ("wheat", 65), ("sugar_beet", 65), ("galium", 15), ("poa", 11)]
         {
             let page = PathBuf::from(SPECIES).join(name).with_extension("ron");
-            let points = points(&args.field((&page, args.seed), bbch, None).unwrap());
+            let points = points(&args.field(&page, bbch, None).unwrap());
             for view in View::both(&points) {
-                let field = args.field((&page, args.seed), bbch, Some(&view)).unwrap();
+                let field = args.field(&page, bbch, Some(&view)).unwrap();
                 let geometry = EmbreeAccel::build(&field.scene.surfaces(), 1).unwrap();
                 let window = Window::full(args.size, args.size);
                 let labels = render::label(&geometry, &field.scene.parts, &field.scene.camera, window);

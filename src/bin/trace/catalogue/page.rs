@@ -1,10 +1,8 @@
 //! Self-contained HTML page with all species at all growth stages.
 
-use super::beside::Photograph;
-use super::outline::{BLADES, MEANINGS, Measures};
 use furrow_field::PlantRecord;
 use furrow_field::desc::{Role, SpeciesDesc};
-use furrow_report::{Cell, Page, Table, count, data_url, number, pairs, section};
+use furrow_report::{Cell, Page, Table, data_url, number, section};
 use maud::{Markup, html};
 
 /// CSS rules in addition to the shared ones.
@@ -20,8 +18,6 @@ pub(super) struct Entry {
     pub(super) desc: SpeciesDesc,
     /// Stages, youngest first.
     pub(super) stages: Vec<Stage>,
-    /// Photographs of it.
-    pub(super) photographs: Vec<Photograph>,
 }
 
 /// A growth stage.
@@ -30,8 +26,6 @@ pub(super) struct Stage {
     pub(super) plant: PlantRecord,
     /// Its images: from above, then from the side.
     pub(super) looks: Vec<Look>,
-    /// Measures of its outline from above, if there are cut-outs for comparison.
-    pub(super) measures: Option<Measures>,
 }
 
 /// A square image.
@@ -49,9 +43,8 @@ pub(super) fn html(entries: &[Entry]) -> String {
             @let SpeciesDesc { name, eppo, role, .. } = &entry.desc;
             @let role = if *role == Role::Crop { "crop" } else { "weed" };
             (section(&format!("{name} · {eppo} · {role}"), html! {
-                div.stages { @for stage in &entry.stages { (figure(name, stage)) (photographs(entry, Some(stage.plant.bbch))) } (photographs(entry, None)) }
+                div.stages { @for stage in &entry.stages { (figure(name, stage)) } }
                 div.wide { (table(&entry.stages).html()) }
-                @if let Some(table) = outlines(entry) { div.wide { (table.html()) } (meanings()) }
             }))
         }
     };
@@ -83,49 +76,6 @@ fn figure(name: &str, stage: &Stage) -> Markup {
     }
 }
 
-/// Photographs of a stage, or those without a stage in their name.
-fn photographs(entry: &Entry, bbch: Option<u32>) -> Markup {
-    html! {
-        @for photo in entry.photographs.iter().filter(|p| p.bbch == bbch) {
-            figure.stage {
-                figcaption { "photograph " (photo.name) }
-                img src=(data_url("jpeg", &photo.jpeg)) alt=(photo.name) width=(photo.size.0) height=(photo.size.1) {}
-            }
-        }
-    }
-}
-
-/// Table of outline measures: of cut-outs without a stage, then for each stage, of its cut-outs and of rendered plants.
-fn outlines(entry: &Entry) -> Option<Table> {
-    let mut table = Table::new("", ["outline from above"].into_iter().chain(MEANINGS.map(|(name, _)| name)));
-    let mut push = |name: String, all: &[Measures]| {
-        if let Some(mean) = Measures::mean(all) {
-            let numbers = mean.values().map(|x| Cell::Shown(format!("{x:.2}")));
-            table.push([Cell::text(name)].into_iter().chain(numbers));
-        }
-    };
-    let cut_outs = |bbch: Option<u32>| -> Vec<Measures> {
-        entry.photographs.iter().filter(|p| p.bbch == bbch).filter_map(|p| p.measures).collect()
-    };
-    let counted = |all: &[Measures]| count(all.len() as u64, "cut-out", "cut-outs");
-    let any = cut_outs(None);
-    push(format!("all stages, {}", counted(&any)), &any);
-    for Stage { plant, measures, .. } in &entry.stages {
-        let own = cut_outs(Some(plant.bbch));
-        push(format!("BBCH {}, {}", plant.bbch, counted(&own)), &own);
-        push(format!("BBCH {}, rendered", plant.bbch), measures.as_slice());
-    }
-    (!table.rows.is_empty()).then_some(table)
-}
-
-/// Explanation of the columns of [`outlines`].
-fn meanings() -> Markup {
-    html! {
-        (pairs(&MEANINGS.map(|(name, words)| (name, html! { (words) }))))
-        p.reading { (BLADES) " Each line is a mean; for rendered plants, over ten." }
-    }
-}
-
 /// Largest of 1, 2, 5, 10, 20, … that is not above `most`.
 pub(super) fn round_length(most: f32) -> f32 {
     let ten = 10.0_f32.powf(most.log10().floor());
@@ -153,30 +103,10 @@ fn table(stages: &[Stage]) -> Table {
 mod tests {
     use super::*;
 
-    /// Expected: a row of cut-outs names the stages it is compared with, even if these are all stages.
-    #[test]
-    fn rows_of_cut_outs_tell_their_stages() {
-        let species = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/echinochloa.ron");
-        let desc = furrow_field::species_text::SpeciesFile::read(&species).unwrap().parse().unwrap();
-        let measures = Some(Measures::default());
-        let photo = Photograph { name: "a".into(), bbch: None, size: (1, 1), jpeg: Vec::new(), measures };
-        let table = outlines(&Entry { desc, stages: Vec::new(), photographs: vec![photo] }).unwrap();
-        assert!(table.html().into_string().contains("all stages, 1 cut-out"));
-    }
-
     #[test]
     fn scales_have_round_lengths() {
         for (most, length) in [(1.2, 1.0), (9.9, 5.0), (47.0, 20.0), (50.0, 50.0), (130.0, 100.0)] {
             assert_eq!(round_length(most), length);
-        }
-    }
-
-    /// Expected: the guide explains every column.
-    #[test]
-    fn the_guide_knows_the_measures() {
-        let guide = include_str!("../../../../docs/guide/species.md");
-        for (name, _) in MEANINGS {
-            assert!(guide.contains(&format!("| {name} |")), "no {name} in docs/guide/species.md");
         }
     }
 }

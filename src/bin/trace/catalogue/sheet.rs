@@ -11,7 +11,7 @@ const INK: [u8; 3] = [40, 38, 34];
 /// Margin below text and above a bar, pixels.
 const ROOM: usize = 3;
 /// Minimum side of images whose text has two pixels per dot.
-const LARGE: usize = 128;
+const LARGE: usize = 160;
 
 /// A square image, sRGB, row-major from the top.
 pub(super) type Shot = Vec<[u8; 3]>;
@@ -97,7 +97,7 @@ impl Layout {
                 for row in middle - self.dot()..=middle {
                     pixels[row * width + x..][..bar.pixels.min(self.size)].fill(INK);
                 }
-                let beside = (x + bar.pixels + 2 * ROOM, below);
+                let beside = (x + bar.pixels + ROOM * self.dot(), below);
                 letters::draw(&mut pixels, width, &bar.words, beside, self.dot(), INK);
             }
         }

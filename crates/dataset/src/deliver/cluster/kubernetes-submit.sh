@@ -1,11 +1,11 @@
 #!/bin/bash
-# Renders, waits until all shards have ended, finishes. Jobs of an earlier run are removed first; what they made stays.
+# Renders, waits until all shards have ended, and finishes the dataset. Removes the jobs of an earlier run first, but not their images.
 set -eu
 cd "$(dirname "$0")"
 kubectl delete job --ignore-not-found @NAME@ @NAME@-finish
 kubectl apply -f render.yaml
 ended='{.status.conditions[?(@.status=="True")].type}'
-# Failed as well as Complete: the second job says what is missing.
+# Continues after Failed as well as Complete: the second job lists the missing images.
 until kubectl get job @NAME@ -o jsonpath="$ended" | grep -Eq 'Complete|Failed'; do
     sleep 30
 done

@@ -1,20 +1,20 @@
-//! Kubernetes: an indexed job that renders, and one to be applied when it has ended.
+//! Kubernetes: an indexed job that renders, and a second job that is applied when the first has ended.
 //!
-//! Source: Kubernetes documentation, "Indexed Job for Parallel Processing with Static Work Assignment" and "Handling retriable and
-//! non-retriable pod failures with Pod failure policy".
+//! Source: Kubernetes documentation, "Indexed Job for Parallel Processing with Static Work Assignment" and "Handling
+//! retriable and non-retriable pod failures with Pod failure policy".
 
 use super::request::{Job, Pod};
 use super::script::{fill, name};
 use crate::File;
 use furrow_base::{Error, Result};
 
-/// Where the volume is mounted in a pod.
+/// Mount point of the volume in a pod.
 const MOUNT: &str = "/data";
 
-/// Most pods at once; a cluster with fewer cores starts them one after the other.
+/// Largest number of pods at the same time; a cluster with fewer cores starts the rest later.
 const PARALLELISM: u64 = 64;
 
-/// The two jobs and the script that applies them.
+/// Returns the two jobs and the script that applies them.
 pub(super) fn files(dir: &str, job: &Job, pod: &Pod) -> Result<Vec<File>> {
     let dataset = format!("{MOUNT}/{}", dir.rsplit('/').next().unwrap_or_default());
     let program = job.program.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -40,7 +40,8 @@ pub(super) fn files(dir: &str, job: &Job, pod: &Pod) -> Result<Vec<File>> {
     ])
 }
 
-/// A text of a YAML document: JSON is YAML. A `$(` of an argument would name a variable.
+/// Returns a string as a quoted YAML scalar; JSON strings are valid YAML. `$(` is escaped, since it would start a
+/// variable in an argument.
 fn text(of: &str) -> Result<String> {
     serde_json::to_string(&of.replace("$(", "$$("))
         .map_err(|e| Error::failed(format!("{of:?} cannot be written as YAML: {e}")))

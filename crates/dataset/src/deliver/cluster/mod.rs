@@ -1,11 +1,13 @@
-//! Job files for those who have more than one machine: for Slurm, for Kubernetes, for GNU parallel.
+//! Job files that render a dataset on several machines: for Slurm, Kubernetes or GNU parallel.
 //!
-//! A scheduler's part is small, since image k is the same wherever it is made and what is done is read off the disk: start
-//! `trace dataset render --shard k/N` for every k, again where one was cut off; then `finish` and `verify`. Exit codes say what to
-//! do: 0 done, 75 start again, 2 never, 1 look.
+//! The scheduler needs little logic, since image k is the same on every machine and the progress is read from the disk.
+//! It starts `trace dataset render --shard k/N` for every k, starts interrupted shards again, and then runs `finish`
+//! and `verify`. The exit code decides: 0 is success, 75 means start again, 2 means that a retry cannot help, 1 means
+//! that a person has to look at the error.
 //!
-//! Files are written for people: they are read, and edited, since partitions, accounts and images are a site's own. So they are
-//! templates with names between @ signs, one file beside this each; what was edited is never overwritten.
+//! The files are meant to be read and edited by users, since partitions, accounts and container images depend on the
+//! site. They are therefore templates with names between @ signs, each in a file in this folder; edited files are never
+//! overwritten.
 
 mod kubernetes;
 mod parallel;
@@ -23,11 +25,11 @@ use furrow_output::write_together;
 use script::plain;
 use std::path::{Path, PathBuf};
 
-/// More tasks than this Slurm takes only where its `MaxArraySize` was raised.
+/// Default of Slurm's `MaxArraySize`, the largest number of tasks of an array.
 const SLURM_ARRAY: u64 = 1001;
 
-/// Writes the job files of a dataset into `folder`; files there that say something else are left alone, with an error. Returns the
-/// files, the one to begin with first, and what the user should know.
+/// Writes the job files of a dataset into `folder`. Returns their paths, the one to start with first, and warnings for
+/// the user. Returns an error and writes nothing if a file exists with other contents.
 pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<String>)> {
     check(set, job)?;
     let dir = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
@@ -44,7 +46,7 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
     for file in &files {
         let path = folder.join(&file.path);
         if furrow_base::input::contents(&path).is_ok_and(|there| there != file.bytes) {
-            return Err(Error::misuse("this file is there and says something else: it may have been edited")
+            return Err(Error::misuse("this file exists with other contents; it may have been edited")
                 .in_file(path)
                 .help("remove it, or give another --out"));
         }
@@ -55,7 +57,7 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
     let mut told = Vec::new();
     if job.scheduler == Scheduler::Slurm && job.shards > SLURM_ARRAY {
         told.push(format!(
-            "{} shards: Slurm refuses arrays of more than {SLURM_ARRAY} tasks where its MaxArraySize was not raised",
+            "{} shards: Slurm refuses arrays of more than {SLURM_ARRAY} tasks unless its MaxArraySize is raised",
             job.shards
         ));
     }
@@ -77,7 +79,7 @@ fn check(set: &Set, job: &Job) -> Result<()> {
     if let Some(push) = &job.push {
         push.check()?;
         if push.free {
-            return fault("--push-free leaves nothing for the job that finishes".into(), "leave it out here");
+            return fault("--push-free removes the images that the finishing job needs".into(), "leave it out here");
         }
         if matches!(job.scheduler, Scheduler::Kubernetes(_)) {
             let help = "write --push into the command of render.yaml by hand";
@@ -86,18 +88,18 @@ fn check(set: &Set, job: &Job) -> Result<()> {
     }
     if let Some(scratch) = &job.scratch {
         if scratch.is_empty() || scratch.contains(char::is_control) {
-            return fault(format!("--scratch {scratch:?} is no folder"), "name one, as --scratch '$TMPDIR/furrow'");
+            return fault(format!("--scratch {scratch:?} is not a folder"), "for example: --scratch '$TMPDIR/furrow'");
         }
         if matches!(job.scheduler, Scheduler::Kubernetes(_)) {
             let help = "write --scratch into the command of render.yaml by hand, with a folder of the container";
             return fault("--scratch is for slurm and parallel".into(), help);
         }
     }
-    // Job files are in whole seconds.
+    // Times in job files are in whole seconds.
     let (grace, time) = (job.grace.as_secs(), job.time.as_secs());
     if grace >= time {
-        let words = format!("--grace {grace} leaves nothing of --time {time} s");
-        return fault(words, "--grace is how long before the end of --time a shard is told to stop");
+        let words = format!("--grace {grace} s leaves nothing of --time {time} s");
+        return fault(words, "--grace is the time before the end of --time when a shard receives the stop signal");
     }
     Ok(())
 }

@@ -1,11 +1,11 @@
-//! GNU parallel on one machine, or on several by ssh; xargs where it is not installed.
+//! GNU parallel, on one machine or on several by ssh; xargs if it is not installed.
 
 use super::request::Job;
 use super::script::{fill, plain, quoted};
 use crate::File;
 use furrow_base::Result;
 
-/// The script.
+/// Returns the script.
 pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
     let names = [
         ("DIR", dir.to_owned()),

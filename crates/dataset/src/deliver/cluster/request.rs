@@ -1,4 +1,4 @@
-//! What is asked of a scheduler.
+//! Settings of job files.
 
 use super::script::{expanded, quoted};
 use crate::make::push::Push;
@@ -6,23 +6,23 @@ use furrow_base::{Error, Result};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Who starts the shards.
+/// The scheduler that starts the shards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Scheduler {
     /// Slurm: an array, and a job that follows it.
     Slurm,
-    /// Kubernetes: an indexed job, and one to be applied when it has ended.
+    /// Kubernetes: an indexed job, and a second job that is applied when the first has ended.
     Kubernetes(Pod),
-    /// GNU parallel, or xargs where there is none: a script.
+    /// A script for GNU parallel, or xargs if it is not installed.
     Parallel,
 }
 
-/// Where a pod finds the program and the dataset.
+/// Container image and volume of a pod.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pod {
-    /// Container image in which `trace` is on the path.
+    /// Container image with `trace` in its `PATH`.
     pub image: String,
-    /// Claim of the volume in which the dataset's folder lies.
+    /// Claim of the volume that contains the dataset's folder.
     pub claim: String,
 }
 
@@ -30,58 +30,59 @@ pub struct Pod {
 const LONGEST_NAME: usize = 253;
 
 impl Pod {
-    /// Refuses what Kubernetes would, and what would end a line of the files.
+    /// Returns an error for names that Kubernetes would refuse or that would break a line of the files.
     pub(super) fn check(&self) -> Result<()> {
         let letter = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
         let part = |part: &str| {
             part.starts_with(letter) && part.ends_with(letter) && part.chars().all(|c| letter(c) || c == '-')
         };
         if self.claim.len() > LONGEST_NAME || !self.claim.split('.').all(part) {
-            return Err(Error::misuse(format!("--claim {:?} is no name of a volume claim", self.claim)).help(format!(
-                "such a name has up to {LONGEST_NAME} lower-case letters, digits, `-` and `.`, as `furrow-data`"
+            return Err(Error::misuse(format!("--claim {:?} is not a volume claim name", self.claim)).help(format!(
+                "such a name has up to {LONGEST_NAME} lower-case letters, digits, `-` and `.`, like `furrow-data`"
             )));
         }
         if self.image.is_empty() || self.image.contains(|c: char| c.is_whitespace() || c.is_control()) {
-            return Err(Error::misuse(format!("--image {:?} is no name of a container image", self.image))
-                .help("such a name has no spaces, as `registry.example.org/furrow:0.1.0`"));
+            return Err(Error::misuse(format!("--image {:?} is not a container image name", self.image))
+                .help("such a name has no spaces, like `registry.example.org/furrow:0.1.0`"));
         }
         Ok(())
     }
 }
 
-/// What is asked of a scheduler.
+/// Settings of the job files of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Who starts the shards.
+    /// The scheduler that starts the shards.
     pub scheduler: Scheduler,
-    /// Into how many parts the dataset is cut.
+    /// Number of shards.
     pub shards: u64,
-    /// Cores of each shard.
+    /// Number of cores per shard.
     pub cpus: u32,
-    /// Memory of each shard, GiB.
+    /// Memory per shard, GiB.
     pub memory_gib: u32,
-    /// Longest time of a shard before it is stopped and queued again.
+    /// Time limit of a shard, after which it is stopped and queued again.
     pub time: Duration,
-    /// How long before that it is told: longer than an image takes.
+    /// Time between the signal to stop and the limit; must exceed the time of an image.
     pub grace: Duration,
-    /// Images that are rendered again to check them.
+    /// Number of images that `verify` renders again.
     pub again: u64,
-    /// The program, as the machines see it.
+    /// Path of the program on the machines.
     pub program: PathBuf,
-    /// Folder of a node's own disk in which shards work; the dataset's unless given. `$NAME` and `${NAME}` are the node's variables.
+    /// Folder on a node's local disk in which shards work; `None` for the dataset's folder. `$NAME` and `${NAME}` are
+    /// environment variables of the node.
     pub scratch: Option<String>,
-    /// How what is finished is sent elsewhere.
+    /// Command that copies finished files to another place.
     pub push: Option<Push>,
 }
 
 impl Job {
-    /// What scripts write behind `render`: where it works, and how it pushes.
+    /// Returns the options that scripts append to `render`: for scratch folder and pushing.
     pub(super) fn rendering(&self) -> String {
         let scratch = self.scratch.as_ref().map(|scratch| format!(" --scratch {}", expanded(scratch)));
         scratch.unwrap_or_default() + &self.pushing()
     }
 
-    /// What scripts write behind `finish`: nothing where nothing is pushed.
+    /// Returns the options that scripts append to `finish`: those for pushing, or none.
     pub(super) fn pushing(&self) -> String {
         let Some(Push { command, check, free, tries, timeout }) = &self.push else { return String::new() };
         let mut words = format!(" --push {} --push-tries {tries}", quoted(command));

@@ -1,12 +1,12 @@
-//! Templates with names between @ signs, filled in, and words that survive a shell.
+//! Filling of templates with names between @ signs, and quoting for the shell.
 
 use crate::File;
 use furrow_base::{Error, Result};
 use std::path::Path;
 
-/// A path as it may stand in a script, comments included.
+/// Returns a path for use in a script, including its comments; an error if it has control characters or is not UTF-8.
 pub(super) fn plain(path: &Path) -> Result<String> {
-    // YAML knows two more ends of a line.
+    // YAML has two more line breaks, U+2028 and U+2029.
     let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
     path.to_str().filter(|p| !p.contains(breaks)).map(str::to_owned).ok_or_else(|| {
         Error::misuse("this path cannot be written into a script")
@@ -15,7 +15,8 @@ pub(super) fn plain(path: &Path) -> Result<String> {
     })
 }
 
-/// What the files of a dataset are called by: its folder's name in lower-case letters, digits and hyphens, at most 40 of them.
+/// Returns the name of a dataset's jobs: `furrow-` and up to 40 characters of the folder's name, as lower-case letters,
+/// digits and hyphens.
 pub(super) fn name(dir: &str) -> String {
     let last = dir.rsplit('/').next().unwrap_or_default().to_lowercase();
     let plain: String = last.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(40).collect();
@@ -23,7 +24,7 @@ pub(super) fn name(dir: &str) -> String {
     if plain.is_empty() { "furrow".into() } else { format!("furrow-{plain}") }
 }
 
-/// A word of a shell script, whatever it holds.
+/// Quotes a string so that the shell reads it as one word.
 pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -32,8 +33,8 @@ pub(crate) fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// A word of a shell script in which `$NAME` and `${NAME}` are what these variables hold, and all else stands for itself. The script ends
-/// where one of them is empty or not set.
+/// Quotes a string so that the shell reads it as one word and expands `$NAME` and `${NAME}` in it; everything else is
+/// literal. The script fails if a variable is empty or not set.
 pub(super) fn expanded(word: &str) -> String {
     let mut out = String::from("\"");
     let mut rest = word;
@@ -54,7 +55,7 @@ pub(super) fn expanded(word: &str) -> String {
     out + "\""
 }
 
-/// The variable whose name stands at the beginning, with or without braces, and what follows it.
+/// Splits text that starts with a variable's name, with or without braces, into the name and the rest.
 fn variable(text: &str) -> Option<(&str, &str)> {
     let is_name = |name: &str| {
         let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -67,7 +68,7 @@ fn variable(text: &str) -> Option<(&str, &str)> {
     is_name(parts.0).then_some(parts)
 }
 
-/// A template with its names filled in, in one pass: what is filled in may hold names between @ signs itself.
+/// Fills the names of a template in a single pass; names between @ signs in the values are not replaced.
 pub(super) fn fill(path: &str, template: &str, names: &[(&str, String)]) -> File {
     let mut text = String::with_capacity(2 * template.len());
     let mut rest = template;
@@ -101,7 +102,8 @@ mod tests {
         }
     }
 
-    /// Expected: variables are filled in, with spaces in them and whatever stands beside; nothing else of the shell's language is read.
+    /// Expected: variables are expanded, including values with spaces and adjacent text; all other shell syntax is
+    /// literal.
     #[test]
     fn variables_are_the_shells_and_nothing_else() {
         let said = |word: &str| {

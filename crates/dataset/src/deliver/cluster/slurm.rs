@@ -1,4 +1,4 @@
-//! Slurm: an array that renders, and a job that follows it.
+//! Slurm: a job array that renders, and a job that runs after it.
 
 use super::request::Job;
 use super::script::{fill, name, plain, quoted};
@@ -6,7 +6,7 @@ use crate::File;
 use furrow_base::Result;
 use std::time::Duration;
 
-/// The two jobs and the script that submits them.
+/// Returns the two jobs and the script that submits them.
 pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
     let array = if job.shards == 1 { "0".into() } else { format!("0-{}", job.shards - 1) };
     let names = [
@@ -31,7 +31,7 @@ pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
     ])
 }
 
-/// Days, hours, minutes and seconds as `--time` takes them.
+/// Formats a duration for `--time`: `[days-]hours:minutes:seconds`.
 fn time(time: Duration) -> String {
     let s = time.as_secs();
     let (days, hours, minutes, seconds) = (s / 86400, s / 3600 % 24, s / 60 % 60, s % 60);

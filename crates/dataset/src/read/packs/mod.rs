@@ -1,74 +1,78 @@
-//! Images in archives instead of a folder an image: a million small files are more than many file systems bear.
+//! Packs: archives of many images instead of a folder for each image, since many file systems cannot handle millions of
+//! small files.
 //!
-//! A pack holds so many images of one split, in the order of their numbers, as a tar archive whose files are named as the package `webdataset`
-//! groups them and as [`stream`](crate::deliver::stream) writes them:
+//! A pack contains a fixed number of images of one split, in the order of their numbers. It is a tar archive with the
+//! file names that the package `webdataset` groups by image and that [`stream`](crate::deliver::stream) writes:
 //!
 //! ```text
 //! packs/train-000000.tar     the images
-//! seals/train-000000.json    its checksum, where each file lies in it, and the checksums of each image; written last
+//! seals/train-000000.json    checksum of the archive, position of each file in it, checksum record of each image; written last
 //! ```
 //!
-//! Images are made in folders of their own, as ever, and put into their pack when all of it are there: so kills, shards and faults are those
-//! of any dataset, and an archive is written once. Which image is in which pack follows from its number, splits and the size of packs.
-//! A pack of which a byte was changed, or that is to hold more images or other files, is taken apart first (`store::settle`). So is one whose
-//! record is lost and whose archive the manifest knows (`adopt`).
+//! Images are made in folders of their own, as usual, and moved into their pack when all of its images are complete. So
+//! kills, shards and failures have the same effects as in any dataset, and an archive is written once. The pack of an
+//! image follows from the number of the image, the splits and the pack size.
+//!
+//! A pack is unpacked first (`store::settle`) if a byte of it was changed, or if it needs more images or other files.
+//! It is also unpacked if its record is lost and the manifest lists its archive (`adopt`).
 
 pub mod record;
 
 use crate::model::recipe::Recipe;
 use crate::model::split::Split;
 
-/// Most images of a pack: the record of one is read into memory.
+/// Maximum number of images in a pack; the record of a pack is read into memory.
 pub const MOST: u64 = 100_000;
 
-/// Which pack of a dataset.
+/// Identifier of a pack in a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Id {
-    /// The split of its images.
+    /// Split of its images.
     pub split: Split,
-    /// How many packs of that split are before it.
+    /// Number of the pack among those of its split, from 0.
     pub number: u64,
 }
 
 impl Id {
-    /// Its name, such as `train-000000`.
+    /// Returns the name, such as `train-000000`.
     pub fn name(self) -> String {
         format!("{}-{:06}", self.split.name(), self.number)
     }
 
-    /// Its archive, below the dataset's folder.
+    /// Returns the path of the archive, relative to the dataset's folder.
     pub fn path(self) -> String {
         format!("packs/{}.tar", self.name())
     }
 
-    /// Its record, below the dataset's folder.
+    /// Returns the path of the record, relative to the dataset's folder.
     pub fn seal(self) -> String {
         format!("seals/{}.json", self.name())
     }
 }
 
-/// Which images of a dataset are in which pack.
+/// Assignment of a dataset's images to packs.
 #[derive(Clone, Copy)]
 pub struct Packing<'a> {
     recipe: &'a Recipe,
-    /// Fields of a pack: all images of a field are in one.
+    /// Number of fields in a pack; all images of a field are in the same pack.
     fields: u64,
 }
 
 impl<'a> Packing<'a> {
-    /// Of a dataset; `None` where its images lie in folders.
+    /// Returns the packing of a dataset; `None` if its images are in folders.
     pub fn of(recipe: &'a Recipe) -> Option<Self> {
         Some(Self { recipe, fields: (recipe.pack? / recipe.captures()).max(1) })
     }
 
-    /// Fields of a split in a row, how many are before them, and how many fields have all splits once.
+    /// Describes the repeating pattern of splits over the fields. Returns the number of fields of `split` in one
+    /// period, the number of fields before them, and the length of the period.
     fn pattern(self, split: Split) -> [u64; 3] {
         let shares = self.recipe.split.0.map(u64::from);
         let place = split as usize;
         [shares[place], shares[..place].iter().sum(), shares.iter().sum::<u64>().max(1)]
     }
 
-    /// The pack of an image.
+    /// Returns the pack of an image.
     pub fn id(self, index: u64) -> Id {
         let (field, _) = self.recipe.field_of(index);
         let split = self.recipe.split.of(field);
@@ -76,25 +80,25 @@ impl<'a> Packing<'a> {
         Id { split, number: (field / all * share + field % all - before) / self.fields }
     }
 
-    /// Packs of a split.
+    /// Returns the number of packs of a split.
     fn count(self, split: Split) -> u64 {
         let [share, before, all] = self.pattern(split);
         let fields = self.recipe.count.div_ceil(self.recipe.captures());
         (fields / all * share + (fields % all).saturating_sub(before).min(share)).div_ceil(self.fields)
     }
 
-    /// All packs, in the order of splits and numbers.
+    /// Returns all packs, in the order of splits and numbers.
     pub fn all(self) -> impl Iterator<Item = Id> + use<'a> {
         Split::ALL.into_iter().flat_map(move |split| (0..self.count(split)).map(move |number| Id { split, number }))
     }
 
-    /// The place of a pack among all.
+    /// Returns the index of a pack among all packs.
     pub fn place(self, id: Id) -> u64 {
         Split::ALL.into_iter().take_while(|split| *split != id.split).map(|split| self.count(split)).sum::<u64>()
             + id.number
     }
 
-    /// The images of a pack, in order.
+    /// Returns the images of a pack, in order.
     pub fn images(self, id: Id) -> Vec<u64> {
         let [share, before, all] = self.pattern(id.split);
         let (captures, count) = (self.recipe.captures(), self.recipe.count);
@@ -105,7 +109,8 @@ impl<'a> Packing<'a> {
 }
 
 impl Recipe {
-    /// What the shards of a run share out, by number: fields on a day, or packs where images lie in such.
+    /// Returns the number of the work unit of an image. Units are distributed to the shards of a run: a field on one
+    /// day, or a pack if images are packed.
     pub fn unit_of(&self, index: u64) -> u64 {
         match Packing::of(self) {
             Some(packing) => packing.place(packing.id(index)),
@@ -113,7 +118,7 @@ impl Recipe {
         }
     }
 
-    /// How many of them there are.
+    /// Returns the number of work units.
     pub fn units(&self) -> u64 {
         let unpacked = || self.count.checked_sub(1).map_or(0, |last| self.growing_of(last) + 1);
         Packing::of(self).map_or_else(unpacked, |packing| packing.all().count() as u64)
@@ -125,7 +130,8 @@ mod tests {
     use super::*;
     use crate::model::split::Shares;
 
-    /// Expected: every image is in one pack, the one that lists it, of its split; packs are full but for the last of a split.
+    /// Expected: every image is in exactly one pack, which lists it and has its split; packs are full except the last
+    /// one of a split.
     #[test]
     fn every_image_is_in_one_pack() {
         for (count, shares, pack) in [(100, [8, 1, 1], 7), (33, [1, 0, 0], 10), (7, [2, 3, 1], 100), (50, [0, 1, 2], 4)]

@@ -1,6 +1,7 @@
-//! What is known of a pack: its checksum, where each file lies in it, and the checksums of its images.
+//! Record of a pack: the checksum of the archive, the position of each file in it, and the checksum records of its
+//! images.
 //!
-//! It is written last and holds a hash of itself, so a damaged record is none.
+//! The record is written last and contains a hash of itself, so a damaged record counts as missing.
 
 use super::Id;
 use crate::model::recipe::compact;
@@ -17,20 +18,20 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A pack that is there.
+/// Record of a complete pack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PackRecord {
-    /// Its name.
+    /// Name of the pack.
     pub(crate) pack: String,
-    /// Its archive.
+    /// Checksum of the archive.
     pub(crate) tar: Checksum,
-    /// Where the contents of each file begin in the archive, and their length.
+    /// Offset of the contents of each file in the archive, and their length, in bytes.
     pub(crate) members: BTreeMap<String, (u64, u64)>,
-    /// Its images in the order of their numbers.
+    /// Checksum records of its images, in the order of their numbers.
     pub(crate) images: Vec<ChecksumRecord>,
 }
 
-/// A record as it lies on disk.
+/// A record as it is stored on disk.
 #[derive(Serialize, Deserialize)]
 struct Written {
     #[serde(flatten)]
@@ -40,12 +41,12 @@ struct Written {
 }
 
 impl PackRecord {
-    /// The checksums of an image.
+    /// Returns the checksum record of an image.
     pub(crate) fn image(&self, index: u64) -> Option<&ChecksumRecord> {
         self.images.get(self.images.binary_search_by_key(&index, |image| image.index).ok()?)
     }
 
-    /// Reads a pack's record; `None` where there is none or it is damaged.
+    /// Reads the record of a pack; `None` if it is missing or damaged.
     pub(crate) fn read(folder: &Path, id: Id) -> Option<Self> {
         let bytes = input::contents(&folder.join(id.seal())).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
@@ -53,26 +54,26 @@ impl PackRecord {
         (own == written.seal_sha256 && written.record.pack == id.name()).then_some(written.record)
     }
 
-    /// Writes it: after its archive.
+    /// Writes the record, which must happen after the archive is written.
     pub(crate) fn write(&self, folder: &Path, id: Id) -> Result<()> {
         let written = Written { seal_sha256: self.hash()?, record: self.clone() };
         write_atomically(&input::below(folder, &id.seal())?, &compact(&written)?)
     }
 
-    /// SHA-256 over everything in it, hex.
+    /// Returns the SHA-256 of all fields, in hex.
     pub(crate) fn hash(&self) -> Result<String> {
         Ok(hex::encode(Sha256::digest(compact(self)?)))
     }
 }
 
-/// Most records of packs that are kept in memory: each takes some megabytes for a thousand images.
+/// Maximum number of pack records in memory: each takes some megabytes for a thousand images.
 const MOST_KEPT: usize = 32;
 
-/// The packs of one dataset, their records read when they are needed.
+/// Packs of one dataset. Their records are read when they are needed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Packs(Arc<Mutex<Known>>);
 
-/// Records that were read, and when each was last asked for, in calls.
+/// Cache of records, each with the number of the call that last used it.
 #[derive(Debug, Default)]
 struct Known {
     records: BTreeMap<Id, (u64, Arc<PackRecord>)>,
@@ -87,7 +88,7 @@ impl Known {
         Some(Arc::clone(record))
     }
 
-    /// Keeps one in the place of the one that nobody has asked for the longest.
+    /// Stores a record; in a full cache it replaces the least recently used one.
     fn keep(&mut self, id: Id, record: Arc<PackRecord>) {
         if self.records.len() >= MOST_KEPT {
             let oldest = self.records.iter().min_by_key(|(_, (last, _))| *last).map(|(id, _)| *id);
@@ -98,31 +99,31 @@ impl Known {
 }
 
 impl Packs {
-    /// A pack's record, where there is one.
+    /// Returns the record of a pack; `None` if it is missing or damaged.
     pub(crate) fn get(&self, folder: &Path, id: Id) -> Option<Arc<PackRecord>> {
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().get(id) {
             return Some(known);
         }
-        // Read without the lock: others may need other packs meanwhile.
+        // The lock is released while the file is read, since other threads may need other packs.
         let record = Arc::new(PackRecord::read(folder, id)?);
         lock().keep(id, Arc::clone(&record));
         Some(record)
     }
 
-    /// Forgets a pack that was written or taken apart.
+    /// Removes a pack from the cache after it was written or unpacked.
     pub(crate) fn forget(&self, id: Id) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).records.remove(&id);
     }
 
-    /// Length of an image's file in a pack.
+    /// Returns the length of an image's file in a pack. An error if the archive does not have its recorded length.
     pub(crate) fn length(&self, folder: &Path, id: Id, path: &str) -> io::Result<u64> {
         let (record, (_, length)) = self.member(folder, id, path)?;
         let there = std::fs::metadata(folder.join(id.path()))?.len();
         if there == record.tar.bytes { Ok(length) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
-    /// Contents of an image's file in a pack.
+    /// Returns the contents of an image's file in a pack.
     pub(crate) fn contents(&self, folder: &Path, id: Id, path: &str) -> io::Result<Vec<u8>> {
         let (record, (offset, length)) = self.member(folder, id, path)?;
         if offset.checked_add(length).is_none_or(|end| end > record.tar.bytes) {
@@ -148,7 +149,7 @@ mod tests {
     use super::*;
     use crate::model::split::Split;
 
-    /// Expected: a record comes back as it was written, and one of which a digit was changed is none.
+    /// Expected: a record is read as it was written, and counts as missing after one digit was changed.
     #[test]
     fn records_come_back_as_they_were() {
         let folder = tempfile::tempdir().unwrap();
@@ -171,7 +172,8 @@ mod tests {
         assert_eq!(PackRecord::read(folder.path(), id), None);
     }
 
-    /// Packs of three splits are read side by side. Expected: the one in use stays, however many of others come and go.
+    /// Packs of three splits are read alternately. Expected: a pack in use stays in the cache, regardless of the number
+    /// of other packs that are read.
     #[test]
     fn what_is_in_use_is_kept() {
         let folder = tempfile::tempdir().unwrap();
@@ -186,7 +188,7 @@ mod tests {
         for number in 1..=MOST_KEPT as u64 {
             assert!(packs.get(folder.path(), of(0)).is_some() && packs.get(folder.path(), of(number)).is_some());
         }
-        // What is kept needs no file.
+        // A cached record needs no file.
         std::fs::remove_dir_all(folder.path().join("seals")).unwrap();
         assert!(packs.get(folder.path(), of(0)).is_some() && packs.get(folder.path(), of(1)).is_none());
         packs.forget(of(0));

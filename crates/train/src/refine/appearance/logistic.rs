@@ -4,6 +4,7 @@
 //! that the classifier cannot overfit to errors in the labels.
 
 use furrow_base::sampling::rng::mix;
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Number of principal components used.
 pub(super) const COMPONENTS: usize = 8;
@@ -67,23 +68,22 @@ impl Examples {
         }
         let channels = self.features.len() / n;
         let scales = self.scales(channels, total);
-        let standard: Vec<f32> = self.features.iter().enumerate().map(|(i, f)| scales[i % channels].of(*f)).collect();
-        let axes = self.axes(&standard, channels, total);
-        let rows: Vec<f64> = standard
-            .chunks_exact(channels)
-            .flat_map(|row| axes.iter().map(|axis| row.iter().zip(axis).map(|(f, a)| f64::from(*f) * a).sum()))
-            .collect();
+        let axes = self.axes(&scales, total);
+        // A column for each example: 1 for the bias, then its principal components.
+        let mut rows = DMatrix::repeat(axes.ncols() + 1, n, 1.0);
+        for (mut row, features) in rows.column_iter_mut().zip(self.features.chunks_exact(channels)) {
+            row.rows_mut(1, axes.ncols()).gemv_tr(1.0, &axes, &standard(features, &scales), 0.0);
+        }
         let all: Vec<usize> = (0..n).collect();
-        let beta = self.newton(&rows, axes.len(), &all)?;
-        let weight =
-            |c: usize| axes.iter().zip(&beta[1..]).map(|(axis, b)| axis[c] * b).sum::<f64>() * scales[c].factor;
-        let weights: Vec<f64> = (0..channels).map(weight).collect();
+        let beta = self.newton(&rows, &all)?;
+        let weights = &axes * beta.rows(1, axes.ncols());
+        let weights: Vec<f64> = weights.iter().zip(&scales).map(|(w, s)| w * s.factor).collect();
         let bias = beta[0] - weights.iter().zip(&scales).map(|(w, s)| w * s.mean).sum::<f64>();
-        Some((Classifier { weights, bias }, self.told(&rows, axes.len(), pictures)))
+        Some((Classifier { weights, bias }, self.told(&rows, pictures)))
     }
 
-    /// Returns the cross-validated pseudo-R²; `rows` holds k principal components per example. See [`Self::learn`].
-    fn told(&self, rows: &[f64], k: usize, pictures: &[usize]) -> f64 {
+    /// Returns the cross-validated pseudo-R². See [`Self::learn`] for it, and [`Self::newton`] for `rows`.
+    fn told(&self, rows: &DMatrix<f64>, pictures: &[usize]) -> f64 {
         let folds = pictures.iter().max().map_or(0, |last| FOLDS.min(last + 1));
         let (mut found, mut mean, mut best) = (0.0, 0.0, 0.0);
         for fold in 0..folds {
@@ -94,10 +94,10 @@ impl Examples {
                 continue;
             }
             let usual = learnt.iter().map(|at| self.weights[*at] * self.labels[*at]).sum::<f64>() / weight;
-            let beta = self.newton(rows, k, &learnt);
+            let beta = self.newton(rows, &learnt);
             for at in held_out {
                 let (p, u) = (self.labels[at], self.weights[at]);
-                let q = beta.as_ref().map_or(usual, |beta| logistic(log_odds(beta, &rows[at * k..(at + 1) * k])));
+                let q = beta.as_ref().map_or(usual, |beta| logistic(beta.dot(&rows.column(at))));
                 found += u * likelihood(p, q);
                 mean += u * likelihood(p, usual);
                 best += u * likelihood(p, p);
@@ -123,59 +123,59 @@ impl Examples {
         sums.into_iter().map(scale).collect()
     }
 
-    /// Returns up to [`COMPONENTS`] directions of largest variance, scaled so that the variance of the examples along each is 1.
-    /// Computed by subspace iteration (Golub & Van Loan 2013, section 8.2.4). There are fewer if the examples have a lower rank.
-    fn axes(&self, standard: &[f32], channels: usize, total: f64) -> Vec<Vec<f64>> {
+    /// Returns up to [`COMPONENTS`] directions of largest variance as columns, scaled so that the variance of the examples along each
+    /// is 1. Computed by subspace iteration (Golub & Van Loan 2013, section 8.2.4). There are fewer if the examples have a lower rank.
+    fn axes(&self, scales: &[Scale], total: f64) -> DMatrix<f64> {
+        let channels = scales.len();
+        // Only the lower triangle.
+        let mut covariance = DMatrix::zeros(channels, channels);
+        for (features, u) in self.features.chunks_exact(channels).zip(&self.weights) {
+            let row = standard(features, scales);
+            covariance.syger(u / total, &row, &row, 1.0);
+        }
         let random = |i: usize| (mix(i as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-        let mut axes: Vec<Vec<f64>> =
-            (0..COMPONENTS.min(channels)).map(|k| (0..channels).map(|c| random(k * channels + c)).collect()).collect();
+        let mut axes = DMatrix::from_fn(channels, COMPONENTS.min(channels), |c, k| random(k * channels + c));
         let mut variances = Vec::new();
         for _ in 0..ROUNDS {
-            let mut next = vec![vec![0.0; channels]; axes.len()];
-            for (row, u) in standard.chunks_exact(channels).zip(&self.weights) {
-                for (axis, next) in axes.iter().zip(&mut next) {
-                    let along: f64 = row.iter().zip(axis).map(|(f, a)| f64::from(*f) * a).sum();
-                    next.iter_mut().zip(row).for_each(|(sum, f)| *sum += u / total * along * f64::from(*f));
-                }
+            let mut next = axes.clone();
+            // Not as one product of matrices, whose bits would depend on the processor.
+            for (axis, mut next) in axes.column_iter().zip(next.column_iter_mut()) {
+                next.sygemv(1.0, &covariance, &axis, 0.0);
             }
-            (axes, variances) = orthonormal(next);
+            let (orthonormal, r) = next.qr().unpack();
+            // Without directions that depend linearly on earlier ones.
+            let kept: Vec<usize> =
+                (0..r.ncols()).filter(|k| r[(*k, *k)] > 1e-9 * r.column(*k).norm().max(1e-9)).collect();
+            variances = kept.iter().map(|k| r[(*k, *k)]).collect();
+            axes = orthonormal.select_columns(&kept);
         }
-        let scaled = |(axis, variance): (Vec<f64>, &f64)| axis.into_iter().map(|a| a / variance.sqrt()).collect();
-        axes.into_iter().zip(&variances).map(scaled).collect()
+        axes.column_iter_mut().zip(&variances).for_each(|(mut axis, variance)| axis /= variance.sqrt());
+        axes
     }
 
-    /// Fits bias and coefficients to the examples with the indices `some` by Newton's method; `rows` holds k components per
-    /// example. Returns `None` if the Hessian is singular or the result is not finite.
-    fn newton(&self, rows: &[f64], k: usize, some: &[usize]) -> Option<Vec<f64>> {
+    /// Fits bias and coefficients to the examples with the indices `some` by Newton's method. A column of `rows` holds 1 and the
+    /// components of an example. Returns `None` if the Hessian is singular or the result is not finite.
+    fn newton(&self, rows: &DMatrix<f64>, some: &[usize]) -> Option<DVector<f64>> {
         let scale = some.len() as f64 / some.iter().map(|at| self.weights[*at]).sum::<f64>();
-        let mut beta = vec![0.0; k + 1];
+        let penalty = DMatrix::from_fn(rows.nrows(), rows.nrows(), |i, j| f64::from(u8::from(i == j && i > 0)));
+        let mut beta = DVector::zeros(rows.nrows());
         for _ in 0..STEPS {
-            let mut gradient: Vec<f64> = std::iter::once(0.0).chain(beta[1..].iter().copied()).collect();
-            let mut hessian = vec![vec![0.0; k + 1]; k + 1];
-            (1..=k).for_each(|i| hessian[i][i] = 1.0);
+            // Only the lower triangle of the Hessian.
+            let (mut gradient, mut hessian) = (&penalty * &beta, penalty.clone());
             for &at in some {
-                let (p, u, row) = (self.labels[at], self.weights[at], &rows[at * k..(at + 1) * k]);
-                let x = |i: usize| if i == 0 { 1.0 } else { row[i - 1] };
-                let q = logistic(log_odds(&beta, row));
-                let (first, second) = (scale * u * (q - p), scale * u * (q * (1.0 - q)).max(1e-12));
-                for i in 0..=k {
-                    gradient[i] += first * x(i);
-                    (0..=i).for_each(|j| hessian[i][j] += second * x(i) * x(j));
-                }
+                let (p, u, x) = (self.labels[at], self.weights[at], rows.column(at));
+                let q = logistic(beta.dot(&x));
+                gradient.axpy(scale * u * (q - p), &x, 1.0);
+                hessian.syger(scale * u * (q * (1.0 - q)).max(1e-12), &x, &x, 1.0);
             }
-            let step = solve(hessian, gradient)?;
-            beta.iter_mut().zip(&step).for_each(|(b, s)| *b -= s);
+            let step = Cholesky::new(hessian)?.solve(&gradient);
+            beta -= &step;
             if step.iter().all(|s| s.abs() < CLOSE) {
                 break;
             }
         }
         beta.iter().all(|b| b.is_finite()).then_some(beta)
     }
-}
-
-/// Returns `beta[0]` (the bias) plus the dot product of the other coefficients and the components `row`.
-fn log_odds(beta: &[f64], row: &[f64]) -> f64 {
-    beta[0] + beta[1..].iter().zip(row).map(|(b, y)| b * y).sum::<f64>()
 }
 
 fn logistic(odds: f64) -> f64 {
@@ -200,46 +200,9 @@ impl Scale {
     }
 }
 
-/// Orthonormalizes vectors by modified Gram–Schmidt. Returns the orthonormal vectors and the length of each before normalization; vectors
-/// that depend linearly on earlier ones are dropped.
-fn orthonormal(vectors: Vec<Vec<f64>>) -> (Vec<Vec<f64>>, Vec<f64>) {
-    let (mut done, mut lengths): (Vec<Vec<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
-    for mut vector in vectors {
-        let before = length(&vector);
-        for other in &done {
-            let along: f64 = vector.iter().zip(other).map(|(a, b)| a * b).sum();
-            vector.iter_mut().zip(other).for_each(|(a, b)| *a -= along * b);
-        }
-        let left = length(&vector);
-        if left > 1e-9 * before.max(1e-9) {
-            done.push(vector.into_iter().map(|a| a / left).collect());
-            lengths.push(left);
-        }
-    }
-    (done, lengths)
-}
-
-fn length(vector: &[f64]) -> f64 {
-    vector.iter().map(|a| a * a).sum::<f64>().sqrt()
-}
-
-/// Solves the symmetric positive definite system `a` x = `b` by Cholesky factorization; only the lower triangle of `a` is read. Returns
-/// `None` if `a` is not positive definite.
-fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
-    let n = b.len();
-    for i in 0..n {
-        for j in 0..=i {
-            let rest = a[i][j] - (0..j).map(|k| a[i][k] * a[j][k]).sum::<f64>();
-            a[i][j] = if i == j { Some(rest).filter(|r| *r > 0.0)?.sqrt() } else { rest / a[j][j] };
-        }
-    }
-    for i in 0..n {
-        b[i] = (b[i] - (0..i).map(|k| a[i][k] * b[k]).sum::<f64>()) / a[i][i];
-    }
-    for i in (0..n).rev() {
-        b[i] = (b[i] - (i + 1..n).map(|k| a[k][i] * b[k]).sum::<f64>()) / a[i][i];
-    }
-    Some(b)
+/// Returns features scaled to mean 0 and variance 1.
+fn standard(features: &[f32], scales: &[Scale]) -> DVector<f64> {
+    DVector::from_iterator(scales.len(), features.iter().zip(scales).map(|(f, s)| f64::from(s.of(*f))))
 }
 
 #[cfg(test)]
@@ -304,13 +267,5 @@ mod tests {
         assert!(few.classifier().is_none());
         assert!(Examples { weights: vec![0.0; 20], ..flat }.classifier().is_none());
         assert!(Examples::default().classifier().is_none());
-    }
-
-    /// Expected: 2 x + y = 4 and x + 3 y = 7 are solved by (1, 2); a matrix that is not positive definite gives `None`. Source: arithmetic.
-    #[test]
-    fn symmetric_systems_are_solved() {
-        let solved = solve(vec![vec![2.0, 0.0], vec![1.0, 3.0]], vec![4.0, 7.0]).unwrap();
-        assert!((solved[0] - 1.0).abs() < 1e-12 && (solved[1] - 2.0).abs() < 1e-12, "{solved:?}");
-        assert!(solve(vec![vec![1.0, 0.0], vec![2.0, 1.0]], vec![1.0, 1.0]).is_none());
     }
 }

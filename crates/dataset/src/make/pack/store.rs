@@ -1,8 +1,9 @@
-//! Puts images into their packs, and takes packs apart.
+//! Moves images into packs, and unpacks them.
 
 use crate::File;
+use crate::make::pack::adopt::adopt;
 use crate::make::push::Unit;
-use crate::pack::adopt::adopt;
+use crate::make::task::{Task, remaining};
 use crate::read::archive::{BLOCK, append, entry_name};
 use crate::read::checksum_record::{ChecksumRecord, write_files};
 use crate::read::native;
@@ -10,7 +11,6 @@ use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::packs::record::PackRecord;
 use crate::read::set::{Set, Whole};
-use crate::read::task::{Task, remaining};
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
 use furrow_output::{is_unfinished, remove_unfinished_in};
@@ -20,8 +20,8 @@ use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Whether a pack is there and holds what its dataset asks for, down to each byte. One that does not is taken apart: its images that are
-/// whole lie in folders of their own then.
+/// Returns whether a pack is complete and all its bytes agree with the checksums. Any other pack is unpacked: its
+/// intact images are then in folders of their own.
 pub(crate) fn settle(set: &Set, id: Id) -> Result<bool> {
     let Set { folder, packs, .. } = set;
     packs.forget(id);
@@ -34,10 +34,10 @@ pub(crate) fn settle(set: &Set, id: Id) -> Result<bool> {
             return Ok(true);
         }
         return Err(Error::misuse(format!(
-            "{} was pushed and removed here, and is to hold other images or formats now",
+            "{} was pushed and removed here, but now needs other images or formats",
             id.name()
         ))
-        .help("bring it back, or make what is to be added as a dataset of its own")
+        .help("restore it, or make the additional images or formats as a separate dataset")
         .in_file(folder));
     }
     if is_complete(set, id, &record)?
@@ -51,7 +51,7 @@ pub(crate) fn settle(set: &Set, id: Id) -> Result<bool> {
     Ok(false)
 }
 
-/// Puts the images of a pack into it where all are there, also those that were added since it was written.
+/// Moves the images of a pack into it if all are complete, including those added since the pack was written.
 pub(crate) fn ensure(set: &Set, id: Id) -> Result<()> {
     if let Some(record) = set.packs.get(&set.folder, id)
         && !is_complete(set, id, &record)?
@@ -61,7 +61,8 @@ pub(crate) fn ensure(set: &Set, id: Id) -> Result<()> {
     close(set, id)
 }
 
-/// Archives that are missing or have another length than their records say, each with what is wrong with it: what is seen without reading them.
+/// Returns the archives that are missing or do not have their recorded length, each with a description. The archives
+/// are not read.
 pub(crate) fn cut_short(set: &Set) -> BTreeMap<Id, String> {
     let all: Vec<Id> = Packing::of(&set.recipe).map(|packing| packing.all().collect()).unwrap_or_default();
     let fault = |id: &Id| {
@@ -72,13 +73,13 @@ pub(crate) fn cut_short(set: &Set) -> BTreeMap<Id, String> {
     all.par_iter().filter_map(fault).collect()
 }
 
-/// Whether an image lies in one of these packs and in no folder.
+/// Returns whether an image is in one of these packs and has no checksum record of its own.
 pub(crate) fn lies_in(set: &Set, packs: &BTreeMap<Id, String>, index: u64) -> bool {
     Packing::of(&set.recipe).is_some_and(|packing| packs.contains_key(&packing.id(index)))
         && !ChecksumRecord::path(&set.folder, index).is_file()
 }
 
-/// Whether a record tells of all images that a pack is to hold, with all their files.
+/// Returns whether a record lists all images of its pack, with all their files.
 fn is_complete(set: &Set, id: Id, record: &PackRecord) -> Result<bool> {
     let Some(packing) = Packing::of(&set.recipe) else { return Ok(false) };
     let wanted = packing.images(id);
@@ -93,10 +94,11 @@ fn is_complete(set: &Set, id: Id, record: &PackRecord) -> Result<bool> {
     Ok(true)
 }
 
-/// Puts the images of a pack into it where all are there, and clears their folders. Does nothing where some are missing.
+/// Moves the images of a pack into it, and deletes their folders, if all images are complete. Does nothing if some are
+/// missing.
 pub(crate) fn close(set: &Set, id: Id) -> Result<()> {
     match written(set, id) {
-        // Another run may have put them there meanwhile, and removed their folders.
+        // Another run may have packed them in the meantime, and deleted their folders.
         Err(e) if e.is_not_found() => {
             set.packs.forget(id);
             match set.packs.get(&set.folder, id) {
@@ -116,7 +118,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
         match ChecksumRecord::read(folder, index) {
             Some(image) if remaining(set, &image)? == Task::Done => images.push(image),
             _ => {
-                // Of a pack that is there already, what a killed run has left.
+                // If the pack exists already, a killed run may have left some of its folders.
                 return match packs.get(folder, id) {
                     Some(record) if is_complete(set, id, &record)? => clear(folder, &record),
                     _ => Ok(()),
@@ -145,18 +147,19 @@ fn written(set: &Set, id: Id) -> Result<()> {
     clear(folder, &record)
 }
 
-/// Removes the files of images that a pack holds, and their folders. A folder stays in which something else lies: that is the user's.
+/// Deletes the files of images that are in a pack, and their folders. A folder that contains other files stays, since
+/// these belong to the user.
 pub(crate) fn clear(folder: &Path, record: &PackRecord) -> Result<()> {
     for image in &record.images {
-        // First what says that it is whole.
+        // The record that marks the image as complete goes first.
         remove(&below(folder, &ChecksumRecord::path_below(image.index))?)?;
         clear_image(folder, image)?;
     }
     Ok(())
 }
 
-/// Removes the files of an image from its folder, with what killed runs have left of such, and the folder where nothing else lies in it. Another run
-/// may be writing there just now: what that one makes is in the pack already.
+/// Deletes the files of an image from its folder, including unfinished files of killed runs, and deletes the folder if
+/// it is empty then. Another run may be writing to the folder at the same time; its image is in the pack already.
 fn clear_image(folder: &Path, image: &ChecksumRecord) -> Result<()> {
     let own = below(folder, &native::folder(&Set::name(image.index)))?;
     for _ in 0..TRIES {
@@ -179,15 +182,17 @@ fn clear_image(folder: &Path, image: &ChecksumRecord) -> Result<()> {
             _ => return Ok(()),
         }
     }
-    // Whoever writes there clears it away when its own pack is closed.
+    // The run that writes there deletes the folder when it closes the pack.
     Ok(())
 }
 
-/// How often a folder is cleared that fills again, and how long is waited in between.
+/// Number of attempts to delete a folder that another run fills again.
 const TRIES: u32 = 50;
+/// Pause between these attempts.
 const PAUSE: std::time::Duration = std::time::Duration::from_millis(20);
 
-/// Whether all that lies in the folder of an image is the user's: nothing of the image, and nothing that is unfinished.
+/// Returns whether the folder of an image contains only user files: some files, but none of the image and none that is
+/// unfinished.
 fn is_users(own: &Path, image: &ChecksumRecord) -> bool {
     let entries = std::fs::read_dir(own).into_iter().flatten();
     let names: Vec<OsString> = entries.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
@@ -203,7 +208,7 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Takes a pack apart: what is whole of it lies in folders again.
+/// Unpacks a pack: its intact images are then in folders.
 fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
     let Set { folder, packs, .. } = set;
     for image in &record.images {
@@ -215,14 +220,14 @@ fn take_apart(set: &Set, id: Id, record: &PackRecord) -> Result<()> {
             let bytes = packs.contents(folder, id, path).ok()?;
             sum.is_of(&bytes).then(|| File { path: path.clone(), bytes })
         });
-        // An image of which a byte was changed is made again.
+        // An image with a changed byte is left out and so made again.
         if let Some(files) = whole.collect::<Option<Vec<File>>>() {
             write_files(folder, &files)?;
             image.write(folder)?;
         }
     }
     packs.forget(id);
-    // First what says that it is whole.
+    // The record that marks the pack as complete goes first.
     for path in [id.seal(), id.path()] {
         remove(&below(folder, &path)?)?;
     }

@@ -1,4 +1,4 @@
-//! Takes an archive apart whose record is lost.
+//! Unpacks an archive whose record is lost.
 
 use crate::File;
 use crate::model::recipe::{MANIFEST, Recipe};
@@ -13,15 +13,15 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// The part of a manifest that tells what an archive is.
+/// Part of a manifest that identifies an archive.
 #[derive(Deserialize)]
 struct Listed {
     recipe: Recipe,
     files: BTreeMap<String, Checksum>,
 }
 
-/// Puts the images of an archive into folders of their own where its record is lost or damaged and the manifest says that it is as it was: they
-/// need not be made again then, their formats alone. Does nothing otherwise.
+/// Unpacks the images of an archive into folders if its record is lost or damaged, and the manifest has its current
+/// checksum. Then only the formats of the images need to be made again. Does nothing otherwise.
 pub(crate) fn adopt(set: &Set, id: Id) -> Result<()> {
     let path = set.folder.join(id.path());
     if !path.is_file() || !is_known(set, id)? {
@@ -31,7 +31,7 @@ pub(crate) fn adopt(set: &Set, id: Id) -> Result<()> {
     let mut images: BTreeMap<u64, Vec<File>> = BTreeMap::new();
     for entry in archive.entries().map_err(Error::io(&path))? {
         let mut entry = entry.map_err(Error::io(&path))?;
-        // Packs hold plain files alone. One with holes tells its own length, which may be beyond all memory.
+        // Packs contain regular files only. A sparse entry states its own length, which may exceed the memory.
         if !entry.header().entry_type().is_file() {
             continue;
         }
@@ -42,7 +42,7 @@ pub(crate) fn adopt(set: &Set, id: Id) -> Result<()> {
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).map_err(Error::io(&path))?;
         let file = File { path: format!("{}/{file}", native::folder(&Set::name(index))), bytes };
-        // An image's files stand together.
+        // The files of an image are consecutive.
         if !images.contains_key(&index) {
             std::mem::take(&mut images).into_iter().try_for_each(|(index, files)| put(set, index, &files))?;
         }
@@ -51,7 +51,7 @@ pub(crate) fn adopt(set: &Set, id: Id) -> Result<()> {
     images.into_iter().try_for_each(|(index, files)| put(set, index, &files))
 }
 
-/// An image in its folder, unless it is there.
+/// Writes an image into its folder, unless it is complete there.
 fn put(set: &Set, index: u64, files: &[File]) -> Result<()> {
     if ChecksumRecord::read(&set.folder, index).is_some() {
         return Ok(());
@@ -60,7 +60,7 @@ fn put(set: &Set, index: u64, files: &[File]) -> Result<()> {
     ChecksumRecord::of(index, &set.recipe, files)?.write(&set.folder)
 }
 
-/// Whether an archive is the one that the manifest lists, of the same images.
+/// Returns whether the manifest lists an archive with its current checksum, and has the same recipe.
 fn is_known(set: &Set, id: Id) -> Result<bool> {
     let manifest = input::contents(&set.folder.join(MANIFEST)).ok();
     let Some(listed) = manifest.and_then(|bytes| serde_json::from_slice::<Listed>(&bytes).ok()) else {

@@ -1,6 +1,7 @@
 //! Records of a field that are written beside its images: species that the scene file can place, and conditions drawn for the field.
 
-use super::assemble::{Lighting, Season};
+use super::lighting::Lighting;
+use super::season::Season;
 use furrow_grow::scatter::{RowsRecord, WeedsRecord};
 use furrow_grow::soil::SoilRecord;
 use furrow_optics::light::LightRecord;

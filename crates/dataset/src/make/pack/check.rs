@@ -1,30 +1,30 @@
-//! What a dataset in packs cannot have, and who cannot read it.
+//! Checks of packs: combinations that a dataset in packs cannot have, and readers that need image folders.
 
 use crate::format;
 use crate::model::recipe::{FILE, Recipe};
 use furrow_base::{Error, Result};
 use std::path::Path;
 
-/// An error where a dataset cannot have the packs that its recipe asks for.
+/// Returns an error if a dataset cannot have the packs that its recipe asks for.
 pub fn check(recipe: &Recipe) -> Result<()> {
     let Some(images) = recipe.pack else { return Ok(()) };
     let captures = recipe.captures();
     if !images.is_multiple_of(captures) || images == 0 {
         let near = (images / captures).max(1) * captures;
-        return Err(Error::misuse(format!("--pack {images} would cut fields of {captures} images each"))
+        return Err(Error::misuse(format!("--pack {images} would cut fields of {captures} images"))
             .help(format!("give a multiple of {captures}, such as --pack {near}")));
     }
     match format::all(recipe)?.into_iter().find(|(_, format)| format.names_photographs()) {
         None => Ok(()),
         Some((name, _)) => {
             Err(Error::misuse(format!("--format {name} names the files in images/, which --pack puts into archives"))
-                .help(format!("leave --pack or --format {name} out")))
+                .help(format!("omit --pack or --format {name}")))
         }
     }
 }
 
-/// An error where a path is a dataset in packs, its folder of archives or one of them, for what reads pictures from folders; also where it is its folder
-/// of images: what is left in there is the user's.
+/// Returns an error if `path` is a dataset in packs, its folder of archives or one of these, for readers that need
+/// image folders. The folder `images` of such a dataset is refused as well, since it contains only user files.
 pub fn refuse_archives(path: &Path) -> Result<()> {
     let is_archive = path.extension().is_some_and(|ending| ending == "tar");
     let within = if is_archive { path.parent() } else { Some(path) };
@@ -33,10 +33,10 @@ pub fn refuse_archives(path: &Path) -> Result<()> {
         |dir: &&Path| dir.join(FILE).is_file() && Recipe::read(dir).is_ok_and(|recipe| recipe.pack.is_some());
     match above.into_iter().chain([path]).find(is_packed) {
         None => Ok(()),
-        Some(dir) => Err(Error::misuse("the images of this dataset lie in archives, and this reads folders")
+        Some(dir) => Err(Error::misuse("the images of this dataset are in archives, and this command reads folders")
             .in_file(dir)
             .help(format!(
-                "unpack them with GNU tar and name `unpacked`: mkdir -p unpacked/images && for pack in \"{}\"/packs/*.tar; do tar -xf \"$pack\" \
+                "unpack them with GNU tar and give `unpacked`: mkdir -p unpacked/images && for pack in \"{}\"/packs/*.tar; do tar -xf \"$pack\" \
                  -C unpacked/images --transform 's|[.]|/|'; done",
                 dir.display()
             ))),

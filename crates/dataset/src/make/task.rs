@@ -1,22 +1,22 @@
-//! What remains to be done for an image: found by looking at the disk.
+//! Remaining work of an image, determined from the files on disk.
 
 use crate::format;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::set::Set;
 use furrow_base::Result;
 
-/// What remains to be done for an image.
+/// Remaining work of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Task {
-    /// Nothing.
+    /// None.
     Done,
-    /// Formats, from the native files.
+    /// Write the formats, from the native files.
     Formats,
-    /// Everything.
+    /// Make the native files and the formats.
     All,
 }
 
-/// What remains to be done for an image, from what lies on the disk.
+/// Determines the remaining work of an image. All its files are compared with their checksums.
 pub(crate) fn task(set: &Set, index: u64) -> Result<Task> {
     let Some(checksums) = set.checksums(index) else { return Ok(Task::All) };
     let task = remaining(set, &checksums)?;
@@ -31,12 +31,13 @@ pub(crate) fn task(set: &Set, index: u64) -> Result<Task> {
     if broken.iter().any(lost) {
         return Ok(Task::All);
     }
-    // A format that is no longer wanted may be damaged.
+    // Damage to a format that is no longer requested does not matter.
     let wanted = |(path, _): &(String, String)| formats.iter().any(|(name, _)| in_format(path, name));
     Ok(if broken.iter().any(wanted) { Task::Formats } else { task })
 }
 
-/// What remains to be done of an image whose checksums are there, whatever has become of its files: it may be of another recipe, or lack a format.
+/// Determines the remaining work of an image from its checksum record alone, without reading the files: the record may
+/// belong to another recipe, or lack a format.
 pub(crate) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     if checksums.recipe != set.recipe.fingerprint()? {
         return Ok(Task::All);
@@ -54,7 +55,7 @@ pub(crate) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     Ok(task)
 }
 
-/// Whether a path lies in the folder of a format.
+/// Returns whether a path is in the folder of a format.
 pub(crate) fn in_format(path: &str, format: &str) -> bool {
     path.strip_prefix(format).is_some_and(|rest| rest.starts_with('/'))
 }

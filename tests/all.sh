@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change is merged: format, lints, documentation, all tests with all features. Installs what the
+# tests compare with (tests/peers.sh). Runs in a fresh clone, as root or as a user who may sudo, and asks nothing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bash tests/peers.sh
+cargo fmt --check
+cargo clippy --workspace --all-targets -- -D warnings
+cargo clippy --workspace --all-targets --features system-tests,train,raster -- -D warnings
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features train,raster
+FURROW_REQUIRE_PEERS=1 cargo test --workspace --features system-tests,train,raster
