@@ -376,7 +376,7 @@ fn runs_of_one_folder_answer_together() {
     std::fs::remove_file(runs.join("seed-3").join(run::MODEL)).unwrap();
     std::fs::copy(RGB.join(run::PLAN), runs.join("seed-3").join(run::PLAN)).unwrap();
     let words = fail(train(&arguments), 2);
-    assert!(words.contains("seed-3") && words.contains("not done"), "{words}");
+    assert!(words.contains("seed-3") && words.contains("not complete"), "{words}");
 }
 
 /// Rationale: users who store a dataset in packs should not have to unpack all of it to predict some images. Expected:

@@ -287,7 +287,7 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     fs::copy(two.join(run::WEIGHTS), three.join(run::WEIGHTS)).unwrap();
     let eval = |run: &Path| train(&format!("eval {} --set {} --threads 1", run.display(), set.display()));
     let error = refuse(&mut eval(&three), 2);
-    assert!(error.contains("not the weights that model.json beside them is about"), "{error}");
+    assert!(error.contains("not the weights that model.json"), "{error}");
     let error =
         refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
     assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");

@@ -294,7 +294,10 @@ fn nothing_is_drawn_where_it_cannot_be_written() {
         let taken = folder.path().join(name);
         std::fs::create_dir(&taken).unwrap();
         let error = draw::write(&recipe).unwrap_err();
-        assert!(error.exit_code() == 2 && error.to_string().contains(&format!("{name}: this is no file")), "{error}");
+        assert!(
+            error.exit_code() == 2 && error.to_string().contains(&format!("{name}: this is not a file")),
+            "{error}"
+        );
         std::fs::remove_dir(&taken).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "{name}: files were written");
     }
