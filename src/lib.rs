@@ -34,7 +34,7 @@
 //! | [`prelude`] | what most programs need |
 //! | [`job`] | from a scene file to an image: build, render, label, develop, write |
 //! | [`settings`] | engine, quality, techniques |
-//! | [`dataset`] | many images with all labels, in other tools' formats; resumable, in shards |
+//! | [`dataset`] | many images with all labels, in other tools' formats; resumable, in shards (feature `datasets`) |
 //! | [`scene_format`] | every field of scene files and species files |
 //! | [`film`] | mean and variance of each pixel |
 //! | `train` | networks: training, evaluation, prediction (feature `train`) |
@@ -70,7 +70,9 @@ pub mod prelude;
 pub mod scene_format;
 
 pub use furrow_base::error::{self, Error, Result};
+#[cfg(feature = "datasets")]
+pub use furrow_dataset as dataset;
+pub use furrow_job as job;
 pub use furrow_render::{film, settings};
 #[cfg(feature = "train")]
 pub use furrow_train as train;
-pub use {furrow_dataset as dataset, furrow_job as job};

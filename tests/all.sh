@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 bash tests/peers.sh
 cargo fmt --check
-cargo clippy --workspace --all-targets -- -D warnings
+cargo clippy --no-default-features -- -D warnings
 cargo clippy --workspace --all-targets --features system-tests,train,raster -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features train,raster
 FURROW_REQUIRE_PEERS=1 cargo test --workspace --features system-tests,train,raster

@@ -13,6 +13,7 @@ use furrow_grow::soil::SoilDesc;
 use furrow_optics::light::LightDesc;
 use furrow_optics::sensor::{CameraDesc, LidarDesc, SensorDesc};
 use furrow_render::material::LeafDesc;
+use std::collections::BTreeSet;
 
 /// Pages that the program generates from its own types and command line; links to them are valid before they exist.
 const GENERATED: [&str; 6] = ["scene", "species", "texture", "experiment", "trace", "train"];
@@ -111,32 +112,6 @@ fn every_figure_is_embedded_and_that_of_the_crates_is_complete() {
     for entry in std::fs::read_dir(root().join("crates")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         assert!(figure.contains(&format!(">furrow-{name}<")), "furrow-{name} is missing: run docs/figures/make.py");
-    }
-}
-
-/// Expected: readers who search README or docs for a standard term of rendering or training find it.
-#[test]
-fn standard_terms_are_found() {
-    let text = documents().iter().map(|file| read(file)).collect::<String>().to_lowercase();
-    for term in [
-        "russian roulette",
-        "loss",
-        "training set",
-        "validation",
-        "normalization",
-        "environment map",
-        "ambient occlusion",
-        "class weights",
-        "threshold",
-        "oversampling",
-        "checksum",
-        "prediction",
-        "trainer",
-        "linear blend skinning",
-        "phyllotaxis",
-        "bootstrap",
-    ] {
-        assert!(text.contains(term), "`{term}` occurs in no page");
     }
 }
 
@@ -279,13 +254,13 @@ fn every_piece_of_ron_is_what_it_says() {
 /// each, so that it is parsed but not run.
 #[test]
 fn every_command_is_taken_by_its_program() {
-    let mut checked = 0;
+    let mut checked = BTreeSet::new();
     for page in documents() {
         for block in blocks(&read(&page)).into_iter().filter(|block| block.language == "sh") {
             for command in commands(&block) {
                 // The README passes the arguments of its first line to the program through `cargo run`.
                 let command = command
-                    .split_once("cargo run --release -- ")
+                    .split_once("cargo run --release --no-default-features -- ")
                     .map_or(command.clone(), |(_, rest)| format!("trace {rest}"));
                 let Some(program) = program(&command) else { continue };
                 if program == "train" && !cfg!(feature = "train") {
@@ -293,14 +268,15 @@ fn every_command_is_taken_by_its_program() {
                 }
                 // Only the part before a pipe is ours.
                 let own = command.split(" | ").next().unwrap_or_default().replace("target/release/", "");
-                let output = shell(&format!("{own} --help"), root());
-                let words = String::from_utf8_lossy(&output.stderr);
-                assert!(output.status.success(), "{page}: {command}: {words}");
-                checked += 1;
+                if checked.insert(own.clone()) {
+                    let output = shell(&format!("{own} --help"), root());
+                    let words = String::from_utf8_lossy(&output.stderr);
+                    assert!(output.status.success(), "{page}: {command}: {words}");
+                }
             }
         }
     }
-    assert!(checked > 40, "{checked}");
+    assert!(checked.len() > 40, "{checked:?}");
     let wrong = format!("trace --scene {SMALL} --sp 3 --help");
     assert!(!shell(&wrong, root()).status.success(), "the check must be able to fail");
 }

@@ -1,6 +1,8 @@
 //! Progress display while a field is built, before its first sample: one line on a terminal, or an occasional line in a
 //! log.
 
+#![cfg_attr(not(feature = "datasets"), allow(dead_code, reason = "only datasets log their steps"))]
+
 use furrow_field::assemble::BuildProgress;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt;

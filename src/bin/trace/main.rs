@@ -2,10 +2,15 @@
 
 #![warn(clippy::print_stderr)]
 
+#[cfg(feature = "datasets")]
 mod ablate;
 mod catalogue;
+#[cfg(feature = "datasets")]
 mod compare;
+#[cfg(feature = "datasets")]
 mod dataset;
+#[cfg(feature = "datasets")]
+mod datasets;
 #[cfg(feature = "raster")]
 mod display;
 mod explain;
@@ -14,6 +19,8 @@ mod field;
 mod growing;
 mod init;
 mod leaf;
+#[cfg(not(all(feature = "datasets", feature = "watch")))]
+mod left_out;
 mod letters;
 mod list;
 mod pages;
@@ -21,10 +28,14 @@ mod preview;
 mod quality;
 mod render;
 mod scan;
+#[cfg(feature = "datasets")]
 mod sequence;
+#[cfg(feature = "datasets")]
 mod stream;
 mod texture;
+#[cfg(feature = "datasets")]
 mod variants;
+#[cfg(feature = "watch")]
 mod watch;
 
 use clap::{Parser, Subcommand};
@@ -91,24 +102,19 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 enum Verb {
     /// Render every species at every growth stage, with scale bars.
     Catalogue(catalogue::Args),
-    /// Measure differences between images, or the gap between a real and a synthetic set.
-    Compare(compare::Args),
-    /// Render many fields with all labels, in the formats of other tools.
-    Dataset(Box<dataset::Cli>),
-    /// Write images with their labels to stdout as they are rendered, as a tar archive for another program.
-    Stream(Box<stream::Args>),
-    /// Drive through a field, or return to it on several days, and render all images of its cameras with poses, optical
-    /// flow and tracks.
-    Sequence(Box<sequence::Args>),
-    /// Render a dataset, and the same dataset with one change at a time, to measure what each change means to a
-    /// network.
-    Ablate(Box<ablate::Args>),
+    #[cfg(feature = "datasets")]
+    #[command(flatten)]
+    Datasets(datasets::Verb),
     /// Scan a field with a rotating LiDAR: points with ranges, intensities and labels.
     Scan(scan::Args),
     /// Export a field as a scene of another program.
     Export(export::Args),
     /// Render several fields of a scene file on one sheet, each with its index.
     Preview(Box<preview::Args>),
+    #[cfg(not(all(feature = "datasets", feature = "watch")))]
+    #[command(flatten)]
+    LeftOut(left_out::Verb),
+    #[cfg(feature = "watch")]
     /// Show a scene file's field on a local web page, rendered again whenever the file is saved.
     Watch(Box<watch::Args>),
     /// Generate textures from their recipes; images are written next to the recipes.
@@ -141,11 +147,10 @@ fn main() -> ExitCode {
     };
     let done = match cli.verb {
         Some(Verb::Catalogue(args)) => catalogue::run(&args, &signals),
-        Some(Verb::Compare(args)) => compare::run(&args),
-        Some(Verb::Dataset(args)) => dataset::run(&args, &signals),
-        Some(Verb::Ablate(args)) => ablate::run(&args, &signals),
-        Some(Verb::Sequence(args)) => sequence::run(&args, &signals),
-        Some(Verb::Stream(args)) => stream::run(&args, &signals),
+        #[cfg(feature = "datasets")]
+        Some(Verb::Datasets(verb)) => datasets::run(&verb, &signals),
+        #[cfg(not(all(feature = "datasets", feature = "watch")))]
+        Some(Verb::LeftOut(verb)) => left_out::run(&verb),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Scan(args)) => scan::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),
@@ -157,6 +162,7 @@ fn main() -> ExitCode {
         Some(Verb::Cameras) => list::cameras(),
         Some(Verb::Soils) => list::soils(),
         Some(Verb::Preview(args)) => preview::run(&args, &signals),
+        #[cfg(feature = "watch")]
         Some(Verb::Watch(args)) => watch::run(&args, &signals),
         None => render::run(&cli.render, &signals),
     };
