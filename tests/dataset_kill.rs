@@ -53,9 +53,9 @@ fn killed_twenty_times_it_ends_as_if_never_killed() {
 #[test]
 fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     const COUNT: u64 = 3;
-    let scene = "tests/data/dataset/scene/field.ron";
     let make = |data: &Path| {
-        let mut command = trace(&["dataset", "--scene", scene, "--quiet", "--out", path(data), "--spp", "1"]);
+        let mut command =
+            trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(data), "--spp", "1", "--width", "32"]);
         command.args(["--count", &COUNT.to_string(), "--format", "imagefolder,coco", "--threads", "2"]);
         command
     };
@@ -65,7 +65,7 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     let once = begin.elapsed();
     let whole = tree(&whole);
     let mut next = moments();
-    for pair in 0..20 {
+    for pair in 0..16 {
         let (_keep, data) = scratch();
         let start = || make(&data).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program");
         let first = start();

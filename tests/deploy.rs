@@ -100,13 +100,15 @@ const KINDS: [(Network, &str, NormalizationMode); 6] = [
 fn exported_networks_compute_what_ours_do() {
     let onnx_python = python("import onnx, onnxruntime, safetensors, numpy");
     let torch_python = torch();
-    for (network, bands, exposure) in KINDS {
-        let folder = tempfile::tempdir().unwrap();
-        let taught = learn(network, bands, exposure, &SET, &folder.path().join("run"));
+    let folder = tempfile::tempdir().unwrap();
+    let mut exported = Vec::new();
+    for (kind, (network, bands, exposure)) in KINDS.into_iter().enumerate() {
+        let folder = folder.path().join(kind.to_string());
+        let taught = learn(network, bands, exposure, &SET, &folder.join("run"));
         // With random weights, this network's fifty ReLU6 layers amplify rounding differences, because runtimes fold
         // batch norms into convolutions.
         let learnt = if network == Network::LiteUnet { taught } else { stirred(&taught, 13) };
-        let out = folder.path().join("out");
+        let out = folder.join("out");
         learnt.write(&out).unwrap();
         let io = out.join("io.safetensors");
         record(&learnt, &io);
@@ -115,10 +117,6 @@ fn exported_networks_compute_what_ours_do() {
         let bytes = std::fs::read(out.join("network.onnx")).unwrap();
         onnx::write(&learnt, &out.join("network.onnx")).unwrap();
         assert!(bytes == std::fs::read(out.join("network.onnx")).unwrap(), "{} twice", network.name());
-        if let Some(python) = &onnx_python {
-            ask(python, "train/check_onnx.py", &[path(&out)]);
-        }
-
         let file = out.join("network.pt");
         torchscript::write(&learnt, training::SIZE, &file).unwrap();
         let bytes = std::fs::read(&file).unwrap();
@@ -139,9 +137,15 @@ fn exported_networks_compute_what_ours_do() {
             eprintln!("{} TorchScript, {images} pictures: difference {apart:.1e}", network.name());
             assert!(apart < 1e-4, "{} {images}: {apart}", network.name());
         }
-        if let Some(python) = &torch_python {
-            ask(python, "train/check_torchscript.py", &[path(&file), path(&io)]);
-        }
+        exported.push(path(&out).to_owned());
+    }
+    // One process for all networks: the packages alone take seconds to import.
+    let exported: Vec<&str> = exported.iter().map(String::as_str).collect();
+    if let Some(python) = &onnx_python {
+        ask(python, "train/check_onnx.py", &exported);
+    }
+    if let Some(python) = &torch_python {
+        ask(python, "train/check_torchscript.py", &exported);
     }
 }
 

@@ -6,6 +6,7 @@
 //! built and then dropped. Source: the fields.
 
 use crate::common::program::{scratch, small_text, trace};
+use furrow_field::Field;
 use furrow_field::assemble::{self, Options, Source};
 use furrow_field::estimate::Estimate;
 use furrow_render::render;
@@ -14,15 +15,17 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Returns the ratio of estimated to built triangles; plants that share meshes count once.
-fn ratio(path: &Path, options: &Options) -> f64 {
+/// Returns the field of a scene file, and the ratio of estimated to built triangles; plants that share meshes count once.
+fn built(path: &Path, options: &Options) -> (Field, f64) {
     let pool = render::pool(0).expect("a pool");
     pool.install(|| {
         let expected = Source::open(path).unwrap_or_else(|e| panic!("{e}")).estimate(options).expect("an estimate");
         let field = assemble::field(path, options).unwrap_or_else(|e| panic!("{e}"));
         let meshes: BTreeMap<_, _> =
             field.scene.parts.iter().map(|part| (Arc::as_ptr(&part.mesh), part.mesh.triangles.len())).collect();
-        expected.total().triangles / meshes.values().sum::<usize>() as f64
+        let ratio = expected.total().triangles / meshes.values().sum::<usize>() as f64;
+        drop(meshes);
+        (field, ratio)
     })
 }
 
@@ -43,14 +46,24 @@ fn with_soil(soil: &str) -> (tempfile::TempDir, PathBuf) {
     (keep, path)
 }
 
+/// Expected: besides the estimate, every field has parts, lights and sound meshes, and no unintended warning.
 #[test]
-fn the_scene_files_that_ship_grow_as_estimated() {
+fn the_scene_files_that_ship_build_as_estimated() {
     let options = Options { width: Some(96), ..Options::default() };
     let scenes = std::fs::read_dir("scenes").expect("scenes").map(|e| e.expect("an entry").path());
     let scenes: Vec<PathBuf> = scenes.filter(|path| path.extension().is_some_and(|e| e == "ron")).collect();
     assert!(scenes.len() >= 15);
     for path in scenes {
-        near(ratio(&path, &options), &path.display().to_string());
+        let name = path.display().to_string();
+        let (field, ratio) = built(&path, &options);
+        near(ratio, &name);
+        assert!(!field.scene.parts.is_empty() && !field.scene.lights.is_empty(), "{name}: no parts or no lights");
+        // A visible horizon has ground beyond all plants, which causes an intended warning.
+        let unintended = |warning: &&String| !warning.starts_with("the camera sees ground to the horizon");
+        assert_eq!(field.warnings.iter().filter(unintended).collect::<Vec<_>>(), [""; 0], "{name}");
+        for part in &field.scene.parts {
+            assert_eq!(part.mesh.fault(), None, "{name}");
+        }
     }
 }
 
@@ -67,7 +80,7 @@ fn dense_ground_grows_as_estimated() {
         "soil: (clods: (over_5mm_per_m2: 0), litter: (bits_per_m2: 60000))",
     ] {
         let (_keep, path) = with_soil(soil);
-        near(ratio(&path, &Options::default()), soil);
+        near(built(&path, &Options::default()).1, soil);
     }
 }
 

@@ -56,22 +56,27 @@ fn record(learnt: &TrainedModel, folder: &Path) {
 
 #[test]
 fn networks_compute_what_an_independent_program_does() {
-    let engines = [("numpy", python("import numpy, safetensors")), ("torch", torch())];
+    let folder = tempfile::tempdir().unwrap();
+    let mut recorded = Vec::new();
     for network in Network::ALL {
         for bands in ["rgb", "rgbn"] {
-            let folder = tempfile::tempdir().unwrap();
-            let trained = learn(*network, bands, NormalizationMode::Image, &SET, &folder.path().join("trained"));
+            let kind = folder.path().join(format!("{}-{bands}", network.name()));
+            let trained = learn(*network, bands, NormalizationMode::Image, &SET, &kind.join("trained"));
             // The trained weights are tested for one set of bands only: other bands change only the first layer.
             let learnt = [("stirred", &stirred(&trained, 3)), ("trained", &trained)];
             for (name, learnt) in learnt.into_iter().take(if bands == "rgb" { 2 } else { 1 }) {
-                let folder = folder.path().join(name);
+                let folder = kind.join(name);
                 record(learnt, &folder);
-                for (engine, python) in &engines {
-                    if let Some(python) = python {
-                        ask(python, "train/reference.py", &["--engine", engine, folder.to_str().unwrap()]);
-                    }
-                }
+                recorded.push(folder.to_str().unwrap().to_owned());
             }
+        }
+    }
+    for (engine, python) in [("numpy", python("import numpy, safetensors")), ("torch", torch())] {
+        if let Some(python) = python {
+            // One process for all networks: PyTorch alone takes seconds to import.
+            let arguments: Vec<&str> =
+                ["--engine", engine].into_iter().chain(recorded.iter().map(String::as_str)).collect();
+            ask(&python, "train/reference.py", &arguments);
         }
     }
 }
