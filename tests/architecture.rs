@@ -147,11 +147,10 @@ const ALLOWED: &[(&str, &str)] = &[
         "tch",
         "train/torch/ train/fit/gradients.rs train/fit/loss.rs train/fit/optimiser.rs train/fit/trainer.rs train/deploy/",
     ),
-    // Files are written completely or not at all: images of fields, and generated textures. Temporary folders serve the
-    // denoiser, a scene copied into a dataset or a stream, and the small dataset that a cost estimate renders.
+    // Files are written completely or not at all. Temporary folders serve the denoiser, a scene copied into a dataset or a stream, and the small dataset that a cost estimate renders.
     (
         "tempfile",
-        "cli/mod.rs dataset/make/bill.rs dataset/make/plan.rs dataset/make/push.rs dataset/deliver/stream.rs output/atomic.rs output/denoise/program.rs texture/draw/write.rs",
+        "atomic_file.rs cli/mod.rs dataset/make/bill.rs dataset/make/plan.rs dataset/make/push.rs dataset/deliver/stream.rs output/denoise/program.rs",
     ),
     // An external image viewer.
     ("tev_client", "bin/trace/watch/tev.rs"),

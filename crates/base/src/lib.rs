@@ -7,8 +7,10 @@
 //! | [`geometry`] | rays, hits, meshes, alpha masks |
 //! | [`ron_file`] | RON files whose errors name line and column; numbers with bounds and distributions |
 //! | [`input`] | reading user-supplied files safely |
+//! | [`atomic_file`] | files that appear complete or not at all, also several together |
 //! | [`error`] | the error type of all crates |
 
+pub mod atomic_file;
 pub mod error;
 pub mod geometry;
 pub mod input;

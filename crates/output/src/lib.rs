@@ -1,7 +1,6 @@
 //! Output files: images, radiance and labels. Each file appears completely or not at all. Files contain no timestamps
 //! or paths, so equal runs write equal bytes.
 
-mod atomic;
 pub mod cloud;
 mod denoise;
 mod exr;
@@ -20,10 +19,6 @@ use furrow_render::render::LabelMap;
 use furrow_render::scene::tag::Class;
 use std::path::{Path, PathBuf};
 
-pub use self::atomic::{
-    Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
-    stream_atomically, write_atomically, write_together,
-};
 pub use self::exr::{
     Geometry, Precision, decode_geometry, encode_geometry, encode_layers, encode_planes, half, read_geometry,
 };
@@ -32,6 +27,10 @@ pub use self::png::{
     read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
 pub use denoise::Denoiser;
+pub use furrow_base::atomic_file::{
+    Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
+    stream_atomically, write_atomically, write_together,
+};
 pub use lock::Lock;
 pub use photo::{
     ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, read_color_photo,

@@ -1,10 +1,9 @@
 //! Writes generated textures to PNG files with their provenance.
 
 use super::{Drawn, Grey, Recipe, draw, read};
+use furrow_base::atomic_file::write_together;
 use furrow_base::error::{Error, Result};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
 
 /// Licence of generated textures.
 const LICENCE: &str = "CC0-1.0 OR MIT OR Apache-2.0";
@@ -44,15 +43,8 @@ pub fn write(recipe_path: &Path) -> Result<Vec<PathBuf>> {
     if !named_above(recipe_path, &name) {
         files.push((words, format!("`{name}.png`: {source}. Licence: {LICENCE}.\n").into_bytes()));
     }
-    // Write all temporary files before the first is renamed, so that an image is never next to the relief of another
-    // version.
-    let whole = files.iter().map(|(path, bytes)| unfinished(path, bytes)).collect::<Result<Vec<_>>>()?;
-    let mut written = Vec::new();
-    for (file, (path, _)) in whole.into_iter().zip(files) {
-        file.persist(&path).map_err(|e| Error::io(&path)(e.error))?;
-        written.push(path);
-    }
-    Ok(written)
+    // Replaced together, so that an image is never next to the relief of another version.
+    write_together(recipe_path, |together| files.iter().try_for_each(|(path, bytes)| together.add(path, bytes)))
 }
 
 /// Returns the provenance note of a texture.
@@ -113,21 +105,6 @@ fn png_file(
     writer.write_image_data(bytes).expect("the data length matches the image size");
     writer.finish().expect("writing to memory succeeds");
     file
-}
-
-/// Writes `bytes` to a flushed temporary file in the folder of `path`. Renaming it makes the output appear complete or
-/// not at all.
-fn unfinished(path: &Path, bytes: &[u8]) -> Result<NamedTempFile> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; a texture gets the permissions of any other file that its user creates.
-    #[cfg(unix)]
-    let public = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-    #[cfg(unix)]
-    builder.permissions(public);
-    let mut file = builder.prefix(".furrow-").tempfile_in(folder).map_err(Error::io(path))?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(path))?;
-    Ok(file)
 }
 
 fn named_above(recipe_path: &Path, name: &str) -> bool {

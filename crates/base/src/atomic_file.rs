@@ -3,7 +3,7 @@
 //! Several programs may write into one folder, and one of them may remove the temporary files of killed programs. A
 //! temporary file that has disappeared before its rename is therefore not an error; it is written again.
 
-use furrow_base::{Error, Result};
+use crate::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
