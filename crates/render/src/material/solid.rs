@@ -16,8 +16,8 @@ use furrow_optics::optics::soil::wet;
 use furrow_optics::texture::noise::Perlin;
 use std::sync::Arc;
 
-/// Roughness α of a water film on a piece: at its onset similar to a film over grains (0.3), where complete that of a
-/// film over worn stone.
+/// Roughness α of a water film on a piece: at its onset a little above that of a film over soil grains (0.3), where
+/// complete that of a film over worn stone.
 const FILM_ROUGHNESS: (f32, f32) = (0.35, 0.22);
 /// Below this fraction of water film the gloss is skipped: it would add less than 0.1 % of reflectance.
 const DRY: f32 = 0.04;
