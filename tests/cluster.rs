@@ -170,7 +170,7 @@ fn edited_job_files_are_never_overwritten() {
     let edited = std::fs::read_to_string(&file).unwrap().replace("##SBATCH --partition=…", "#SBATCH --partition=night");
     std::fs::write(&file, &edited).unwrap();
     let before = tree(&folder);
-    let said = fail(verb("emit", &folder, &["--engine", "slurm", "--shards", "3"]), 2);
+    let said = fail(verb("emit", &folder, &["--scheduler", "slurm", "--shards", "3"]), 2);
     assert!(said.contains("edited") && said.contains("--out"), "{said}");
     same(&tree(&folder), &before);
     let elsewhere = jobs.join("other");

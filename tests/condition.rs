@@ -201,17 +201,10 @@ fn wilted_plants_are_lower_and_stay_above_the_ground() {
     assert!(all[1] < 0.95 * all[0] && all[2] < 0.9 * all[1], "{all:?}");
 }
 
-/// Expected: a scene file with the keyword of the previous version is accepted, has scorched rims, and causes a warning
-/// that names the new keyword; a file with the new keyword causes none. No leaf of the synthetic datasets has a rim,
-/// because none of the photographs that they represent has any.
+/// Rationale: none of the photographs that the synthetic datasets represent shows a dead leaf margin. Expected: no leaf
+/// of their scenes has one.
 #[test]
-fn the_old_keyword_of_rims_is_read_and_told() {
-    let field = plants((24, 12), &[("sugar_beet", 16, &condition("(scorch_mm: 2)"))]);
-    let [warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
-    assert!(warning.contains("`scorch_mm`") && warning.contains("`scorched`"), "{warning}");
-    assert_eq!(field.plants[0].condition.unwrap().scorch_mm, 2.0);
-    let field = plants((24, 12), &[("sugar_beet", 16, &condition("(scorched: 1, scorch: 0.1)"))]);
-    assert_eq!(field.warnings, Vec::<String>::new());
+fn no_leaf_of_the_synthetic_datasets_has_a_dead_margin() {
     for set in ["a", "b", "c", "d"] {
         let page = std::path::PathBuf::from(format!("scenes/synthetic-{set}.ron"));
         let desc: furrow_field::desc::FieldDesc = furrow_base::ron_file::RonFile::read(&page).unwrap().parse().unwrap();

@@ -44,7 +44,7 @@ use furrow_base::math::{Spectrum, Vec2, vec2};
 use furrow_base::ron_file::{RonFile, Step, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
-use furrow_grow::plant::{ConditionDesc, GrowOptions};
+use furrow_grow::plant::GrowOptions;
 use furrow_grow::scatter::{self, Disc, Spot};
 use furrow_grow::soil::Rect;
 use furrow_optics::light::LightDesc;
@@ -390,8 +390,6 @@ impl<'a> Builder<'a> {
         floor: Option<Floor<'_>>,
         shown: Option<Rect>,
     ) -> Result<Vec<PlantRecord>> {
-        let outdated = seedlings.iter().find_map(|s| s.condition.as_ref().and_then(ConditionDesc::outdated));
-        self.warnings.extend(outdated.map(str::to_owned));
         let mut plants = self.plant(seedlings, floor, shown)?;
         plants.extend(self.models(seedlings.len(), floor)?);
         identity::settle(&mut plants);

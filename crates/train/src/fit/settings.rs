@@ -74,7 +74,7 @@ pub struct Settings {
     #[schemars(extend("x-example" = "4"))]
     pub accumulate: Option<u64>,
     /// Optimiser: sgd or adam.
-    #[arg(long, alias = "optimizer", value_name = "NAME", default_value = default_of("optimiser"))]
+    #[arg(long, value_name = "NAME", default_value = default_of("optimiser"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"adam\""))]
     pub optimiser: Option<String>,

@@ -44,7 +44,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
     /// Folder of the species files. Default: scenes/species, or the shipped species if there is no such folder.
-    #[arg(long, alias = "pages", value_name = "DIR")]
+    #[arg(long, value_name = "DIR")]
     species_dir: Option<PathBuf>,
     /// Samples per pixel.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]

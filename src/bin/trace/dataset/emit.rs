@@ -15,7 +15,7 @@ pub(crate) struct Args {
     /// Folder of the dataset, as created by `plan`, at a path visible to all machines.
     dir: PathBuf,
     /// Scheduler that starts the shards.
-    #[arg(long, alias = "engine", value_enum)]
+    #[arg(long, value_enum)]
     scheduler: SchedulerName,
     /// Number of shards; each should take minutes to hours.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]

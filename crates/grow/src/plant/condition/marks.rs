@@ -354,9 +354,6 @@ impl Marks {
 /// Returns the width of a leaf's dead margin, mm; 0 for most leaves.
 fn scorch_mm(condition: &Condition, bearer: &Bearer<'_>, s: &mut Stream) -> f32 {
     let old = bearer.age.powi(2);
-    if condition.scorch_mm > 0.0 {
-        return condition.scorch_mm * old;
-    }
     let Some(margin) = bearer.margin.filter(|_| s.chance(f64::from(condition.scorched * old))) else { return 0.0 };
     condition.scorch * bearer.age * margin.deepest() * bearer.image_mm.y
 }

@@ -85,10 +85,6 @@ pub struct ConditionDesc {
     /// Width of that margin on the oldest leaves, as a fraction of the distance from the margin to the innermost point.
     /// Inside it is a yellow margin of twice the width.
     pub scorch: Vary<Fraction>,
-    /// Deprecated, accepted for one more version: width of a dead margin on every leaf, in mm. Replaced by `scorched`
-    /// and `scorch`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scorch_mm: Option<Vary<NonNegative>>,
     /// Anthocyanin of veins, stalks and stem in addition to the species file's pigments, µg/cm².
     pub reddening: Vary<NonNegative>,
     /// Fraction of a leaf at the soil that is covered by dust; 10 cm above the soil it is a third of this.
@@ -171,7 +167,6 @@ impl ConditionDesc {
             }),
             scorched: none(),
             scorch: Vary::uniform(0.03, 0.12),
-            scorch_mm: None,
             reddening: none(),
             dust: none(),
             splash: none(),
@@ -200,7 +195,6 @@ impl ConditionDesc {
             spots: self.spots.draw32(&mut of(7)),
             scorched: self.scorched.draw32(&mut of(14)),
             scorch: self.scorch.draw32(&mut of(15)),
-            scorch_mm: self.scorch_mm.as_ref().map_or(0.0, |mm| mm.draw32(&mut of(8))),
             reddening: self.reddening.draw32(&mut of(9)),
             dust: self.dust.draw32(&mut of(10)),
             splash: self.splash.draw32(&mut of(11)),
@@ -208,14 +202,6 @@ impl ConditionDesc {
             pale_young: self.pale_young.draw32(&mut of(13)),
             greenness: self.greenness.draw32(&mut of(16)),
         }
-    }
-
-    /// Returns a warning if a deprecated keyword is used.
-    pub fn outdated(&self) -> Option<&'static str> {
-        self.scorch_mm.is_some().then_some(
-            "`scorch_mm` of a condition is an old keyword and will be refused by the next version: write `scorched`, the fraction of leaves \
-             with a dead margin, and `scorch`, its relative width; for none write `scorched: 0`",
-        )
     }
 
     /// Returns the factor on the species file's chlorophyll for a leaf of relative age `age` (0 the youngest, 1 the
@@ -242,11 +228,6 @@ fn one() -> f32 {
     1.0
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference to the field")]
-fn is_none(width: &f32) -> bool {
-    *width == 0.0
-}
-
 /// Condition of one plant. Fields as in [`ConditionDesc`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
@@ -270,9 +251,6 @@ pub struct Condition {
     /// Width of that margin, as a fraction of the distance from the margin to the innermost point.
     #[serde(default)]
     pub scorch: f32,
-    /// Width of a dead margin on all leaves (deprecated keyword), mm.
-    #[serde(default, skip_serializing_if = "is_none")]
-    pub scorch_mm: f32,
     /// Additional anthocyanin in veins, stalks and stem, µg/cm².
     pub reddening: f32,
     /// Fraction covered by dust at the soil, 0–1.
@@ -301,7 +279,6 @@ impl Default for Condition {
             spots: 0.0,
             scorched: 0.0,
             scorch: 0.0,
-            scorch_mm: 0.0,
             reddening: 0.0,
             dust: 0.0,
             splash: 0.0,
