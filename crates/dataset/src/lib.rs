@@ -12,6 +12,7 @@
 //! seals/000123.json     checksum record: SHA-256 of each file of the image; written last
 //! ledger/               timing log, one file per run: start, end, time of each image, failures; the only clock times
 //! jobs/                 job files that `emit` wrote for a scheduler, and their logs; belong to no image
+//! pushed/000123.json    hash of a unit that `--push` has uploaded
 //! manifest.json         list of everything above; written when all images are complete
 //! images.parquet, plants.parquet  tables for selecting images and plants
 //! report.html           summary of the dataset, one page
