@@ -358,6 +358,8 @@ fn full_and_closed_streams_end_no_work() {
         &["dataset", "status", "d", "--json"],
         &["dataset", "status", "d", "--watch"],
         &[&["dataset"][..], &other, &["--dry-run"]].concat(),
+        &[&["dataset", "plan"][..], &other, &["--estimate"]].concat(),
+        // The name of the flag in the first scripts.
         &[&["dataset", "plan"][..], &other, &["--bill"]].concat(),
     ] {
         its_answer_is_not_lost_unseen(env!("CARGO_BIN_EXE_trace"), folder.path(), args);
@@ -412,15 +414,15 @@ fn a_terminal_shows_what_grows() {
 fn a_terminal_shows_what_grows_for_a_bill() {
     let folder = folder();
     let out = folder.path().join("out").display().to_string();
-    let order = |verb: &str, bill: &str| {
-        format!("{verb} --scene scenes/field.ron --width 81 --spp 300 --count 1 --out {out} {bill}")
+    let order = |verb: &str, estimate: &str| {
+        format!("{verb} --scene scenes/field.ron --width 81 --spp 300 --count 1 --out {out} {estimate}")
     };
     let of_days = "--days 20 --width 81 --spp 300 --format tum --dry-run";
     let days = format!("sequence --scene scenes/field.ron {of_days} --out {out}");
     let commands = [
         (order("dataset", "--dry-run"), true),
         (days, true),
-        (order("dataset plan", "--bill"), true),
+        (order("dataset plan", "--estimate"), true),
         (order("dataset", "--dry-run --quiet"), false),
     ];
     for (command, shown) in commands {

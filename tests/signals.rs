@@ -200,8 +200,8 @@ fn an_interrupt_while_a_bill_grows_its_fields_is_told() {
     let page = keep.path().join("page.ron");
     write_weeds(&page, MANY);
     let order = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count", "5"];
-    for (verb, bill) in [(&["dataset"][..], "--dry-run"), (&["dataset", "plan"], "--bill")] {
-        let Some(after) = said_after_it_grew(&[verb, &order, &[bill]].concat()) else { return };
+    for (verb, estimate) in [(&["dataset"][..], "--dry-run"), (&["dataset", "plan"], "--estimate")] {
+        let Some(after) = said_after_it_grew(&[verb, &order, &[estimate]].concat()) else { return };
         assert!(after.contains("stopped before it was done; nothing was written"), "{verb:?}: {after}");
         assert!(!after.contains("core hours") && !data.exists(), "{verb:?}: {after}");
     }

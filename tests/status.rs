@@ -328,9 +328,9 @@ fn the_bill_is_what_is_taken() {
         assert!(said.contains("rendering images, 1 of 3"), "a log must show the current step: {said}");
         let rows = parsed(&output);
         if order.contains(&"64") {
-            // `plan --bill` prints the same rows; the cheapest order is enough.
+            // `plan --estimate` prints the same rows; the cheapest order is enough.
             let arguments =
-                [&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--bill"]].concat();
+                [&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--estimate"]].concat();
             assert!(bill(&arguments).keys().eq(rows.keys()), "{order:?}");
             assert!(!data.exists(), "{order:?}");
         }

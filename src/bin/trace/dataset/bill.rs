@@ -1,5 +1,5 @@
 //! Cost estimate of a dataset: `trace dataset … --dry-run`, `trace sequence … --dry-run` and `trace dataset plan …
-//! --bill`.
+//! --estimate`.
 
 use crate::growing::Line;
 use furrow_base::Result;

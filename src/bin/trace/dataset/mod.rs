@@ -67,8 +67,8 @@ struct PlanArgs {
     order: order::Args,
     /// Create nothing: render three to sixteen probe images with fewer samples, and estimate core hours, disk, files,
     /// memory and a number of shards.
-    #[arg(long)]
-    bill: bool,
+    #[arg(long, alias = "bill")]
+    estimate: bool,
 }
 
 #[derive(clap::Args)]
@@ -86,10 +86,10 @@ struct MakeArgs {
 /// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(PlanArgs { order, bill: true })) => {
+        Some(Verb::Plan(PlanArgs { order, estimate: true })) => {
             bill::run(order.images.folder(), order.order()?, 0, false, signals)
         }
-        Some(Verb::Plan(PlanArgs { order, bill: false })) => {
+        Some(Verb::Plan(PlanArgs { order, estimate: false })) => {
             let set = order::run(order, false, signals)?;
             order::tell_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
