@@ -85,9 +85,14 @@ fn restore(folder: &Path, files: &BTreeMap<String, Vec<u8>>) {
 
 /// Returns the command that generates a dataset of tiny images on one thread.
 fn dataset(data: &Path, count: &str) -> Command {
+    dataset_on(data, count, "1")
+}
+
+/// The same on several threads.
+fn dataset_on(data: &Path, count: &str, threads: &str) -> Command {
     let mut command =
         trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(data)]);
-    command.args(["--count", count, "--width", "32", "--spp", "1", "--threads", "1"]);
+    command.args(["--count", count, "--width", "32", "--spp", "1", "--threads", threads]);
     command
 }
 
@@ -131,6 +136,45 @@ fn a_packed_dataset_that_meets_a_fault_goes_on_to_the_same_bytes() {
     for (within, between) in [(None, 6), (Some("packs"), 5)] {
         each_is_gone_on_from(&packed, within, between, &|there, whole, what| is_whole(there, whole, &beside, what));
     }
+}
+
+/// Rationale: a bug in one thread must neither hang the others nor lose what is finished. Expected: wherever a thread that
+/// makes an image panics, exit code 1, one error that names the image, complete files only, and the same command then
+/// produces the bytes of an undisturbed run; for any number of threads.
+#[test]
+fn a_panic_ends_a_dataset_or_stream_with_the_images_number() {
+    let make = |data: &Path, threads: &str| dataset_on(data, "4", threads);
+    let (_keep, out) = scratch();
+    succeed(make(&out, "1"));
+    let whole = tree(&out);
+    let told = |command: &mut Command, at: u64| {
+        faults::panics(command, "pool", at);
+        let output = command.output().expect("the program");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.success() {
+            return None;
+        }
+        assert_eq!(output.status.code(), Some(1), "reading {at}: {said}");
+        let errors: Vec<&str> = said.lines().filter(|line| line.starts_with("error: ")).collect();
+        let [error] = errors[..] else { panic!("reading {at}: {said}") };
+        assert!(error.contains("the program failed: ") && said.contains("\n help: "), "reading {at}: {said}");
+        Some(error.starts_with("error: image 00000"))
+    };
+    let (mut in_images, mut in_streams) = (0, 0);
+    for at in [1, 2, 3, 5, 8, 13, 21, 34] {
+        let (_keep, out) = scratch();
+        let threads = if at % 2 == 0 { "3" } else { "1" };
+        in_images += u32::from(told(&mut make(&out, threads), at) == Some(true));
+        let there = if out.exists() { tree(&out) } else { Tree::new() };
+        assert!(there.keys().all(|name| !name.contains(".furrow-")), "reading {at}");
+        is_whole(&there, &whole, &Tree::new(), &format!("reading {at}"));
+        succeed(make(&out, "1"));
+        same(&tree(&out), &whole);
+        let mut stream = trace(&["stream", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--spp", "1"]);
+        stream.args(["--count", "4", "--width", "32", "--threads", threads]);
+        in_streams += u32::from(told(&mut stream, at) == Some(true));
+    }
+    assert!(in_images > 2 && in_streams > 2, "{in_images} and {in_streams}");
 }
 
 /// Writes three photographs with masks in folders for training and validation.

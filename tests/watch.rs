@@ -7,6 +7,7 @@
 
 use crate::common::browser::browser;
 use crate::common::devtools::Page;
+use crate::common::faults;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -272,6 +273,24 @@ fn what_a_model_names_is_followed_and_so_is_what_it_lacks() {
 
 /// Rationale: one field among many that is too large must not hide the others. Expected: the requested image is
 /// displayed with the sheet open, and a cell of the sheet that cannot be rendered shows the reason.
+/// Rationale: a bug in the rendering thread. Expected: it is reported, the page does not stay busy, and the next change
+/// of the file is rendered.
+#[test]
+fn a_panic_is_reported_and_the_next_change_is_rendered() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
+    faults::panics(&mut command, "render", 1);
+    let watched = Watched::spawn(command, &[]);
+    let mut events = watched.events();
+    let failed = events.until(|state| !state["error"].is_null() && state["doing"] == "");
+    let error = failed["error"].as_str().unwrap_or_else(|| panic!("{failed}"));
+    assert!(error.contains("the program failed: ") && failed["picture"].is_null(), "{failed}");
+    watched.save(&format!("{}\n", watched.text()));
+    let made = events.until(|state| !state["picture"].is_null() && state["doing"] == "");
+    assert!(made["error"].is_null(), "{made}");
+    let (code, _) = watched.end("INT");
+    assert_eq!(code, Some(75));
+}
+
 #[test]
 fn a_field_that_cannot_grow_leaves_the_picture_and_the_other_fields() {
     let watched = Watched::start(&["--seed", "4"]);

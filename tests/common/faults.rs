@@ -1,4 +1,4 @@
-//! A file system that fails at a chosen operation: `tests/faults/fail.c`, preloaded into the program.
+//! A file system that fails at a chosen operation, and a program that panics at one: `tests/faults/fail.c`, preloaded into the program.
 
 use super::dataset::{path, same, succeed, tree};
 use super::program::scratch;
@@ -61,6 +61,15 @@ pub fn run(mut command: Command, folder: &Path, at: u64, lasts: bool) -> Ended {
     let told = std::fs::read_to_string(told.path()).expect("the count");
     let (changes, failed) = told.trim().split_once(' ').unwrap_or(("0", "none"));
     Ended { output, changes: changes.parse().expect("a number"), failed: failed.into() }
+}
+
+/// Makes a command panic where a thread named `thread` reads the clock for the time number `at`, from 1.
+pub fn panics(command: &mut Command, thread: &str, at: u64) {
+    command
+        .env("LD_PRELOAD", library())
+        .env("FAULT_THREAD", thread)
+        .env("FAULT_CLOCK", at.to_string())
+        .envs(AS_IT_BEGAN);
 }
 
 /// Selects operations to fail out of `changes`: the first two, the last two, and `between` others spread evenly.

@@ -1,9 +1,12 @@
-/* A file system that fails: preloaded into a program, it lets the n-th change below a folder fail.
+/* A file system and a clock that fail: preloaded into a program, it lets the n-th change below a folder fail, or the n-th reading of the clock.
  *
  * FAULT_FOLDER  changes of files below this folder count: making, writing, flushing, renaming, linking
  * FAULT_AT      the one that fails, from 1; 0 for none
  * FAULT_LASTS   if set, all that follow fail too, as on a disk that stays full
  * FAULT_COUNT   file that takes the number of changes so far, and the kind of the one that failed
+ *
+ * FAULT_THREAD  readings of the clock by threads of this name count; the one that fails makes Rust's standard library panic
+ * FAULT_CLOCK   the one that fails, from 1
  *
  * Programs may call the kernel without the C library, so the calls are caught where they enter it: a seccomp filter raises SIGSYS, and the
  * handler makes the call from the one place that the filter lets through, or refuses it. Linux on x86-64. Source: seccomp(2), "SECCOMP_RET_TRAP".
@@ -21,6 +24,7 @@
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
+#include <time.h>
 #include <ucontext.h>
 #include <unistd.h>
 
@@ -161,7 +165,23 @@ static void filter(void) {
     }
 }
 
+static const char *of_thread;
+static long clock_at;
+static long readings;
+
+int clock_gettime(clockid_t clock, struct timespec *time) {
+    char name[16] = "";
+    if (of_thread && prctl(PR_GET_NAME, name) == 0 && strcmp(name, of_thread) == 0 && __atomic_add_fetch(&readings, 1, __ATOMIC_SEQ_CST) == clock_at) {
+        errno = EINVAL;
+        return -1;
+    }
+    return (int)syscall(SYS_clock_gettime, clock, time);
+}
+
 __attribute__((constructor)) static void begin(void) {
+    const char *reading = getenv("FAULT_CLOCK");
+    clock_at = reading ? atol(reading) : 0;
+    of_thread = getenv("FAULT_THREAD");
     const char *named = getenv("FAULT_FOLDER"), *count = getenv("FAULT_COUNT"), *number = getenv("FAULT_AT");
     if (!named || !count) return;
     snprintf(folder, sizeof folder, "%s", named);

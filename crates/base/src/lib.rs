@@ -9,6 +9,7 @@
 //! | [`input`] | reading user-supplied files safely |
 //! | [`atomic_file`] | files that appear complete or not at all, also several together |
 //! | [`error`] | the error type of all crates |
+//! | [`supervise`] | panics of worker threads as errors |
 
 pub mod atomic_file;
 pub mod error;
@@ -17,5 +18,6 @@ pub mod input;
 pub mod math;
 pub mod ron_file;
 pub mod sampling;
+pub mod supervise;
 
 pub use error::{Error, Result};

@@ -17,6 +17,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `threads` | worker threads |
+//! | `schedule` | numbered work items on several workers, with results in order or as they are finished |
 //! | `scene_file`, `field` | scene file and built field |
 //! | `expected` | expected number of plants in the images, without building fields |
 //! | `renderer`, `rasterizer` | an opened engine that renders any number of fields |
@@ -29,6 +30,7 @@ mod image;
 mod rasterizer;
 mod renderer;
 mod scene_file;
+mod schedule;
 mod threads;
 mod view;
 
@@ -37,5 +39,6 @@ pub use field::Field;
 pub use image::{Image, Times};
 pub use renderer::{Renderer, Request};
 pub use scene_file::SceneFile;
+pub use schedule::{ResultOrder, Schedule};
 pub use threads::Threads;
 pub use view::View;

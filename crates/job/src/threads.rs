@@ -24,6 +24,11 @@ impl Threads {
         Ok(ALL.get_or_init(|| fresh).clone())
     }
 
+    /// Starts `workers` pools that together have `threads` threads, or one each if that is more.
+    pub fn divided(threads: usize, workers: usize) -> Result<Vec<Self>> {
+        (0..workers).map(|worker| Self::new(share(threads, workers, worker))).collect()
+    }
+
     /// Returns the number of threads.
     pub fn count(&self) -> usize {
         self.0.current_num_threads()
@@ -32,5 +37,25 @@ impl Threads {
     /// Runs `work` in these threads. If the caller is already one of them, it runs directly.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.0.install(work)
+    }
+}
+
+/// Returns the number of threads of one of `workers` workers that share `threads` threads; at least one.
+fn share(threads: usize, workers: usize, worker: usize) -> usize {
+    (threads / workers + usize::from(worker < threads % workers)).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_are_shared_out_whole() {
+        for (threads, workers) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
+            let shares: Vec<usize> = (0..workers).map(|worker| share(threads, workers, worker)).collect();
+            assert_eq!(shares.iter().sum::<usize>(), threads);
+            assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
+        }
+        assert_eq!(share(2, 3, 2), 1);
     }
 }

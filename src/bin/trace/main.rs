@@ -39,6 +39,7 @@ mod variants;
 mod watch;
 
 use clap::{Parser, Subcommand};
+use furrow_base::supervise::supervised;
 use furrow_cli::cli::{self, signal};
 use std::process::ExitCode;
 
@@ -145,7 +146,8 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let done = match cli.verb {
+    // A panic ends the program with exit code 1 and a message like any other error.
+    let done = supervised(|| match cli.verb {
         Some(Verb::Catalogue(args)) => catalogue::run(&args, &signals),
         #[cfg(feature = "datasets")]
         Some(Verb::Datasets(verb)) => datasets::run(&verb, &signals),
@@ -165,6 +167,6 @@ fn main() -> ExitCode {
         #[cfg(feature = "watch")]
         Some(Verb::Watch(args)) => watch::run(&args, &signals),
         None => render::run(&cli.render, &signals),
-    };
-    cli::end(done)
+    });
+    cli::end(done.and_then(|done| done))
 }

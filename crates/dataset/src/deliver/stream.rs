@@ -5,7 +5,7 @@
 //! so the reader determines the speed.
 
 use crate::File;
-use crate::make::generate::{Shard, Work, fitting, share, together};
+use crate::make::generate::{Shard, Work, fitting, together};
 use crate::make::plan::{Order, plan};
 use crate::make::render::{LastField, render, renderer, scene_file};
 use crate::model::invariants;
@@ -13,17 +13,18 @@ use crate::model::recipe::MOST_IMAGES;
 use crate::read::archive::append;
 use crate::read::native;
 use crate::read::set::Set;
-use furrow_base::error::{Kind, Place};
+use furrow_base::error::Place;
+use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
-use furrow_job::{Renderer, SceneFile, Threads};
+use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
 use furrow_render::render::Watch;
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
@@ -74,49 +75,43 @@ impl ImageStream {
         let stop = Arc::<AtomicBool>::default();
         let scene = scene_file(set)?.memory(work.memory).until(&stop);
         let workers = self.workers(work, &scene)?;
-        let queue = Arc::new(Queue::new(self.wanted(work.shard), 2 * workers.len()));
+        let images = self.wanted(work.shard).map(|index| vec![index]);
+        let schedule = Arc::new(Schedule::new(images, ResultOrder::InOrder { ahead: 2 * workers.len() }));
         let (tell, told) = channel();
-        let to_write = Arc::clone(&queue);
+        let to_write = Arc::clone(&schedule);
         // Not a scoped thread: the reader of a pipe may block it forever, and a stop must not wait for it.
         let write = move || {
-            let ended = archive(&to_write, out, &tell);
+            let ended = supervised(|| archive(&to_write, out, &tell)).and_then(|ended| ended);
             to_write.end();
             let _ = tell.send(Said::Ended(ended));
         };
         std::thread::Builder::new().name("archive".into()).spawn(write).map_err(Error::no_thread)?;
-        let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
         let source = Source { set, scene, renderer, stop: &stop };
-        let warn = listener.warn;
-        let mut refused = None;
-        let (written, ended) = std::thread::scope(|scope| {
-            for worker in &workers {
-                let work = || self.serve(&queue, &source, worker, warn, &failures);
-                if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
-                    refused = Some(Error::no_thread(e));
-                    queue.end();
-                    break;
+        let make = |index: &u64, threads: &Threads, kept: &mut LastField| {
+            let made = threads.install(|| source.image(*index, threads, kept)).map_err(|e| self.as_asked(e));
+            made.inspect_err(|e| {
+                if e.is_of_one_field() {
+                    (listener.warn)(&format!("image {} is left out: {e}", Set::name(*index)));
                 }
-            }
-            let ends = listen(&told, listener, &queue, &stop);
-            // Stops the workers, whose images are no longer needed.
+            })
+        };
+        let stopped = || stop.load(Ordering::Relaxed);
+        let Written { images, last, failures, ended } = schedule.run(&workers, stopped, make, || {
+            let written = listen(&told, listener, &schedule, &stop);
+            // Interrupts the workers, whose images are no longer needed.
             stop.store(true, Ordering::Relaxed);
-            ends
-        });
-        let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
-        if let Some(refused) = refused {
-            return Err(refused);
-        }
+            written
+        })?;
         match ended {
-            _ if failures.values().any(|e| !e.is_of_one_field()) => Err(together(failures)),
             None => {
-                let next = written.last.map_or(self.indices.start, |last| last + 1);
-                Err(Error::stopped(format!("stopped: {} images were written", written.images))
+                let next = last.map_or(self.indices.start, |last| last + 1);
+                Err(Error::stopped(format!("stopped: {images} images were written"))
                     .help(format!("--first {next} continues the stream")))
             }
-            Some(Err(e)) if e.kind() == ErrorKind::BrokenPipe => Ok(written.images),
-            Some(Err(e)) => Err(Error::io(Path::new("stdout"))(e)),
-            Some(Ok(())) if failures.is_empty() => Ok(written.images),
-            Some(Ok(())) => Err(together(failures)),
+            Some(Err(e)) => Err(e),
+            Some(Ok(End::Left)) => Ok(images),
+            Some(Ok(End::Last)) if failures.is_empty() => Ok(images),
+            Some(Ok(End::Last)) => Err(together(failures)),
         }
     }
 
@@ -129,37 +124,7 @@ impl ImageStream {
             given => given,
         };
         let at_once = at_once.min((self.indices.end - self.indices.start) as usize).max(1);
-        (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect()
-    }
-
-    /// Makes images one after another until the queue has no more.
-    fn serve(
-        &self,
-        queue: &Queue,
-        source: &Source<'_>,
-        threads: &Threads,
-        warn: &(dyn Fn(&str) + Sync),
-        failures: &Mutex<BTreeMap<u64, Error>>,
-    ) {
-        let _guard = EndOnPanic(queue);
-        // Each worker builds the field of its images itself; waiting for another worker to build it would take the same
-        // time.
-        let mut kept = LastField::default();
-        while let Some(index) = queue.begin() {
-            match threads.install(|| source.image(index, threads, &mut kept)) {
-                Ok(files) => queue.finish(index, State::Made(files)),
-                Err(e) if e.kind() == Kind::Interrupted => queue.end(),
-                Err(e) => {
-                    let e = self.as_asked(e);
-                    let of_one = e.is_of_one_field();
-                    if of_one {
-                        warn(&format!("image {} is left out: {e}", Set::name(index)));
-                    }
-                    lock(failures).insert(index, e);
-                    if of_one { queue.finish(index, State::LeftOut) } else { queue.end() }
-                }
-            }
-        }
+        Threads::divided(threads, at_once)
     }
 
     /// Returns the indices of the images of a shard.
@@ -203,107 +168,36 @@ impl Source<'_> {
 /// field.
 pub const MOST_LEFT_OUT: usize = 20;
 
-/// State of an image in the queue.
-enum State {
-    UnderWay,
-    Made(Vec<File>),
-    LeftOut,
-}
-
-/// Queue of images from the workers to the archive, ordered by index.
-struct Queue {
-    inside: Mutex<Inside>,
-    changed: Condvar,
-    /// Largest number of images that are in progress or waiting.
-    most: usize,
-}
-
-struct Inside {
-    /// Indices of images that no worker has started.
-    wanted: Box<dyn Iterator<Item = u64> + Send>,
-    images: BTreeMap<u64, State>,
-    /// Whether no further image may be started: all are started, or the stream ends.
-    ended: bool,
-    /// Whether waiting images are discarded too, because the stream ends.
-    left: bool,
-}
-
-impl Queue {
-    fn new(wanted: impl Iterator<Item = u64> + Send + 'static, most: usize) -> Self {
-        let inside = Inside { wanted: Box::new(wanted), images: BTreeMap::new(), ended: false, left: false };
-        Self { inside: Mutex::new(inside), changed: Condvar::new(), most }
-    }
-
-    /// Waits for room in the queue and returns the next image to make; `None` if there is none.
-    fn begin(&self) -> Option<u64> {
-        let full = |inside: &mut Inside| !inside.ended && inside.images.len() >= self.most;
-        let mut inside = self.changed.wait_while(lock(&self.inside), full).unwrap_or_else(PoisonError::into_inner);
-        let next = if inside.ended { None } else { inside.wanted.next() };
-        match next {
-            Some(index) => drop(inside.images.insert(index, State::UnderWay)),
-            None => inside.ended = true,
-        }
-        self.changed.notify_all();
-        next
-    }
-
-    /// Sets the state of an image that is made or left out.
-    fn finish(&self, index: u64, state: State) {
-        lock(&self.inside).images.insert(index, state);
-        self.changed.notify_all();
-    }
-
-    /// Waits for the next image by index and removes it from the queue; returns `None` after the last.
-    fn take(&self) -> Option<(u64, State)> {
-        let waits = |inside: &mut Inside| {
-            !inside.left
-                && match inside.images.first_key_value() {
-                    Some((_, state)) => matches!(state, State::UnderWay),
-                    None => !inside.ended,
-                }
-        };
-        let mut inside = self.changed.wait_while(lock(&self.inside), waits).unwrap_or_else(PoisonError::into_inner);
-        let next = if inside.left { None } else { inside.images.pop_first() };
-        self.changed.notify_all();
-        next
-    }
-
-    /// Ends the stream: no image is started or written any more.
-    fn end(&self) {
-        let mut inside = lock(&self.inside);
-        (inside.ended, inside.left) = (true, true);
-        self.changed.notify_all();
-    }
-}
-
-/// Ends the stream if a worker panics; otherwise the archive would wait for its image forever.
-struct EndOnPanic<'a>(&'a Queue);
-
-impl Drop for EndOnPanic<'_> {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.0.end();
-        }
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Message of the writing thread.
 enum Said {
     /// An image was written.
     Written(u64),
+    /// An image could not be made.
+    Failed(u64, Error),
     /// The thread has ended.
-    Ended(io::Result<()>),
+    Ended(Result<End>),
 }
 
-/// Number of written images and index of the last one.
+/// Reason for the end of an archive.
+#[derive(Debug, PartialEq)]
+enum End {
+    /// Every image was written or failed, or too many failed in a row, or one failed for a reason that persists.
+    Last,
+    /// The reader has closed the pipe.
+    Left,
+}
+
+/// What was written of a stream.
 #[derive(Default)]
 struct Written {
+    /// Number of images.
     images: u64,
+    /// Index of the last image.
     last: Option<u64>,
+    /// Errors of images that could not be made.
+    failures: BTreeMap<u64, Error>,
+    /// How the archive ended; `None` after a stop.
+    ended: Option<Result<End>>,
 }
 
 /// Polling interval for the stop flag.
@@ -312,14 +206,13 @@ const EVERY: Duration = Duration::from_millis(50);
 /// Time that a stop waits for the image that is being written.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Receives messages of the writing thread until it ends, or until [`PATIENCE`] has passed since a stop. The second
-/// result is `None` after a stop.
+/// Receives messages of the writing thread until it ends, or until [`PATIENCE`] has passed since a stop.
 fn listen(
     told: &Receiver<Said>,
     listener: &Listener<'_>,
-    queue: &Queue,
+    schedule: &Schedule<u64, Vec<File>>,
     stop: &AtomicBool,
-) -> (Written, Option<io::Result<()>>) {
+) -> Written {
     let mut written = Written::default();
     let mut stopped: Option<Instant> = None;
     loop {
@@ -328,35 +221,51 @@ fn listen(
                 (written.images, written.last) = (written.images + 1, Some(index));
                 (listener.done)(index);
             }
-            Ok(Said::Ended(ended)) => return (written, Some(ended).filter(|_| stopped.is_none())),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                queue.end();
-                return (written, Some(Err(io::Error::other("the thread that writes has failed"))));
+            Ok(Said::Failed(index, error)) => drop(written.failures.insert(index, error)),
+            Ok(Said::Ended(ended)) => {
+                written.ended = Some(ended).filter(|_| stopped.is_none());
+                return written;
             }
+            Err(RecvTimeoutError::Timeout) => {}
+            // The thread sends its end before it drops the sender.
+            Err(RecvTimeoutError::Disconnected) => return written,
         }
         if stopped.is_none() && listener.stop.load(Ordering::Relaxed) {
             stopped = Some(Instant::now());
             stop.store(true, Ordering::Relaxed);
-            queue.end();
+            schedule.end();
         }
         if stopped.is_some_and(|since| since.elapsed() > PATIENCE) {
-            return (written, None);
+            return written;
         }
     }
 }
 
-/// Writes the images of the queue as a tar archive.
-fn archive(queue: &Queue, out: impl Write, tell: &Sender<Said>) -> io::Result<()> {
+/// Writes the images as a tar archive until the last one, [`MOST_LEFT_OUT`] failures in a row, or an error that
+/// concerns more than one field.
+fn archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Sender<Said>) -> Result<End> {
+    write_archive(schedule, out, tell).or_else(|e| match e.kind() {
+        ErrorKind::BrokenPipe => Ok(End::Left),
+        _ => Err(Error::io(Path::new("stdout"))(e)),
+    })
+}
+
+fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Sender<Said>) -> io::Result<End> {
     let mut archive = tar::Builder::new(out);
     let mut left_out = 0;
-    while let Some((index, state)) = queue.take() {
-        let State::Made(files) = state else {
-            left_out += 1;
-            if left_out == MOST_LEFT_OUT {
-                break;
+    while let Some((index, made)) = schedule.take() {
+        let files = match made {
+            Ok(files) => files,
+            Err(e) => {
+                left_out += 1;
+                let ends = left_out == MOST_LEFT_OUT || !e.is_of_one_field();
+                // After a stop, nobody reads the reason.
+                let _ = tell.send(Said::Failed(index, e));
+                if ends {
+                    break;
+                }
+                continue;
             }
-            continue;
         };
         left_out = 0;
         for file in &files {
@@ -365,50 +274,51 @@ fn archive(queue: &Queue, out: impl Write, tell: &Sender<Said>) -> io::Result<()
         archive.get_mut().flush()?;
         let _ = tell.send(Said::Written(index));
     }
-    archive.into_inner()?.flush()
+    archive.into_inner()?.flush()?;
+    Ok(End::Last)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn made(queue: &Queue, index: u64) {
-        queue.finish(index, State::Made(vec![File { path: format!("images/{index:06}/rgb.png"), bytes: vec![7; 3] }]));
-    }
-
-    #[test]
-    fn images_leave_in_order_and_few_wait() {
-        let queue = Arc::new(Queue::new(10..14, 2));
-        assert_eq!((queue.begin(), queue.begin()), (Some(10), Some(11)));
-        made(&queue, 11);
-        let third = std::thread::spawn({
-            let queue = Arc::clone(&queue);
-            move || queue.begin()
-        });
-        std::thread::sleep(Duration::from_millis(50));
-        assert!(!third.is_finished(), "two are under way or wait");
-        made(&queue, 10);
-        assert_eq!(queue.take().map(|(index, _)| index), Some(10));
-        assert_eq!(third.join().unwrap(), Some(12));
-        assert_eq!(queue.take().map(|(index, _)| index), Some(11));
-        assert_eq!(queue.begin(), Some(13));
-        queue.finish(12, State::LeftOut);
-        made(&queue, 13);
-        assert!(matches!(queue.take(), Some((12, State::LeftOut))));
-        assert_eq!(queue.begin(), None);
-        assert!(matches!(queue.take(), Some((13, State::Made(_)))));
-        assert!(queue.take().is_none());
+    /// Runs the archive on images of which `make` makes the files; returns the indices of those written and failed.
+    fn archived(make: impl Fn(u64) -> Result<()> + Sync) -> (Vec<u64>, Vec<u64>) {
+        let schedule = Schedule::new((0..100).map(|index| vec![index]), ResultOrder::InOrder { ahead: 4 });
+        let make = |index: &u64, _: &Threads, (): &mut ()| {
+            make(*index).map(|()| vec![File { path: format!("images/{index:06}/rgb.png"), bytes: vec![7; 3] }])
+        };
+        let (tell, told) = channel();
+        let workers = Threads::divided(2, 2).unwrap();
+        let ended = schedule.run(&workers, || false, make, || archive(&schedule, io::sink(), &tell)).unwrap();
+        assert_eq!(ended.unwrap(), End::Last);
+        drop(tell);
+        let (mut written, mut failed) = (Vec::new(), Vec::new());
+        for said in told {
+            match said {
+                Said::Written(index) => written.push(index),
+                Said::Failed(index, _) => failed.push(index),
+                Said::Ended(_) => {}
+            }
+        }
+        (written, failed)
     }
 
     #[test]
     fn too_many_left_out_in_a_row_end_the_archive() {
-        let queue = Queue::new(0..100, 101);
-        while let Some(index) = queue.begin() {
-            if index == 5 || index == 30 { made(&queue, index) } else { queue.finish(index, State::LeftOut) }
-        }
-        let (tell, told) = channel();
-        archive(&queue, io::sink(), &tell).unwrap();
-        drop(tell);
-        assert_eq!(told.iter().count(), 1, "5 is written, 30 comes after more than twenty");
+        let made = |index| if index == 5 || index == 30 { Ok(()) } else { Err(Error::input("no sun")) };
+        let (written, failed) = archived(made);
+        assert_eq!(written, [5], "5 is written, 30 comes after more than twenty");
+        assert_eq!(failed.len(), 5 + MOST_LEFT_OUT);
+    }
+
+    /// Expected: the images before the one that fails are written, and none after it.
+    #[test]
+    fn a_panic_ends_the_archive_at_its_image() {
+        let (written, failed) = archived(|index| {
+            assert_ne!(index, 7, "no sun");
+            Ok(())
+        });
+        assert_eq!((written, failed), ((0..7).collect(), vec![7]));
     }
 }

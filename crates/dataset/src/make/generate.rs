@@ -22,13 +22,13 @@ use furrow_base::error::Kind;
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
-use furrow_job::{Renderer, SceneFile, Threads};
+use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
 use furrow_render::render::Watch;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The part of a dataset that a run makes: the images whose [unit](crate::Recipe::unit_of) `u` satisfies `u % of ==
@@ -92,7 +92,7 @@ pub struct Callbacks<'a> {
     pub begin: &'a (dyn Fn(usize) + Sync),
     /// Called with each warning before the first image.
     pub warn: &'a (dyn Fn(&str) + Sync),
-    /// Called with the index of each completed image, from any thread.
+    /// Called with the index of each completed image, on the calling thread.
     pub done: &'a (dyn Fn(u64) + Sync),
     /// Set to `true` to stop once the images in progress are complete.
     pub soon: &'a AtomicBool,
@@ -120,11 +120,6 @@ pub(crate) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usi
     let memory = memory.unwrap_or_else(usual_memory) as f64;
     let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
     ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
-}
-
-/// Returns the number of threads of one of `workers` workers that share `threads` threads; at least one.
-pub(crate) fn share(threads: usize, workers: usize, worker: usize) -> usize {
-    (threads / workers + usize::from(worker < threads % workers)).max(1)
 }
 
 /// Makes the missing images of a shard. A stopped run returns [`Kind::Interrupted`] with the number of complete images;
@@ -168,10 +163,10 @@ pub(crate) fn generate_for(
     let sent = delivery.deliver;
     units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
     // One worker renders all images of a field and day one after another, and builds the scene once.
-    let fields: Vec<&[(u64, Task)]> =
-        tasks.chunk_by(|a, b| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0)).collect();
+    let of_one_field = |a: &(u64, Task), b: &(u64, Task)| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0);
+    let fields: Vec<Vec<(u64, Task)>> = tasks.chunk_by(of_one_field).map(<[_]>::to_vec).collect();
     if let Some(time_left) = work.time_left {
-        let grows = |field: &&&[(u64, Task)]| field.iter().any(|(_, task)| *task == Task::All);
+        let grows = |field: &&Vec<(u64, Task)>| field.iter().any(|(_, task)| *task == Task::All);
         time_left.expect(tasks.len(), fields.iter().filter(grows).count());
     }
     let rendered = tasks.iter().find(|(_, task)| *task == Task::All).map(|(index, _)| *index);
@@ -190,8 +185,7 @@ pub(crate) fn generate_for(
         .as_ref()
         .map_or(MOST_AT_ONCE, |(scene, index, _)| fitting(scene, set.recipe.field_of(*index).0, work.memory));
     let at_once = if work.at_once == 0 { threads.min(most) } else { work.at_once }.min(fields.len()).max(1);
-    let workers: Vec<Threads> =
-        (0..at_once).map(|worker| Threads::new(share(threads, at_once, worker))).collect::<Result<_>>()?;
+    let workers = Threads::divided(threads, at_once)?;
     let run = Run {
         set,
         source: source.map(|(scene, _, renderer)| (scene, renderer)),
@@ -205,50 +199,32 @@ pub(crate) fn generate_for(
     if !tasks.is_empty() {
         run.timing_log.add(&Row::Began(Began { began_s: now(), images: tasks.len(), at_once, threads }))?;
     }
-    let next = AtomicUsize::new(0);
-    let made = AtomicUsize::new(0);
-    let failures: Mutex<BTreeMap<u64, Error>> = Mutex::default();
-    let failed = AtomicBool::new(false);
-    let fail = |index: u64, error: Error| {
-        // An error of one field does not stop the run; any other error, such as a full disk, does.
-        failed.fetch_or(!error.is_of_one_field(), Ordering::Relaxed);
-        // If this write fails too, for example on a full disk, the original error is still returned.
-        let _ = run.timing_log.add(&Row::Failure(ImageFailure { index, error: error.to_string(), failed_s: now() }));
-        failures.lock().unwrap_or_else(PoisonError::into_inner).insert(index, error);
+    let (mut made, mut failures) = (0, BTreeMap::new());
+    let make = |(index, task): &(u64, Task), threads: &Threads, kept: &mut LastField| {
+        threads.install(|| run.image(*index, *task, threads, kept))?;
+        if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) }
     };
+    let schedule = Schedule::new(fields.into_iter(), ResultOrder::AsFinished);
     let stopped = || callbacks.soon.load(Ordering::Relaxed) || callbacks.now.load(Ordering::Relaxed);
-    let refused = std::thread::scope(|scope| {
-        for worker in &workers {
-            let work = || {
-                let ended = || stopped() || failed.load(Ordering::Relaxed);
-                while let Some(field) = fields.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !ended()) {
-                    let mut kept = LastField::default();
-                    for (index, task) in field.iter().take_while(|_| !ended()) {
-                        match worker
-                            .install(|| run.image(*index, *task, worker, &mut kept))
-                            .and_then(|()| if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) })
-                        {
-                            Ok(()) => {
-                                made.fetch_add(1, Ordering::Relaxed);
-                                (callbacks.done)(*index);
-                            }
-                            Err(e) if e.kind() == Kind::Interrupted => break,
-                            Err(e) => fail(*index, e),
-                        }
-                    }
+    let refused = schedule.run(&workers, stopped, make, || {
+        while let Some(((index, _), result)) = schedule.take() {
+            match result {
+                Ok(()) => {
+                    made += 1;
+                    (callbacks.done)(index);
                 }
-            };
-            if let Err(e) = std::thread::Builder::new().name("images".into()).spawn_scoped(scope, work) {
-                // The threads that did start stop after their current images.
-                failed.store(true, Ordering::Relaxed);
-                return Some(Error::no_thread(e));
+                Err(e) if e.kind() == Kind::Interrupted => {}
+                Err(e) => {
+                    let failure = ImageFailure { index, error: e.to_string(), failed_s: now() };
+                    // If this write fails too, for example on a full disk, the original error is still returned.
+                    let _ = run.timing_log.add(&Row::Failure(failure));
+                    failures.insert(index, e);
+                }
             }
         }
-        None
     });
-    let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
     // A stop may arrive after the last image; the run is complete then.
-    let lacking = tasks.len() - made.into_inner();
+    let lacking = tasks.len() - made;
     let end = match lacking {
         _ if !failures.is_empty() => End::Failed,
         0 => End::Done,
@@ -259,9 +235,7 @@ pub(crate) fn generate_for(
         return Err(together(failures));
     }
     noted?;
-    if let Some(refused) = refused {
-        return Err(refused);
-    }
+    refused?;
     if lacking == 0 { Ok(()) } else { Err(interrupted(delivery.home, wanted - lacking, wanted)) }
 }
 
@@ -457,16 +431,6 @@ fn lost(set: &Set, index: u64) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn threads_are_shared_out_whole() {
-        for (threads, workers) in [(1, 1), (2, 2), (7, 3), (64, 16), (5, 4)] {
-            let shares: Vec<usize> = (0..workers).map(|worker| share(threads, workers, worker)).collect();
-            assert_eq!(shares.iter().sum::<usize>(), threads);
-            assert!(shares.iter().max().unwrap() - shares.iter().min().unwrap() <= 1);
-        }
-        assert_eq!(share(2, 3, 2), 1);
-    }
 
     #[test]
     fn a_cause_that_lasts_is_told_alone_and_faults_of_fields_together() {

@@ -68,6 +68,7 @@ impl Watch<'_> {
 pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
+        .thread_name(|_| "pool".into())
         .start_handler(|_| prepare_thread())
         .build()
         .map_err(|e| Error::failed(format!("cannot start {threads} threads: {e}")))

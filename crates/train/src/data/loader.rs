@@ -10,6 +10,7 @@ use super::order::Order;
 use super::photos::{Photos, Views};
 use super::store::Store;
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -60,7 +61,7 @@ impl Loader<Views> {
 }
 
 impl<T: Send + 'static> Loader<T> {
-    /// Starts the threads. `maker` creates, for each thread, the function that prepares the input of a step.
+    /// Starts the threads; a panic in one is the error of its step. `maker` creates, for each thread, the function that prepares the input of a step.
     fn of<M>(maker: impl Fn() -> M, from: u64, to: u64, threads: usize) -> Result<Self>
     where
         M: FnMut(u64) -> Result<T> + Send + 'static,
@@ -71,7 +72,8 @@ impl<T: Send + 'static> Loader<T> {
             let mut make = maker();
             let work = move || {
                 for step in (from + thread..to).step_by(threads as usize) {
-                    let made = make(step);
+                    let made = supervised(|| make(step)).map_err(|bug| bug.within(format!("step {step}")));
+                    let made = made.and_then(|made| made);
                     let failed = made.is_err();
                     // A failed send means that the loader was dropped.
                     if sender.send(made).is_err() || failed {
@@ -157,5 +159,21 @@ mod tests {
             order.sort_unstable();
             assert_eq!(order, [0, 1, 2, 3, 4, 5, 6]);
         }
+    }
+
+    /// Expected: the steps before the panic arrive, then its error, then nothing; the loader never waits.
+    #[test]
+    fn a_panic_is_the_error_of_its_step() {
+        let maker = || {
+            |step: u64| {
+                assert_ne!(step, 3, "no leaf");
+                Ok(step)
+            }
+        };
+        let mut loader = Loader::of(maker, 0, 100, 1).unwrap();
+        assert!((0..3).all(|step| loader.next().unwrap().unwrap() == step));
+        let error = loader.next().unwrap().unwrap_err().to_string();
+        assert!(error.starts_with("step 3: the program failed: ") && error.contains("no leaf"), "{error}");
+        assert!(loader.next().is_none());
     }
 }

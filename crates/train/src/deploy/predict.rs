@@ -13,8 +13,10 @@ use crate::run::ModelCard;
 use crate::session::Machine;
 use crate::torch::multiscale::{self, Scores};
 use crate::torch::{Model, device};
+use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_output::Picture as Png;
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -98,8 +100,9 @@ pub fn predict(
                 break;
             }
             match readers[number % workers].recv() {
-                Ok(Ok(ready)) => batch.push((number, ready)),
-                Ok(Err(fault)) => {
+                Ok(Ok(Ok(ready))) => batch.push((number, ready)),
+                Ok(Err(bug)) => return Err(bug),
+                Ok(Ok(Err(fault))) => {
                     unread.push(pictures[number].name.as_str());
                     made.faults.push(fault);
                 }
@@ -113,7 +116,7 @@ pub fn predict(
         drop((readers, writers));
         let mut written = Vec::new();
         for handle in handles {
-            written.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
+            written.extend(supervised(|| handle.join().unwrap_or_else(|panic| resume_unwind(panic)))??);
         }
         written.sort();
         made.done = written.len();
@@ -161,16 +164,16 @@ fn learn(
     Ok((found, picked.len()))
 }
 
-/// Starts a thread that reads the images and sends them to the returned receiver.
+/// Starts a thread that reads the images and sends them to the returned receiver, or the error of a panic.
 fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
     card: &'a ModelCard,
     pictures: impl Iterator<Item = &'a Picture> + Send + 's,
-) -> Result<Receiver<Result<Ready<'a>>>> {
+) -> Result<Receiver<Result<Result<Ready<'a>>>>> {
     let (sender, receiver) = sync_channel(AHEAD);
     let work = move || {
         for picture in pictures {
-            let ready = Ready::read(picture, card);
+            let ready = supervised(|| Ready::read(picture, card)).map_err(|bug| bug.within(&picture.name));
             // The receiver is gone: the prediction was stopped.
             if sender.send(ready).is_err() {
                 return;
@@ -198,7 +201,8 @@ fn write<'s, 'a: 's>(
     let work = move || {
         let mut written = Vec::new();
         for (number, ready, mut scores) in receiver {
-            match draw(card, out, &ready, &mut scores, appearance) {
+            let drawn = supervised(|| draw(card, out, &ready, &mut scores, appearance));
+            match drawn.map_err(|bug| bug.within(&ready.picture.name)).and_then(|drawn| drawn) {
                 Ok(paths) => written.push((number, paths)),
                 Err(e) => {
                     failed.store(true, Ordering::Relaxed);

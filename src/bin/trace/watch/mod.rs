@@ -103,10 +103,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let files = files::watch(session.clone())?;
     let tev = args.display.map(|Display::Tev| tev::Tev::default());
     let worker = Worker::new(session.clone(), files, (&threads, args.memory.bytes), tev)?;
-    let thread = std::thread::Builder::new()
-        .name("render".into())
-        .spawn(move || worker.run())
-        .map_err(|e| Error::failed(format!("cannot start a thread: {e}")))?;
+    let thread =
+        std::thread::Builder::new().name("render".into()).spawn(move || worker.run()).map_err(Error::no_thread)?;
     server.serve(stop);
     session.end();
     // It may be building a field. There is no need to wait for that, because nothing is written.

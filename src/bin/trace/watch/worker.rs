@@ -9,6 +9,7 @@ use super::sliders::{sliders, with};
 use super::tev::Tev;
 use furrow_base::error::Kind;
 use furrow_base::ron_file::RonFile;
+use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_field::assemble::Preview;
 use furrow_job::{Field, Renderer, Request, SceneFile, Threads};
@@ -64,7 +65,12 @@ impl Worker {
         let session = self.session.clone();
         while let Some((asked, wish)) = session.next(done) {
             done = asked;
-            match self.answer(asked, &wish) {
+            let answered = supervised(|| self.answer(asked, &wish)).unwrap_or_else(|bug| {
+                // What a panic interrupted may be incomplete: the next request reads and builds everything again.
+                (self.preview, self.known, self.own_width) = (Preview::default(), None, None);
+                Err(bug)
+            });
+            match answered {
                 Err(error) if error.kind() == Kind::Interrupted => {}
                 Err(error) => {
                     self.files.fail(session.path(), error.place().map(|place| place.file.as_path()));
