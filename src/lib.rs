@@ -57,7 +57,7 @@
 //! | 8 | `furrow-job` | scene file → image → files |
 //! | 7 | `furrow-output` | file formats |
 //! | 6 | `furrow-field` | scene file → scene |
-//! | 5 | `furrow-render` | `film`, `settings` · `material`, `accel` · `scene` · `integrator` · `render` · `raster` |
+//! | 4 | `furrow-render` | `film`, `settings` · `material`, `accel` · `scene` · `integrator` · `render` · `raster` |
 //! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model` |
 //! | 3 | `furrow-optics` | `optics` · `texture` · `bsdf`, `light`, `sensor` |
 //! | 1 | `furrow-report` | charts, tables, HTML pages |

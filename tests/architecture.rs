@@ -29,6 +29,8 @@ const NEVER: &[(&str, &str)] = &[
     ("bsdf", "geometry texture scene light material sampling"),
     ("material", "light"),
     ("light", "material"),
+    // Takes textures, marks and maps as plain data, whoever grew them.
+    ("material", "plant soil scatter model"),
     // Uses meshes and their masks only; other modules hold a `&dyn Intersect`.
     ("accel", "material light scene sensor"),
     // Reads files into meshes and surface descriptions; the scattering of light is the materials' task.

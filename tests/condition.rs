@@ -14,9 +14,10 @@ use furrow_dataset::make::damage::damage;
 use furrow_field::Field;
 use furrow_field::PartKind;
 use furrow_field::assemble::Options;
-use furrow_grow::plant::condition::{Bearer, Marks};
+use furrow_grow::plant::condition::Bearer;
 use furrow_grow::plant::{Condition, ConditionDesc, OrganKind};
 use furrow_optics::optics::soil::LOESS;
+use furrow_optics::texture::marks::Marks;
 use furrow_render::accel::{Brute, EmbreeAccel};
 use furrow_render::material::{ConditionOptics, Damage, LeafDesc, LeafMaterial, Material, Tones};
 use furrow_render::render::label;
@@ -233,7 +234,7 @@ fn leaf(desc: &ConditionDesc, condition: &Condition, k: u64) -> (Material, Marks
         mask: None,
         margin: None,
     };
-    let marks = Marks::draw(desc, condition, &bearer, &Stream::of(5, 0, Purpose::Test, k));
+    let marks = bearer.draw_marks(desc, condition, &Stream::of(5, 0, Purpose::Test, k));
     let leaf = LeafDesc::default();
     let tones = Arc::new(Tones::new(&leaf.pigments));
     let optics = ConditionOptics::new((&leaf.pigments, tones), Some(marks.clone()), 0.0, LOESS);

@@ -17,7 +17,7 @@ use furrow_field::assemble::{Options, field_of};
 use furrow_field::days::DaysDesc;
 use furrow_field::traits::Traits;
 use furrow_field::{Field, PartKind};
-use furrow_grow::plant::condition::{Bearer, Marks};
+use furrow_grow::plant::condition::Bearer;
 use furrow_grow::plant::{Condition, ConditionDesc};
 use furrow_optics::light::LightRecord;
 use std::collections::{BTreeMap, BTreeSet};
@@ -383,7 +383,7 @@ fn marks_stay_where_they_were_and_more_come() {
                 margin: None,
             };
             let stream = Stream::of(1, 0, Purpose::Test, k);
-            let left = Marks::draw(&ConditionDesc::flawless(), &condition, &bearer, &stream).cut(Some(&mask));
+            let left = bearer.draw_marks(&ConditionDesc::flawless(), &condition, &stream).cut(Some(&mask));
             *all += mask.count() - left.count();
             if let Some(had) = before {
                 for i in 0..120 * 200 {

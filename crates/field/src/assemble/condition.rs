@@ -5,9 +5,10 @@ use crate::library::Choice;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{Spectrum, Vec2};
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_grow::plant::condition::{Bearer, Marks, leaf_stream};
+use furrow_grow::plant::condition::{Bearer, leaf_stream};
 use furrow_grow::plant::{Condition, ConditionDesc, LeafLife, OrganKind};
 use furrow_optics::optics::Pigments;
+use furrow_optics::texture::marks::Marks;
 use furrow_render::material::{ConditionOptics, LeafMaterial};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -134,6 +135,6 @@ impl<'a> Ailing<'a> {
         // A ribbon without an image is too narrow for bites and spots; only uniform effects apply.
         let all_over = Condition { chlorosis: self.drawn.chlorosis, dust: self.drawn.dust, ..Condition::default() };
         let drawn = if image.is_some() { &self.drawn } else { &all_over };
-        Marks::draw(self.desc, drawn, &bearer, stream)
+        bearer.draw_marks(self.desc, drawn, stream)
     }
 }

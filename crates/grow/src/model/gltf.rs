@@ -9,12 +9,12 @@ use super::document::{
 };
 use super::files::Files;
 use super::glb;
-use super::parts::{Label, MOST_TRIANGLES, Model, NormalTexture, Part, Surface, Transmission, Up};
+use super::parts::{Label, MOST_TRIANGLES, Model, Part, Up};
 use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use super::uri::{Target, follow};
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::{DMat4, DQuat, DVec3, Vec2, Vec3, vec2};
-use furrow_optics::texture::{ColorSpace, Header, NormalMap, Texture, Wrap};
+use furrow_optics::texture::{ColorSpace, Header, NormalMap, NormalTexture, Surface, Texture, Transmission, Wrap};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -17,7 +17,7 @@ mod parts;
 mod settle;
 mod uri;
 
-pub use parts::{Label, Model, NormalTexture, Part, Surface, Transmission, Up};
+pub use parts::{Label, Model, Part, Up};
 
 use files::Files;
 use furrow_base::input::Scope;

@@ -5,11 +5,11 @@
 //! downwards here.
 
 use super::files::Files;
-use super::parts::{MOST_TRIANGLES, Model, Part, Surface, Up};
+use super::parts::{MOST_TRIANGLES, Model, Part, Up};
 use super::settle::{Wrong, faceted, fraction, into_one_tile, settle, too_many_triangles};
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::{Vec3, vec2};
-use furrow_optics::texture::{ColorSpace, Header, Texture, Wrap};
+use furrow_optics::texture::{ColorSpace, Header, Surface, Texture, Wrap};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -38,7 +38,6 @@ mod surface;
 mod tests;
 mod wheel;
 
-pub use bake::GroundMaps;
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
 pub use color::SoilColor;
@@ -60,15 +59,10 @@ pub use site::{FULL_CELL_M, FULL_TEXEL_M, SeedRows, Site};
 pub use stone::stones;
 pub use wheel::WheelDesc;
 
+pub use furrow_optics::texture::ground::MAX_LAYERS;
+
 use furrow_base::math::{Vec2, vec2};
 use furrow_base::sampling::{Purpose, Stream};
-
-/// Slope angle of the soil's facets below a millimetre, radians. For ground with explicit relief down to 1 mm, Irons et
-/// al. 1992 imply 0.26–0.52.
-pub const FACETS: f32 = 0.35;
-
-/// Maximum number of layers of a ground.
-pub const MAX_LAYERS: usize = 4;
 
 /// Textures of one layer, sampled at tile coordinates: one tile is 0..1, and both textures repeat.
 pub trait LayerMaps {

@@ -10,7 +10,6 @@
 //! Clods that are bodies at full detail but not here also shade themselves and each other. Their effect is computed for
 //! level ground, from their heights alone.
 
-use super::FACETS;
 use super::bake::{Painted, Shade, closing, wet};
 use super::ground::Ground;
 use super::lit::{Heights, Lit, Reach};
@@ -20,6 +19,8 @@ use super::{Canopy, InView, LayerMaps, Rect};
 use furrow_base::math::{Vec2, Vec3, vec2};
 use furrow_optics::optics::LostRelief;
 use furrow_optics::optics::shadowing::{PAIRS, SLANTS, Shadowing, TURNS, Table};
+use furrow_optics::optics::soil::FACETS;
+use furrow_optics::texture::ground::GroundMaps;
 use rayon::prelude::*;
 
 /// Maximum number of patches along each side of the ground, the side of a patch, and the margin built around each,
@@ -253,7 +254,7 @@ impl Ground {
         let (k, slope) = painted.at(p);
         let mesh = if self.flat { Vec3::Z } else { self.normal(p.x, p.y) };
         let normal = Vec3::new(mesh.x - slope.x * mesh.z, mesh.y - slope.y * mesh.z, mesh.z).normalize();
-        let albedo = super::GroundMaps::decode(painted.maps.albedo[k]).iter().sum();
+        let albedo = GroundMaps::decode(painted.maps.albedo[k]).iter().sum();
         let height = self.height(p.x, p.y);
         let rise = |d: Vec2| if self.flat { 0.0 } else { self.height(p.x + d.x, p.y + d.y) - height };
         Sample {

@@ -4,6 +4,7 @@ use super::*;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::Vec3;
 use furrow_base::ron_file::{Num, Vary};
+use furrow_optics::texture::ground::GroundMaps;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

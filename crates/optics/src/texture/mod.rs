@@ -8,14 +8,17 @@
 mod cutout;
 pub mod draw;
 pub mod exr_size;
+pub mod ground;
 mod height;
 pub mod maps;
+pub mod marks;
 mod need;
 pub mod noise;
 pub mod panorama;
 mod pyramid;
 mod rgbe;
 mod srgb;
+mod surface;
 mod texels;
 
 pub use cutout::{Cutting, cut_out, doubts};
@@ -24,6 +27,7 @@ pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
 pub use need::{Allowance, Header, Need};
 pub use pyramid::Wrap;
 pub use srgb::ColorSpace;
+pub use surface::{NormalTexture, Surface, Transmission};
 
 use furrow_base::error::{Error, Result};
 use furrow_base::geometry::AlphaMask;

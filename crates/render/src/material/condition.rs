@@ -16,9 +16,9 @@
 use super::Damage;
 use furrow_base::math::{Spectrum, Vec2, Vec3, Vec4, smoothstep};
 use furrow_base::ron_file::Num;
-use furrow_grow::plant::condition::{Marks, Tissue};
 use furrow_optics::optics::{Leaf, LeafBands, LeafOptics, Pigments};
 use furrow_optics::texture::Texture;
+use furrow_optics::texture::marks::{Marks, Tissue};
 use furrow_optics::texture::noise::Perlin;
 use std::sync::Arc;
 
@@ -155,7 +155,7 @@ impl ConditionOptics {
 
     /// Roughness α of the upper side's coat under the dust of this leaf.
     pub(super) fn dulled(&self, alpha: f32) -> f32 {
-        (alpha + DULL * self.0.marks.as_ref().map_or(0.0, Marks::dust)).min(0.9)
+        (alpha + DULL * self.0.marks.as_ref().map_or(0.0, |marks| marks.dust)).min(0.9)
     }
 
     /// Address of the shared data, equal for clones.
@@ -167,7 +167,7 @@ impl ConditionOptics {
     pub(super) fn picture_size(&self, most: (u32, u32)) -> (u32, u32) {
         let Some(marks) = &self.0.marks else { return most };
         let fit = |mm: f32, most: u32| ((mm * 3.0).ceil() as u32).clamp(16.min(most), most);
-        (fit(marks.image_mm().x, most.0), fit(marks.image_mm().y, most.1))
+        (fit(marks.image_mm.x, most.0), fit(marks.image_mm.y, most.1))
     }
 
     /// Degree to which a point belongs to a vein, 0–1: veins are paler than their surroundings.
@@ -176,7 +176,7 @@ impl ConditionOptics {
         let Some(marks) = &inner.marks else { return 1.0 };
         let Some(picture) = picture.filter(|_| marks.interveinal() || inner.red.is_some()) else { return 0.0 };
         let luminance = |mm: f32| {
-            let [r, g, b, _] = picture.sample(uv, picture.lod(mm / marks.image_mm().max_element()));
+            let [r, g, b, _] = picture.sample(uv, picture.lod(mm / marks.image_mm.max_element()));
             Vec3::new(r, g, b).dot(Vec3::new(0.2126, 0.7152, 0.0722))
         };
         let contrast = luminance(VEIN_MM.0) / luminance(VEIN_MM.1).max(1e-4);
@@ -250,10 +250,8 @@ pub fn tissues(pigments: &Pigments, s: f32) -> [Leaf; 3] {
 mod tests {
     use super::*;
     use furrow_base::math::vec2;
-    use furrow_base::sampling::{Purpose, Stream};
-    use furrow_grow::plant::condition::Bearer;
-    use furrow_grow::plant::{Condition, ConditionDesc};
     use furrow_optics::optics::soil::LOESS;
+    use furrow_optics::texture::marks::Patch;
     use proptest::prelude::*;
 
     fn ndvi(leaf: Leaf) -> f32 {
@@ -261,25 +259,14 @@ mod tests {
         (nir - r) / (nir + r)
     }
 
-    fn optics(condition: &Condition, seed: u64) -> ConditionOptics {
-        let bearer = Bearer {
-            met: None,
-            age: 1.0,
-            cotyledon: false,
-            share: 1.0,
-            height: 0.0,
-            image_mm: vec2(60.0, 100.0),
-            mask: None,
-            margin: None,
-        };
-        let stream = Stream::of(seed, 0, Purpose::Test, 0);
-        let marks = Marks::draw(&ConditionDesc::flawless(), condition, &bearer, &stream);
+    fn optics(marks: Marks, reddening: f32) -> ConditionOptics {
         let pigments = Pigments::default();
-        ConditionOptics::new((&pigments, Arc::new(Tones::new(&pigments))), Some(marks), condition.reddening, LOESS)
+        let marks = Marks { image_mm: vec2(60.0, 100.0), ..marks };
+        ConditionOptics::new((&pigments, Arc::new(Tones::new(&pigments))), Some(marks), reddening, LOESS)
     }
 
-    fn mean_ndvi(condition: &Condition) -> f32 {
-        let of = optics(condition, 4);
+    fn mean_ndvi(marks: Marks) -> f32 {
+        let of = optics(marks, 0.0);
         let leaf = LeafOptics::new(&Pigments::default()).plain();
         let at = |i: usize| vec2((i % 40) as f32 / 40.0, (i / 40) as f32 / 40.0);
         (0..1600).map(|i| ndvi(of.at(leaf, at(i), None).upper)).sum::<f32>() / 1600.0
@@ -304,9 +291,9 @@ mod tests {
 
     #[test]
     fn dust_and_splash_lower_the_ndvi_step_by_step() {
-        let dust = [0.0, 0.05, 0.1, 0.2, 0.4].map(|dust| mean_ndvi(&Condition { dust, ..Condition::default() }));
+        let dust = [0.0, 0.05, 0.1, 0.2, 0.4].map(|dust| mean_ndvi(Marks { dust, ..Marks::default() }));
         assert!(dust.windows(2).all(|w| w[1] < w[0]), "{dust:?}");
-        let splash = [0.0, 1.0, 4.0, 12.0].map(|splash| mean_ndvi(&Condition { splash, ..Condition::default() }));
+        let splash = [0.0, 0.06, 0.25, 0.7].map(|splash| mean_ndvi(Marks { splash, ..Marks::default() }));
         assert!(splash.windows(2).all(|w| w[1] < w[0]), "{splash:?}");
     }
 
@@ -324,13 +311,17 @@ mod tests {
         fn no_worn_leaf_returns_more_than_it_receives(
             rgb in prop::array::uniform3(0f32..1.0),
             u in 0f32..1.0, v in 0f32..1.0,
-            chlorosis in 0f32..1.0, spots in 0f32..30.0, dust in 0f32..1.0, splash in 0f32..20.0, reddening in 0f32..20.0,
-            seed in 0u64..40,
+            chlorosis in 0f32..1.0, spots in 0usize..30, dust in 0f32..0.9, splash in 0f32..1.0, reddening in 0f32..20.0,
+            seed in 0u32..40,
         ) {
-            let condition =
-                Condition { chlorosis, spots, dust, splash, reddening, scorched: 1.0, scorch: 0.1, ..Condition::default() };
+            let spot = |k: usize| {
+                let centre = vec2((k * 7 % 60) as f32 - 30.0, (k * 13 % 100) as f32);
+                Patch { centre, radius: 3.0, turn: Vec2::X, stretch: 1.2, phase: Vec2::splat(k as f32) }
+            };
+            let spots: Vec<Patch> = (0..spots).map(spot).collect();
+            let marks = Marks { seed, chlorosis, blotches: spots.clone(), spots, dust, splash, ..Marks::default() };
             let leaf = LeafOptics::new(&Pigments::default()).at(rgb);
-            let worn = optics(&condition, seed).at(leaf, vec2(u, v), None);
+            let worn = optics(marks, reddening).at(leaf, vec2(u, v), None);
             for side in [worn.tissue, worn.upper] {
                 let sum = (side.reflectance + side.transmittance).max();
                 prop_assert!(sum <= 0.9901 && side.reflectance.is_finite(), "{side:?}");

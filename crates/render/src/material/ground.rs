@@ -6,10 +6,10 @@ use super::swatch::{Grain, Swatch, Tone};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
 use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, vec2};
-use furrow_grow::soil::{FACETS, GroundMaps};
 use furrow_optics::bsdf::{Bsdf, OrenNayar, Rough, Shadowed, Wet};
 use furrow_optics::optics::Shadowing;
-use furrow_optics::optics::soil::{at as four_bands, wet};
+use furrow_optics::optics::soil::{FACETS, at as four_bands, wet};
+use furrow_optics::texture::ground::GroundMaps;
 use rayon::prelude::*;
 use std::sync::Arc;
 

@@ -15,9 +15,8 @@ use super::swatch::{Swatch, Tone, centre};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
 use furrow_base::math::{Frame, Spectrum, Vec2, Vec3};
-use furrow_grow::model::{NormalTexture, Surface, Transmission};
 use furrow_optics::bsdf::{self, Bsdf, OrenNayar, Side};
-use furrow_optics::texture::Texture;
+use furrow_optics::texture::{NormalTexture, Surface, Texture, Transmission};
 use std::sync::Arc;
 
 /// Index of refraction of the coat, as in glTF.

@@ -2,14 +2,14 @@
 //! its appearance.
 //!
 //! A species file defines the distribution of the damage ([`ConditionDesc`]), each plant draws its own ([`Condition`]),
-//! and each leaf draws its [`Marks`]: holes and bites, which cut its mask, and tissue that is yellow, dead or covered
+//! and each leaf draws its [`Marks`](furrow_optics::texture::marks::Marks): holes and bites, which cut its mask, and tissue that is yellow, dead or covered
 //! with soil. All of this uses separate random streams, so a plant has the same leaves in the same places with and
 //! without a condition.
 
 mod marks;
 mod posture;
 
-pub use marks::{Bearer, Marks, Tissue};
+pub use marks::Bearer;
 pub(super) use posture::Posture;
 
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Positive, Vary};

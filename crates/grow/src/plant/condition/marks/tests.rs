@@ -1,6 +1,7 @@
 //! Areas and numbers of the parts that marks remove or colour.
 
 use super::*;
+use furrow_optics::texture::noise::Perlin;
 
 const IMAGE: Vec2 = vec2(60.0, 100.0);
 
@@ -26,7 +27,7 @@ fn stream(k: u64) -> Stream {
 }
 
 fn marks(condition: &Condition, bearer: &Bearer<'_>, k: u64) -> Marks {
-    Marks::draw(&ConditionDesc::flawless(), condition, bearer, &stream(k))
+    bearer.draw_marks(&ConditionDesc::flawless(), condition, &stream(k))
 }
 
 #[test]
@@ -63,7 +64,7 @@ fn holes_remove_the_area_of_their_radius() {
     let condition = Condition { holes: 1.0, ..Condition::default() };
     let (mut removed, mut holes) = (0.0, 0);
     for k in 0..400 {
-        let m = Marks::draw(&desc, &condition, &leaf(&mask), &stream(k));
+        let m = leaf(&mask).draw_marks(&desc, &condition, &stream(k));
         let centred = m.holes.iter().all(|h| (h.centre / vec2(28.0, 47.0) - vec2(0.0, 50.0 / 47.0)).length() < 0.8);
         if m.holes() == 1 && centred {
             removed += (mask.count() - m.cut(Some(&mask)).count()) as f32 * 0.04;
@@ -177,7 +178,7 @@ fn scorched_rims_are_a_share_of_the_blade_and_rare() {
     let desc = ConditionDesc::default();
     let bearer = Bearer { margin: Some(&margin), ..leaf(&mask) };
     let rims =
-        (0..2000).filter(|k| Marks::draw(&desc, &desc.draw(&stream(*k)), &bearer, &stream(*k)).scorch_mm > 0.0).count();
+        (0..2000).filter(|k| bearer.draw_marks(&desc, &desc.draw(&stream(*k)), &stream(*k)).scorch_mm > 0.0).count();
     assert!((10..67).contains(&rims), "{rims} of 2000");
 }
 

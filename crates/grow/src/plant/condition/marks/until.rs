@@ -4,27 +4,25 @@
 //! uniform over the period in which the leaf receives marks. The marks of a later day therefore include those of an
 //! earlier day, in the same places.
 
-use super::Marks;
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_optics::texture::marks::Marks;
 
 /// Index of the first of the leaf's streams for the moments, one stream for each kind of mark.
 const MOMENTS: u64 = 40;
 
-impl Marks {
-    /// Keeps the marks that appear within the first `share` of the period, 0 to 1; `stream` is the leaf's.
-    pub(super) fn until(mut self, share: f32, stream: &Stream) -> Self {
-        let whole = self.holes.len() - self.bites;
-        let bites = self.holes.split_off(whole);
-        keep(&mut self.holes, share, stream, 0);
-        let mut kept = bites;
-        keep(&mut kept, share, stream, 1);
-        self.bites = kept.len();
-        self.holes.append(&mut kept);
-        keep(&mut self.tears, share, stream, 2);
-        keep(&mut self.blotches, share, stream, 3);
-        keep(&mut self.spots, share, stream, 4);
-        self
-    }
+/// Keeps the marks that appear within the first `share` of the period, 0 to 1; `stream` is the leaf's.
+pub(super) fn until(mut marks: Marks, share: f32, stream: &Stream) -> Marks {
+    let whole = marks.holes.len() - marks.bites;
+    let bites = marks.holes.split_off(whole);
+    keep(&mut marks.holes, share, stream, 0);
+    let mut kept = bites;
+    keep(&mut kept, share, stream, 1);
+    marks.bites = kept.len();
+    marks.holes.append(&mut kept);
+    keep(&mut marks.tears, share, stream, 2);
+    keep(&mut marks.blotches, share, stream, 3);
+    keep(&mut marks.spots, share, stream, 4);
+    marks
 }
 
 fn keep<T>(marks: &mut Vec<T>, share: f32, stream: &Stream, kind: u64) {
