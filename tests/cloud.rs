@@ -13,7 +13,7 @@ use furrow_output::cloud::{self, Cloud};
 use std::collections::BTreeMap;
 
 /// Size of a point in bytes: position, normal and labels.
-const POINT: usize = 36;
+const POINT: usize = 38;
 
 /// Positions, normals and labels (plant, leaf) of a cloud's points.
 fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u32, u16))> {
@@ -22,6 +22,10 @@ fn points(cloud: Cloud) -> Vec<(Vec3, Vec3, (u32, u16))> {
     let header = file.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let words = String::from_utf8_lossy(&file[..header]).into_owned();
     assert!(words.contains(&format!("element vertex {count}\n")), "{words}");
+    // Open3D drops properties of other types.
+    let mut properties = words.lines().filter_map(|line| line.strip_prefix("property "));
+    let read = |property: &str| ["float ", "int ", "uchar "].iter().any(|kind| property.starts_with(kind));
+    assert!(properties.all(read), "{words}");
     let body = &file[header..];
     assert_eq!(body.len(), count as usize * POINT);
     let float = |p: &[u8], k: usize| f32::from_le_bytes(p[4 * k..4 * k + 4].try_into().unwrap());

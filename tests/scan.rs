@@ -245,8 +245,8 @@ fn columns(file: &[u8]) -> (BTreeMap<String, Vec<f64>>, Vec<String>) {
         for (kind, name) in &properties {
             let value = match kind.as_str() {
                 "float" => f64::from(f32::from_le_bytes(take(4).try_into().unwrap())),
-                "uint" => f64::from(u32::from_le_bytes(take(4).try_into().unwrap())),
-                "ushort" => f64::from(u16::from_le_bytes(take(2).try_into().unwrap())),
+                "double" => f64::from_le_bytes(take(8).try_into().unwrap()),
+                "int" => f64::from(i32::from_le_bytes(take(4).try_into().unwrap())),
                 "uchar" => f64::from(take(1)[0]),
                 other => panic!("a property of type {other}"),
             };

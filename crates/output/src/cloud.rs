@@ -18,7 +18,8 @@ use furrow_render::scene::Part;
 use furrow_render::scene::tag::Class;
 use std::path::Path;
 
-/// Types and names of a point's properties, in file order.
+/// Types and names of a point's properties, in file order. Whole numbers are `uchar` or `int`: Open3D drops `ushort` and
+/// `uint`.
 const PROPERTIES: [(&str, &str); 14] = [
     ("float", "x"),
     ("float", "y"),
@@ -32,11 +33,11 @@ const PROPERTIES: [(&str, &str); 14] = [
     ("uchar", "nir"),
     ("uchar", "class"),
     ("uchar", "part"),
-    ("uint", "plant"),
-    ("ushort", "leaf"),
+    ("int", "plant"),
+    ("int", "leaf"),
 ];
 
-/// Largest number of points in a file, 3.6 GB.
+/// Largest number of points in a file, 3.8 GB.
 const MOST_POINTS: f64 = 1e8;
 
 /// Properties of one point.
@@ -71,14 +72,14 @@ impl Column {
         Self { kind: "float", name }
     }
 
-    /// Creates an unsigned 32-bit integer property.
-    pub const fn uint(name: &'static str) -> Self {
-        Self { kind: "uint", name }
+    /// Creates a double-precision property, which holds every unsigned 32-bit integer.
+    pub const fn double(name: &'static str) -> Self {
+        Self { kind: "double", name }
     }
 
-    /// Creates an unsigned 16-bit integer property.
-    pub const fn ushort(name: &'static str) -> Self {
-        Self { kind: "ushort", name }
+    /// Creates a signed 32-bit integer property.
+    pub const fn int(name: &'static str) -> Self {
+        Self { kind: "int", name }
     }
 
     /// Creates an unsigned 8-bit integer property.
@@ -92,10 +93,10 @@ impl Column {
 pub enum Value {
     /// Single-precision number.
     Float(f32),
-    /// Unsigned 32-bit integer.
-    Uint(u32),
-    /// Unsigned 16-bit integer.
-    Ushort(u16),
+    /// Double-precision number.
+    Double(f64),
+    /// Signed 32-bit integer.
+    Int(i32),
     /// Unsigned 8-bit integer.
     Uchar(u8),
 }
@@ -104,8 +105,8 @@ impl Value {
     fn kind(self) -> &'static str {
         match self {
             Self::Float(_) => "float",
-            Self::Uint(_) => "uint",
-            Self::Ushort(_) => "ushort",
+            Self::Double(_) => "double",
+            Self::Int(_) => "int",
             Self::Uchar(_) => "uchar",
         }
     }
@@ -139,8 +140,8 @@ impl Cloud {
         for value in values {
             match value {
                 Value::Float(v) => self.bytes.extend(v.to_le_bytes()),
-                Value::Uint(v) => self.bytes.extend(v.to_le_bytes()),
-                Value::Ushort(v) => self.bytes.extend(v.to_le_bytes()),
+                Value::Double(v) => self.bytes.extend(v.to_le_bytes()),
+                Value::Int(v) => self.bytes.extend(v.to_le_bytes()),
                 Value::Uchar(v) => self.bytes.push(*v),
             }
         }
@@ -153,8 +154,9 @@ impl Cloud {
         self.bytes.extend(rgb);
         self.bytes.push(*nir);
         self.bytes.extend(kind);
+        // At most `MOST_PLANTS`, 2²⁴ − 1, so the sign bit is never set.
         self.bytes.extend(plant.to_le_bytes());
-        self.bytes.extend(leaf.to_le_bytes());
+        self.bytes.extend(i32::from(*leaf).to_le_bytes());
         self.points += 1;
         self.of_soil += u64::from(kind[0] == Class::Soil as u8);
     }

@@ -18,10 +18,10 @@ const COLUMNS: [Column; 9] = [
     Column::float("reflectance"),
     Column::float("azimuth"),
     Column::float("time"),
-    Column::ushort("beam"),
+    Column::int("beam"),
     Column::uchar("return_number"),
     Column::uchar("number_of_returns"),
-    Column::uint("plant_id"),
+    Column::double("plant_id"),
 ];
 
 /// Returns the points of a scan of a field.
@@ -56,10 +56,10 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
                 Value::Float(echo.intensity * echo.range * echo.range),
                 Value::Float(pulse.azimuth_deg),
                 Value::Float(pulse.time_s),
-                Value::Ushort(pulse.beam),
+                Value::Int(pulse.beam.into()),
                 Value::Uchar(echo.number),
                 Value::Uchar(echo.count),
-                Value::Uint(ids.get(&part.tag.plant).copied().unwrap_or(0)),
+                Value::Double(ids.get(&part.tag.plant).copied().unwrap_or(0).into()),
             ],
         );
     }

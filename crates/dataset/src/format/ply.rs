@@ -7,8 +7,8 @@
 //! | `red green blue nir` | uchar | the rendered image |
 //! | `class` | uchar | 0 soil, 1 crop, 2 weed |
 //! | `part` | uchar | number of the part, as in the format `parts` |
-//! | `plant` | uint | number in `plants.png` |
-//! | `leaf` | ushort | number in `leaves.png` |
+//! | `plant` | int | number in `plants.png` |
+//! | `leaf` | int | number in `leaves.png` |
 //!
 //! Binary, little endian. Points are in the order of the pixels; all images of a field share one world space.
 //!

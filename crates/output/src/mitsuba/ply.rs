@@ -19,7 +19,7 @@ pub(super) fn encode(mesh: &Mesh, colors: Option<&[Spectrum]>) -> Vec<u8> {
         let _ = writeln!(header, "property float {name}");
     }
     let faces = mesh.triangles.len();
-    let _ = write!(header, "element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n");
+    let _ = write!(header, "element face {faces}\nproperty list uchar int vertex_indices\nend_header\n");
     let mut out = header.into_bytes();
     out.reserve(mesh.positions.len() * names.len() * 4 + faces * 13);
     for (i, ((p, n), t)) in mesh.positions.iter().zip(&mesh.normals).zip(&mesh.uvs).enumerate() {
