@@ -1,11 +1,13 @@
 //! User-supplied files: opening and reading with limits, and containment of the paths that they name.
 //!
 //! Directories, pipes, sockets and devices are rejected before they are opened: opening a pipe blocks until something
-//! writes to it, and a device may never end.
+//! writes to it, and a device may never end. Decoders of foreign formats run inside [`guarded`].
 
+mod guard;
 mod scope;
 pub mod shipped;
 
+pub use guard::{caught, guarded};
 pub use scope::{Outside, Scope, tidy};
 
 use crate::{Error, Result};
