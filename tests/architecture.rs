@@ -73,7 +73,7 @@ const ALLOWED: &[(&str, &str)] = &[
         "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs dataset/format/traits.rs report/csv.rs",
     ),
     // Layers (output), environment maps (input).
-    ("exr", "output/exr/mod.rs texture/exr_size.rs texture/panorama.rs"),
+    ("exr", "output/exr/mod.rs texture/exr_size.rs texture/openexr.rs"),
     // Text on sheets of images.
     ("font8x8", "bin/trace/letters.rs"),
     // `math` re-exports the vectors; two files sum in double precision.

@@ -14,7 +14,9 @@ pub mod maps;
 pub mod marks;
 mod need;
 pub mod noise;
+mod openexr;
 pub mod panorama;
+mod primaries;
 mod pyramid;
 mod rgbe;
 mod srgb;
@@ -33,6 +35,7 @@ use furrow_base::error::{Error, Result};
 use furrow_base::geometry::AlphaMask;
 use furrow_base::input::{self, Refusal};
 use furrow_base::math::Vec2;
+use image::ImageFormat;
 use pyramid::{Level, Plane, Pyramid, halve};
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Seek};
 use std::path::Path;
@@ -229,8 +232,13 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
 /// Returns a reader of an image that enforces the size limits.
 fn reader<R: BufRead + Seek>(source: R) -> Result<image::ImageReader<R>, Fault> {
     let mut reader = image::ImageReader::new(source).with_guessed_format().map_err(Fault::Io)?;
-    if reader.format().is_none() {
-        return Err(Fault::Image("this is not an image; PNG and JPEG can be read".to_owned()));
+    match reader.format() {
+        Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+        // The crate would clip the linear values of a Radiance image to bytes.
+        Some(other) => {
+            return Err(Fault::Image(format!("this is an image of the format {other:?}; PNG and JPEG can be read")));
+        }
+        None => return Err(Fault::Image("this is not an image; PNG and JPEG can be read".to_owned())),
     }
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIZE);

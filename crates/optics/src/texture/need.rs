@@ -5,10 +5,9 @@
 //! height map peaks at 39 bytes per pixel, the estimate is 40. Four colour images of a model of that size take 7.4
 //! each, the estimate is 7.7.
 
-use super::{MAX_BYTES, exr_size, reader};
+use super::{MAX_BYTES, exr_size, reader, rgbe};
 use furrow_base::input;
 use image::ImageDecoder;
-use image::codecs::hdr::HdrDecoder;
 use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::iter::Sum;
 use std::ops::Add;
@@ -106,12 +105,8 @@ impl Header {
     /// the error.
     pub fn of_panorama(path: &Path) -> Option<Self> {
         let source = || input::open(path).ok().map(BufReader::new);
-        let of = |(width, height)| Self { width, height, bytes: 12 };
-        if let Ok(decoder) = HdrDecoder::new(source()?) {
-            return Some(of((decoder.metadata().width, decoder.metadata().height)));
-        }
-        let (width, height) = exr_size::size(source()?)?;
-        Some(of((width.try_into().ok()?, height.try_into().ok()?)))
+        let (width, height) = rgbe::size(source()?).or_else(|| input::caught(|| exr_size::size(source()?)).ok()?)?;
+        Some(Self { width: width.try_into().ok()?, height: height.try_into().ok()?, bytes: 12 })
     }
 
     /// Reads the header from the bytes of a file, like [`Header::of_file`].

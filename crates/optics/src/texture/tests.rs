@@ -154,3 +154,12 @@ fn maps_take_no_longer_for_coarse_features_than_for_fine_ones() {
     let maps = derive(HeightFromBrightness::LEAF.coarsest).1;
     assert!(maps.height.values().iter().all(|h| h.abs() <= 0.002));
 }
+
+/// Rationale: the decoder would clip linear values to bytes and take them for sRGB.
+#[test]
+fn a_radiance_image_is_no_texture() {
+    let mut bytes = b"#?RADIANCE\n\n-Y 1 +X 1\n".to_vec();
+    bytes.extend([128, 128, 128, 129]);
+    let what = Texture::decode(&bytes, ColorSpace::Srgb).unwrap_err();
+    assert!(what.contains("format Hdr; PNG and JPEG"), "{what}");
+}
