@@ -60,7 +60,7 @@
 //! | 4 | `furrow-render` | `film`, `settings` · `material`, `accel` · `scene` · `integrator` · `render` · `raster` |
 //! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model` |
 //! | 3 | `furrow-optics` | `optics` · `texture` · `bsdf`, `light`, `sensor` |
-//! | 1 | `furrow-report` | charts, tables, HTML pages |
+//! | 2 | `furrow-report` | charts, tables, HTML pages |
 //! | 1 | `furrow-base` | `math`, `error` · `sampling`, `geometry`, `input`, `atomic_file` · `ron_file` |
 //! | 1 | `furrow-embree` | bindings to Embree |
 

@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`math`] | vectors, frames, four-band spectra |
+//! | [`math`] | vectors, frames, four-band spectra, conversions between number types |
 //! | [`sampling`] | seeded streams, Sobol points, warps, tabulated distributions |
 //! | [`geometry`] | rays, hits, meshes, alpha masks |
 //! | [`ron_file`] | RON files whose errors name line and column; numbers with bounds and distributions |

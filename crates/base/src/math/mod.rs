@@ -1,8 +1,10 @@
-//! Vectors, frames and the four-band spectrum. All other modules use this one.
+//! Vectors, frames, the four-band spectrum and conversions between number types. All other modules use this one.
 
+mod convert;
 mod frame;
 mod spectrum;
 
+pub use convert::{FromFloat, RoundTo, ToFloat, ToInt};
 pub use frame::Frame;
 pub use glam::{DMat3, DMat4, DQuat, DVec3, Mat3, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 pub use spectrum::Spectrum;
