@@ -195,7 +195,10 @@ mod tests {
 
     #[test]
     fn floats_beyond_the_range_saturate() {
-        assert_eq!([-0.9_f32, 255.9, 256.0, f32::INFINITY, f32::NAN].map(|x| x.trunc_to::<u8>()), [0, 255, 255, 255, 0]);
+        assert_eq!(
+            [-0.9_f32, 255.9, 256.0, f32::INFINITY, f32::NAN].map(|x| x.trunc_to::<u8>()),
+            [0, 255, 255, 255, 0]
+        );
         assert_eq!([-0.5_f64, -1e300, 1e300].map(|x| x.floor_to::<i64>()), [-1, i64::MIN, i64::MAX]);
         assert_eq!([-0.5_f32, 0.5, 1.4].map(|x| x.ceil_to::<usize>()), [0, 1, 2]);
         assert_eq!([-2.5_f32, 2.5, 2.4].map(|x| x.round_to::<i16>()), [-3, 3, 2]);
