@@ -41,6 +41,8 @@ const NEVER: &[(&str, &str)] = &[
     ("film", "scene sampling"),
     // The rasterizer shares the scene with the path tracer, but no ray tracing.
     ("raster", "integrator accel bsdf sampling output"),
+    // A writer receives what rays have found; it traces none.
+    ("output/mitsuba/", "accel"),
     // The pipeline does not depend on datasets; writing files is the task of `output`.
     ("job", "dataset train compare"),
     // Plain data.

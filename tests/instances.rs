@@ -18,7 +18,7 @@ use furrow_field::assemble::Options;
 use furrow_field::traits::Traits;
 use furrow_field::{Field, PartKind, PlantRecord};
 use furrow_grow::plant::OrganKind;
-use furrow_optics::bsdf::{Bsdf, Leaf};
+use furrow_optics::bsdf::{Bsdf, Leaf, Portable};
 use furrow_optics::optics::{LeafOptics, Pigments};
 use furrow_render::accel::{Brute, EmbreeAccel, Surface};
 use furrow_render::material::Material;

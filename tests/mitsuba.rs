@@ -127,7 +127,7 @@ fn folder(name: &str) -> PathBuf {
 /// Exports a scene, renders it with our renderer, and writes `ours.bin` in the format of `check.py`.
 fn prepare(name: &str, scene: &Scene, spp: u32) -> PathBuf {
     let folder = folder(name);
-    furrow_output::mitsuba::write(&folder, scene, name).unwrap_or_else(|e| panic!("{name}: {e}"));
+    furrow_job::mitsuba::export(&folder, scene, name).unwrap_or_else(|e| panic!("{name}: {e}"));
     let film: Film = shoot(scene, &PathTracer::default(), spp, 5);
     let pool = render::pool(2).expect("a pool");
     let labels = pool.install(|| {
@@ -193,7 +193,7 @@ fn mitsuba_agrees_on_fields_when_it_is_given_their_scattering() {
 /// Exports a scene; returns the folder and the text of `scene.xml`.
 fn exported(scene: &Scene) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().expect("a folder");
-    furrow_output::mitsuba::write(folder.path(), scene, "a test -- of <words>").expect("files");
+    furrow_job::mitsuba::export(folder.path(), scene, "a test -- of <words>").expect("files");
     let text = fs::read_to_string(folder.path().join("scene.xml")).expect("scene.xml");
     (folder, text)
 }
@@ -361,7 +361,7 @@ fn equal_exports_are_equal_bytes() {
 #[test]
 fn what_is_lost_is_said() {
     let (folder, _) = exported(&sheets());
-    let quiet = furrow_output::mitsuba::write(folder.path(), &sheets(), "").expect("files").warnings;
+    let quiet = furrow_job::mitsuba::export(folder.path(), &sheets(), "").expect("files").warnings;
     assert_eq!(quiet, Vec::<String>::new());
     let mut scene = sheets();
     let distortion = Distortion { k1: -0.05, ..Distortion::default() };
@@ -369,7 +369,7 @@ fn what_is_lost_is_said() {
         Camera::new((60, 40), [80.0, 81.0], [30.0, 20.0], distortion, *scene.camera.pose()).expect("a camera");
     scene.materials[0] = Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::splat(0.3), 0.4)));
     scene.filter = Filter::Gaussian(0.4).footprint();
-    let warnings = furrow_output::mitsuba::write(folder.path(), &scene, "").expect("files").warnings.join("\n");
+    let warnings = furrow_job::mitsuba::export(folder.path(), &scene, "").expect("files").warnings.join("\n");
     for word in ["distortion", "square", "Gaussian", "Oren–Nayar"] {
         assert!(warnings.contains(word), "{word} in {warnings}");
     }

@@ -23,10 +23,12 @@
 //! | `renderer`, `rasterizer` | an opened engine that renders any number of fields |
 //! | `view` | content of an image: radiance, or an attribute of the first surface in false colours |
 //! | `image` | rendered image and its output files |
+//! | [`mitsuba`] | export for Mitsuba |
 
 mod expected;
 mod field;
 mod image;
+pub mod mitsuba;
 mod rasterizer;
 mod renderer;
 mod scene_file;

@@ -58,7 +58,7 @@ impl Format {
         match self {
             Self::Ply => furrow_output::cloud::write(folder, field, density),
             Self::Gltf => furrow_output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
-            Self::Mitsuba => furrow_output::mitsuba::write(folder, &field.scene, &field.provenance()),
+            Self::Mitsuba => furrow_job::mitsuba::export(folder, &field.scene, &field.provenance()),
         }
     }
 

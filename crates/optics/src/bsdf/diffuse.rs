@@ -1,5 +1,6 @@
 //! BRDF of rough, opaque, dry surfaces: soil, stone, wood.
 
+use super::form::{Form, Portable};
 use super::sample::{BsdfSample, Scatter, cosine, facing};
 use crate::optics::soil::facets;
 use furrow_base::math::{Spectrum, Vec3};
@@ -65,5 +66,24 @@ impl Scatter for OrenNayar {
             return None;
         }
         Some(BsdfSample { wi: facing(wi, side), weight: self.upper(facing(wo, side), wi) / pdf, pdf })
+    }
+}
+
+impl Portable for OrenNayar {
+    fn reflectance(&self, _cos_o: f32) -> Spectrum {
+        self.albedo
+    }
+
+    fn form(&self) -> Form {
+        Form::Rough { albedo: self.albedo, shape: self.shape(), film: None, shadowing: None }
+    }
+
+    fn examples() -> Vec<(&'static str, Self)> {
+        let soil = Spectrum::new(0.22, 0.14, 0.09, 0.27);
+        vec![
+            ("lambert", Self::new(Spectrum::splat(0.5), 0.0)),
+            ("dry soil", Self::new(soil, 0.35)),
+            ("rough soil", Self::new(soil, 0.7)),
+        ]
     }
 }

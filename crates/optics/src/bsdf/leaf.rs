@@ -14,6 +14,7 @@
 //! everything below. Transmission is Lambertian, as measured on broad leaves in the visible and near infrared by
 //! Walter-Shea & Norman 1991.
 
+use super::form::{Form, Portable, SheetSide};
 use super::fresnel;
 use super::microfacet::Ggx;
 use super::sample::{BsdfSample, Scatter, cosine, facing};
@@ -119,21 +120,9 @@ impl Leaf {
         Self::new(Side::bare(reflectance), Side::bare(reflectance), transmittance)
     }
 
-    /// Returns the reflectance at normal incidence of the upper side if `cos` is positive, of the lower side otherwise.
-    pub fn reflectance(&self, cos: f32) -> Spectrum {
-        let side = if cos > 0.0 { &self.upper } else { &self.lower };
-        let bare = side.diffuse + Spectrum::splat(side.albedo);
-        side.layer.map_or(bare, |layer| layer.over(bare))
-    }
-
     /// Returns the upper and the lower side.
     pub fn both_sides(&self) -> [&Side; 2] {
         [&self.upper, &self.lower]
-    }
-
-    /// Returns the transmittance at normal incidence.
-    pub fn transmittance(&self) -> Spectrum {
-        self.transmittance
     }
 
     /// Returns the side that `w` is on, then the opposite side.
@@ -205,5 +194,52 @@ impl Scatter for Leaf {
         }
         let (value, pdf) = self.both(&chances, wo, wi);
         (pdf > 0.0).then(|| BsdfSample { wi, weight: value / pdf, pdf })
+    }
+}
+
+impl Portable for Leaf {
+    /// Returns the reflectance at normal incidence of the upper side if `cos_o` is positive, of the lower side
+    /// otherwise.
+    fn reflectance(&self, cos_o: f32) -> Spectrum {
+        let side = if cos_o > 0.0 { &self.upper } else { &self.lower };
+        let bare = side.diffuse + Spectrum::splat(side.albedo);
+        side.layer.map_or(bare, |layer| layer.over(bare))
+    }
+
+    #[inline]
+    fn transmittance(&self) -> Spectrum {
+        self.transmittance
+    }
+
+    fn form(&self) -> Form {
+        let side = |of: &Side| SheetSide { diffuse: of.diffuse, coat: of.coat, layer: of.layer };
+        Form::Sheet { sides: [side(&self.upper), side(&self.lower)], transmittance: self.transmittance }
+    }
+
+    fn examples() -> Vec<(&'static str, Self)> {
+        let leaf = |front: f32, back: f32| {
+            let side = |roughness: f32, r: Spectrum| Side::new(1.45, [roughness; 2], r);
+            Self::new(
+                side(front, Spectrum::new(0.07, 0.11, 0.05, 0.44)),
+                side(back, Spectrum::new(0.1, 0.15, 0.08, 0.44)),
+                Spectrum::new(0.07, 0.12, 0.02, 0.5),
+            )
+        };
+        let grass = Side::new(1.45, [0.5, 0.2], Spectrum::splat(0.3));
+        let layered = |hairs: f32, bloom: f32| {
+            let side = |r: Spectrum| Side::new(1.45, [0.45; 2], r).layered(SurfaceLayer::new(hairs, bloom));
+            let [upper, lower] =
+                [Spectrum::new(0.07, 0.11, 0.05, 0.44), Spectrum::new(0.1, 0.15, 0.08, 0.44)].map(side);
+            Self::new(upper, lower, Spectrum::new(0.07, 0.12, 0.02, 0.5))
+        };
+        vec![
+            ("glossy leaf", leaf(0.15, 0.5)),
+            ("beet leaf", leaf(0.3, 0.5)),
+            ("dull leaf", leaf(0.6, 0.6)),
+            ("grass", Self::new(grass, grass, Spectrum::splat(0.4))),
+            ("hairy leaf", layered(0.3, 0.0)),
+            ("blue leaf", layered(0.0, 0.1)),
+            ("leaf without a coat", Self::bare(Spectrum::splat(0.45), Spectrum::splat(0.55))),
+        ]
     }
 }

@@ -1,5 +1,6 @@
 //! Rough surface with fine relief that is not meshed: a factor represents how the relief shadows the surface.
 
+use super::form::{Form, Portable};
 use super::sample::{BsdfSample, Scatter};
 use super::{OrenNayar, Wet};
 use crate::optics::Shadowing;
@@ -27,24 +28,6 @@ impl Shadowed {
     /// Creates the BRDF. `up` is the unit normal, in the local frame, of the mean plane of the relief.
     pub fn new(base: Rough, up: Vec3, shadowing: Shadowing) -> Self {
         Self { base, up, shadowing }
-    }
-
-    /// Returns the surface without its relief.
-    pub fn base(&self) -> &Rough {
-        &self.base
-    }
-
-    /// Returns the shadowing factor of the relief.
-    pub fn shadowing(&self) -> &Shadowing {
-        &self.shadowing
-    }
-
-    /// Returns the reflectance at normal incidence under a uniform sky.
-    pub fn albedo(&self) -> Spectrum {
-        match &self.base {
-            Rough::Dry(base) => base.albedo(),
-            Rough::Wet(base) => base.albedo(),
-        }
     }
 
     #[inline]
@@ -75,5 +58,42 @@ impl Scatter for Shadowed {
             }
             Rough::Wet(base) => base.sample_below(wo, u, |wi| self.factor(wo, wi)),
         }
+    }
+}
+
+impl Portable for Shadowed {
+    /// Returns the reflectance at normal incidence under a uniform sky.
+    fn reflectance(&self, cos_o: f32) -> Spectrum {
+        match &self.base {
+            Rough::Dry(base) => base.reflectance(cos_o),
+            Rough::Wet(base) => base.reflectance(cos_o),
+        }
+    }
+
+    fn form(&self) -> Form {
+        let base = match &self.base {
+            Rough::Dry(base) => base.form(),
+            Rough::Wet(base) => base.form(),
+        };
+        match base {
+            Form::Rough { albedo, shape, film, .. } => {
+                Form::Rough { albedo, shape, film, shadowing: Some(self.shadowing) }
+            }
+            other => other,
+        }
+    }
+
+    fn examples() -> Vec<(&'static str, Self)> {
+        let soil = Spectrum::new(0.22, 0.14, 0.09, 0.27);
+        let shadowed = |base: Rough| {
+            // The factor grows with the elevation of both directions and shrinks with the azimuth between them.
+            let factor = |pair: usize, turn: usize| 0.6 + 0.02 * pair as f32 - 0.05 * turn as f32;
+            let factors = std::array::from_fn(|pair| std::array::from_fn(|turn| factor(pair, turn)));
+            Self::new(base, Vec3::new(0.28, 0.0, 0.96), Shadowing::new(&factors))
+        };
+        vec![
+            ("coarse soil", shadowed(Rough::Dry(OrenNayar::new(soil, 0.35)))),
+            ("coarse wet soil", shadowed(Rough::Wet(Wet::new(soil, 0.35, 0.7, 0.6)))),
+        ]
     }
 }

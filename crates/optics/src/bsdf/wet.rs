@@ -5,6 +5,7 @@
 //! the base, as for a leaf.
 
 use super::diffuse::OrenNayar;
+use super::form::{Film, Form, Portable};
 use super::fresnel;
 use super::microfacet::Ggx;
 use super::sample::{BsdfSample, Scatter, cosine, facing};
@@ -51,21 +52,6 @@ impl Wet {
     /// Returns the reflectance at normal incidence.
     pub fn albedo(&self) -> Spectrum {
         self.base.albedo() + Spectrum::splat(self.film * self.gloss)
-    }
-
-    /// Returns the soil below the film.
-    pub fn base(&self) -> &OrenNayar {
-        &self.base
-    }
-
-    /// Returns the film's surface.
-    pub fn coat(&self) -> Ggx {
-        self.coat
-    }
-
-    /// Returns the fraction covered by the film, 0–1.
-    pub fn film(&self) -> f32 {
-        self.film
     }
 
     /// Returns the mean transmission where the film reflects `fresnel`: that of the film, mixed with 1 for the bare
@@ -134,5 +120,21 @@ impl Scatter for Wet {
     #[inline]
     fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
         self.sample_below(wo, u, |_| 1.0)
+    }
+}
+
+impl Portable for Wet {
+    fn reflectance(&self, _cos_o: f32) -> Spectrum {
+        self.albedo()
+    }
+
+    fn form(&self) -> Form {
+        let film = Some(Film { coat: self.coat, share: self.film });
+        Form::Rough { albedo: self.base.albedo(), shape: self.base.shape(), film, shadowing: None }
+    }
+
+    fn examples() -> Vec<(&'static str, Self)> {
+        let soil = Spectrum::new(0.22, 0.14, 0.09, 0.27);
+        vec![("moist soil", Self::new(soil, 0.35, 0.4, 0.3)), ("wet soil", Self::new(soil, 0.35, 1.0, 0.15))]
     }
 }

@@ -12,16 +12,16 @@ use furrow_render::scene::Scene;
 use std::collections::BTreeMap;
 
 /// Materials of a scene with each texture fixed to one level, and a separate material for each tint.
-pub(super) struct Leveled {
+pub struct Leveled {
     /// One material for each material, tint and level in use.
-    pub(super) materials: Vec<Material>,
+    pub materials: Vec<Material>,
     /// Material index of each part.
-    pub(super) of_parts: Vec<u32>,
+    pub of_parts: Vec<u32>,
 }
 
 impl Leveled {
     /// Creates the materials of a scene.
-    pub(super) fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &Scene) -> Self {
         let mut known: BTreeMap<(u32, [u32; 3], Option<u32>), u32> = BTreeMap::new();
         let mut materials = Vec::new();
         let of_parts = scene.parts.iter().map(|part| {

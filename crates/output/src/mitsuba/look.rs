@@ -6,7 +6,7 @@
 use furrow_base::geometry::{Hit, Interaction, Mesh};
 use furrow_base::math::{Spectrum, Vec2, Vec3, vec2};
 use furrow_optics::bsdf::microfacet::Ggx;
-use furrow_optics::bsdf::{Bsdf, OrenNayar, Rough, SurfaceLayer, Wet};
+use furrow_optics::bsdf::{Bsdf, Form, SurfaceLayer};
 use furrow_optics::optics::Shadowing;
 use furrow_render::material::{Material, Varies};
 
@@ -51,6 +51,8 @@ pub(super) struct Look {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) texels: Vec<Texel>,
+    /// `true` if the format represents the scattering; otherwise the texels are those of a Lambertian replacement.
+    pub(super) held: bool,
 }
 
 impl Look {
@@ -61,18 +63,19 @@ impl Look {
             Varies::Nowhere | Varies::Place => (1, 1),
         };
         let flat = patch(Vec3::ZERO, Vec3::Z);
-        let mut kind = None;
+        let (mut kind, mut held) = (None, true);
         let mut texels = Vec::with_capacity((width * height) as usize);
         for y in 0..height {
             for x in 0..width {
                 let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
-                let (of, texel) = at(material, &flat, uv);
+                let (of, texel, own) = at(material, &flat, uv);
+                held &= own;
                 kind = Some(kind.map_or(of, |known: Kind| known.and(of)));
                 texels.push(texel);
             }
         }
         let kind = kind.unwrap_or(Kind::Sheet { coats: [None; 2], layers: [None; 2] });
-        Self { kind, width, height, texels }
+        Self { kind, width, height, texels, held }
     }
 
     /// Returns `true` if the shading normal differs anywhere from the mesh's.
@@ -116,7 +119,7 @@ pub(super) fn colors(material: &Material, mesh: &Mesh) -> Vec<Spectrum> {
 
 /// Returns the shading normal at a point of a material's texture, in the frame of ∂p/∂u, its perpendicular in the
 /// surface, and the surface's normal. If textures are fixed to one level, it equals the exported normal.
-pub(super) fn relief(material: &Material, uv: Vec2) -> Vec3 {
+pub fn relief(material: &Material, uv: Vec2) -> Vec3 {
     at(material, &patch(Vec3::ZERO, Vec3::Z), uv).1.normal
 }
 
@@ -134,31 +137,55 @@ fn patch(p: Vec3, n: Vec3) -> Mesh {
 }
 
 /// Returns the scattering at one point of a patch, seen along its normal by a ray with the footprint of the whole
-/// image, so that constant properties are averages.
-fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel) {
+/// image, so that constant properties are averages; and whether it is that of the material, not a replacement.
+fn at(material: &Material, patch: &Mesh, uv: Vec2) -> (Kind, Texel, bool) {
     let point = Interaction::new(patch, &Hit { part: 0, triangle: 0, u: uv.y, v: uv.x, t: 0.0 }, 1.0);
     let (bsdf, frame) = material.scatter(&point, patch.normals[0]);
-    let opaque =
-        |albedo: Spectrum, film: f32| Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal: frame.z };
-    let dry =
-        |b: &OrenNayar, shadowing| (Kind::Soil { shape: b.shape(), film: None, shadowing }, opaque(b.albedo(), 0.0));
-    let wet = |b: &Wet, shadowing| {
-        let kind = Kind::Soil { shape: b.base().shape(), film: Some(b.coat()), shadowing };
-        (kind, opaque(b.base().albedo(), b.film()))
-    };
-    match bsdf {
-        Bsdf::OrenNayar(b) => dry(&b, None),
-        Bsdf::Shadowed(b) => match b.base() {
-            Rough::Dry(base) => dry(base, Some(*b.shadowing())),
-            Rough::Wet(base) => wet(base, Some(*b.shadowing())),
-        },
-        Bsdf::Wet(b) => wet(&b, None),
-        Bsdf::Leaf(b) => {
-            let [upper, lower] = b.both_sides();
-            let reflect = [upper.diffuse(), lower.diffuse()];
-            let texel = Texel { reflect, transmit: b.transmittance(), film: 0.0, normal: frame.z };
-            let kind = Kind::Sheet { coats: [upper.coat(), lower.coat()], layers: [upper.layer(), lower.layer()] };
-            (kind, texel)
+    split(bsdf.form(), &bsdf, frame.z)
+}
+
+/// Splits the form of a BSDF into constant properties and those of a texel with this shading normal. Returns `false` as
+/// well if there is no form: the result is then the Lambertian surface of the same reflectance and transmittance.
+fn split(form: Form, bsdf: &Bsdf, normal: Vec3) -> (Kind, Texel, bool) {
+    match form {
+        Form::Rough { albedo, shape, film, shadowing } => {
+            let kind = Kind::Soil { shape, film: film.map(|film| film.coat), shadowing };
+            let film = film.map_or(0.0, |film| film.share);
+            (kind, Texel { reflect: [albedo; 2], transmit: Spectrum::ZERO, film, normal }, true)
+        }
+        Form::Sheet { sides, transmittance } => {
+            let kind = Kind::Sheet { coats: sides.map(|side| side.coat), layers: sides.map(|side| side.layer) };
+            let reflect = sides.map(|side| side.diffuse);
+            (kind, Texel { reflect, transmit: transmittance, film: 0.0, normal }, true)
+        }
+        Form::Unheld => {
+            let kind = if bsdf.transmits() {
+                Kind::Sheet { coats: [None; 2], layers: [None; 2] }
+            } else {
+                Kind::Soil { shape: [1.0, 0.0], film: None, shadowing: None }
+            };
+            let reflect = [bsdf.reflectance(1.0), bsdf.reflectance(-1.0)];
+            (kind, Texel { reflect, transmit: bsdf.transmittance(), film: 0.0, normal }, false)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: a BSDF without a form must not vanish from an export. Expected: a Lambertian surface of the same
+    /// reflectance and transmittance replaces it; a form is kept.
+    #[test]
+    fn what_has_no_form_becomes_lambertian() {
+        for (name, bsdf) in Bsdf::examples() {
+            assert!(split(bsdf.form(), &bsdf, Vec3::Z).2, "{name}");
+            let (kind, texel, held) = split(Form::Unheld, &bsdf, Vec3::Z);
+            assert!(!held && texel.film == 0.0 && texel.transmit == bsdf.transmittance(), "{name}");
+            assert_eq!(texel.reflect[0], bsdf.reflectance(1.0), "{name}");
+            let sheet = Kind::Sheet { coats: [None; 2], layers: [None; 2] };
+            let soil = Kind::Soil { shape: [1.0, 0.0], film: None, shadowing: None };
+            assert_eq!(kind, if bsdf.transmits() { sheet } else { soil }, "{name}");
         }
     }
 }

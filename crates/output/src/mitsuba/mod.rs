@@ -43,11 +43,11 @@ use furrow_render::film::Filter;
 use furrow_render::integrator::PathTracer;
 use furrow_render::material::Varies;
 use furrow_render::scene::{Part, Scene};
-use level::Leveled;
-pub use level::fix_levels;
+pub use level::{Leveled, fix_levels};
 use light::Lights;
 use look::Look;
-use mean::Mean;
+pub use look::relief;
+pub use mean::{Crossing, Directions, Pair};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
@@ -76,29 +76,28 @@ struct Key {
     mask: usize,
 }
 
-/// Writes `scene` into `folder`; `text` is stored in the files as their provenance. `scene.xml` is written last, so its
-/// presence means that the export is complete.
-pub fn write(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
+/// Writes `scene`, whose materials have been `leveled`, into `folder`. Scattering that the format lacks is averaged over
+/// `directions`; `text` is stored in the files as their provenance. `scene.xml` is written last, so its presence means
+/// that the export is complete.
+pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Directions, text: &str) -> Result<Export> {
     let mut files = Files { folder, together: Together::default() };
     let mut warnings = camera_warnings(scene);
-    let leveled = Leveled::of(scene);
-    let groups = groups(scene, &leveled)?;
+    let groups = groups(scene, leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
     if lights.has_lamps() && lights.has_sky() {
         warnings.push("with lamps in the scene the camera does not see the sky".into());
     }
     let mut masks: HashMap<usize, String> = HashMap::new();
     let mut lost = BTreeSet::new();
-    let mean = Mean::of(scene, &leveled)?;
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
         let look = Look::of(&leveled.materials[group.material as usize]);
-        let factor = Surface::corner_factor(&look, &mean);
+        let factor = Surface::corner_factor(&look, directions);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
-            Some(_) => Surface::of_corners(&look, &group.name, &mean, &mut files)?,
-            None => Surface::write(&look, &group.name, mask, &mean, &mut files)?,
+            Some(_) => Surface::of_corners(&look, &group.name, directions, &mut files)?,
+            None => Surface::write(&look, &group.name, mask, directions, &mut files)?,
         };
         surface.warnings(&group.name, &mut lost);
         files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;

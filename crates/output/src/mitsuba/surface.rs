@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | Lambert | `diffuse` | exact |
 //! | sheet without coats | blend of `diffuse` on either side and `principledthin` that only transmits | exact |
-//! | Oren–Nayar | `diffuse` with k times the albedo, k by [`Mean`] | equal brightness on average over the scene's light and view |
+//! | Oren–Nayar | `diffuse` with k times the albedo, k by [`Directions`] | equal brightness on average over the scene's light and view |
 //! | hairs and bloom | part of the `diffuse` below them | equal brightness on average over the scene's light and view |
 //! | coats, films of water | blend with `roughplastic` without a base | Mitsuba's Smith masking is uncorrelated |
 //! | surface below a film of water | included in k | equal brightness on average over the scene's light and view |
@@ -22,7 +22,7 @@
 
 use super::files::{Band, Files, Plugins};
 use super::look::{Kind, Look, Texel};
-use super::mean::{Cover, Mean};
+use super::mean::{Cover, Directions};
 use super::xml::Element;
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::{Error, Result};
@@ -60,6 +60,8 @@ struct Shares {
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     kind: Kind,
+    /// `false` for a Lambertian replacement of scattering that the format does not represent.
+    held: bool,
     /// Diffuse reflectance of both sides times `factor`, and transmittance times `through`, of the tissue alone.
     bare: Shares,
     factor: [f32; 2],
@@ -106,7 +108,7 @@ impl Surface {
         look: &Look,
         stem: &str,
         mask: Option<String>,
-        mean: &Mean,
+        mean: &Directions,
         files: &mut Files<'_>,
     ) -> Result<Self> {
         let (factor, through) = match look.kind {
@@ -147,12 +149,12 @@ impl Surface {
             let channels = [("R", axis(0)), ("G", axis(1)), ("B", axis(2))];
             files.numbers(&format!("{normal}.exr"), look.width, look.height, &channels)?;
         }
-        Ok(Self { kind: look.kind, bare, factor, through, covered, film, normal, mask })
+        Ok(Self { kind: look.kind, held: look.held, bare, factor, through, covered, film, normal, mask })
     }
 
     /// Creates a rough surface whose reflectance, times [`Surface::corner_factor`], is stored at the mesh's vertices,
     /// with a uniform film of water.
-    pub(super) fn of_corners(look: &Look, stem: &str, mean: &Mean, files: &mut Files<'_>) -> Result<Self> {
+    pub(super) fn of_corners(look: &Look, stem: &str, mean: &Directions, files: &mut Files<'_>) -> Result<Self> {
         let kind = look.kind;
         let share = look.texels.first().map_or(0.0, |t| t.film);
         let film = (share > 0.0).then(|| format!("textures/{stem}-film"));
@@ -161,6 +163,7 @@ impl Surface {
         }
         Ok(Self {
             kind,
+            held: look.held,
             bare: Shares { reflect: [Paint::Corners, Paint::Corners], transmit: None },
             factor: [Self::corner_factor(look, mean); 2],
             through: 0.0,
@@ -172,7 +175,7 @@ impl Surface {
     }
 
     /// Returns the factor on reflectances at a mesh's vertices.
-    pub(super) fn corner_factor(look: &Look, mean: &Mean) -> f32 {
+    pub(super) fn corner_factor(look: &Look, mean: &Directions) -> f32 {
         match look.kind {
             Kind::Soil { shape, film, shadowing } => {
                 let below = film.map(|coat| (coat, look.mean_film()));
@@ -187,6 +190,9 @@ impl Surface {
         let mut warn = |what| {
             warnings.insert((what, name.to_owned()));
         };
+        if !self.held {
+            warn("its scattering cannot be represented and is exported as Lambert");
+        }
         match self.kind {
             Kind::Soil { shape: [_, b], film, shadowing } => {
                 if shadowing.is_some() {

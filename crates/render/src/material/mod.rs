@@ -124,11 +124,8 @@ impl Material {
             Self::Solid(m) => m.swatch(),
             Self::Painted(m) => m.swatch(),
             Self::Plain(bsdf) => {
-                let transmittance = match bsdf {
-                    Bsdf::Leaf(leaf) => leaf.transmittance(),
-                    _ => Spectrum::ZERO,
-                };
-                Swatch::plain(Tone { reflectance: bsdf.reflectance(1.0), transmittance }, 1.0)
+                let tone = Tone { reflectance: bsdf.reflectance(1.0), transmittance: bsdf.transmittance() };
+                Swatch::plain(tone, 1.0)
             }
         }
     }
