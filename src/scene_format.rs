@@ -37,7 +37,7 @@ pub use furrow_grow::soil::{
     SoilColor, SoilDesc, StonesDesc, WheelDesc,
 };
 #[doc(inline)]
-pub use furrow_optics::light::{GlowDesc, InfraredDesc, LightDesc, PointDesc, ShapeDesc, SunDesc};
+pub use furrow_optics::light::desc::*;
 #[doc(inline)]
 pub use furrow_optics::sensor::{
     AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, MatrixDesc, MosaicDesc,

@@ -173,7 +173,7 @@ fn a_lamp_falls_off_with_the_square_of_the_distance() {
         let at = scene.camera.pose().position - direction / direction.z;
         let to = vec3(0.0, 0.0, 0.8) - at;
         let cosine = to.z / to.length();
-        let expected = 0.5 / PI * 1000.0 * small.area() * cosine * cosine / to.length_squared();
+        let expected = 0.5 / PI * 1000.0 * (PI * 0.005 * 0.005) * cosine * cosine / to.length_squared();
         let found = film.at(x, y).mean.to_array()[1];
         assert!((found / expected - 1.0).abs() < 0.01, "({x}, {y}): {found} for {expected}");
     }

@@ -161,9 +161,9 @@ fn weather_is_the_days_and_soil_the_fields() {
     assert!(share[0] < share[1] && share[1] < share[2], "{share:?}");
     assert!(known[0].moisture.mean != known[1].moisture.mean && known[1].moisture.mean != known[2].moisture.mean);
     assert_eq!((known[0].relief.clone(), known[0].clods.clone()), (known[2].relief.clone(), known[2].clods.clone()));
-    let sky = days.each_ref().map(|field| match field.conditions.lights[0] {
-        LightRecord::Daylight { sun_elevation_deg, cloud, .. } => (sun_elevation_deg, cloud),
-        ref other => panic!("{other:?}"),
+    let sky = days.each_ref().map(|field| match &field.conditions.lights[0] {
+        LightRecord::Daylight(day) => (day.sun_elevation_deg, day.cloud),
+        other => panic!("{other:?}"),
     });
     assert!(sky.iter().all(|(sun, _)| *sun == sky[0].0) && sky[0].1 != sky[1].1 && sky[1].1 != sky[2].1, "{sky:?}");
     let stones = days.each_ref().map(|field| {

@@ -13,10 +13,12 @@ mod png;
 pub mod scan;
 
 use furrow_base::Result;
+use furrow_optics::light::{Form, Light};
 use furrow_optics::sensor::{Deep, Photograph};
 use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
 use furrow_render::scene::tag::Class;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub use self::exr::{
@@ -71,6 +73,18 @@ pub struct Export {
     pub warnings: Vec<String>,
     /// Amount of data in a few words, if the number of files is not informative.
     pub amount: Option<String>,
+}
+
+/// Returns a warning about the lights that exports omit, if there are any.
+fn unheld(lights: &[Light]) -> Option<String> {
+    omitted(lights.iter().map(|light| (light.kind(), light.form())))
+}
+
+/// Returns the warning for lights with these kinds and forms.
+fn omitted<'a>(lights: impl Iterator<Item = (&'a str, Form)>) -> Option<String> {
+    let kinds: BTreeSet<&str> = lights.filter(|(_, form)| *form == Form::Unheld).map(|(kind, _)| kind).collect();
+    let names: Vec<&str> = kinds.into_iter().collect();
+    (!names.is_empty()).then(|| format!("the format has no such lights, they are omitted: {}", names.join(", ")))
 }
 
 /// Provenance of an image, which is stored in its files.
@@ -166,4 +180,19 @@ pub fn write_files(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<Vec<PathB
     write_together(folder, |together| {
         files.iter().try_for_each(|(name, bytes)| together.add(&folder.join(name), bytes))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: a warning names each kind of omitted light once; lights with a form cause none.
+    #[test]
+    fn omitted_lights_are_named_once() {
+        let held = Light::examples();
+        assert_eq!(unheld(&held.into_iter().map(|(_, light)| light).collect::<Vec<Light>>()), None);
+        let lights = [("Laser", Form::Unheld), ("Sky", Form::Dome { uniform: false }), ("Laser", Form::Unheld)];
+        let warning = omitted(lights.into_iter()).unwrap_or_default();
+        assert!(warning.ends_with(": Laser"), "{warning}");
+    }
 }

@@ -60,9 +60,7 @@ impl<'a> Brief<'a> {
     /// Returns elevation and azimuth of the sun (degrees) and the turbidity of the first daylight.
     fn daylight(&self) -> Option<[f64; 3]> {
         self.lights().iter().find_map(|light| match light {
-            LightRecord::Daylight { sun_elevation_deg, sun_azimuth_deg, turbidity, .. } => {
-                Some([*sun_elevation_deg, *sun_azimuth_deg, *turbidity])
-            }
+            LightRecord::Daylight(day) => Some([day.sun_elevation_deg, day.sun_azimuth_deg, day.turbidity]),
             _ => None,
         })
     }
@@ -87,8 +85,8 @@ impl<'a> Brief<'a> {
         let (mut sun, mut all) = (0.0, 0.0);
         for light in self.lights() {
             let (direct, diffuse) = match light {
-                LightRecord::Daylight { sun_irradiance_w_m2_nm, sky_irradiance_w_m2_nm, .. } => {
-                    (visible(*sun_irradiance_w_m2_nm), visible(*sky_irradiance_w_m2_nm))
+                LightRecord::Daylight(day) => {
+                    (visible(day.sun_irradiance_w_m2_nm), visible(day.sky_irradiance_w_m2_nm))
                 }
                 other => (0.0, visible(other.irradiance_w_m2_nm())),
             };

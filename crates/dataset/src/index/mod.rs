@@ -86,9 +86,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
     let camera = conditions.map(|conditions| &conditions.camera);
     let lights = conditions.map(|conditions| &conditions.lights[..]).unwrap_or_default();
     let sun = lights.iter().find_map(|light| match light {
-        LightRecord::Daylight { sun_elevation_deg, sun_azimuth_deg, turbidity, cloud, .. } => {
-            Some((*sun_elevation_deg, *sun_azimuth_deg, *turbidity, *cloud))
-        }
+        LightRecord::Daylight(day) => Some((day.sun_elevation_deg, day.sun_azimuth_deg, day.turbidity, day.cloud)),
         _ => None,
     });
     let ground = lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.irradiance_w_m2_nm());

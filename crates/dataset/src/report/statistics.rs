@@ -214,24 +214,20 @@ impl Statistics {
         for one in lights {
             *light.kinds.entry(one.kind().to_owned()).or_default() += 1;
             let given = match one {
-                LightRecord::Daylight { sun_irradiance_w_m2_nm: sun, sky_irradiance_w_m2_nm: sky, .. } => {
-                    vec![*sun, *sky]
-                }
+                LightRecord::Daylight(day) => vec![day.sun_irradiance_w_m2_nm, day.sky_irradiance_w_m2_nm],
                 other => vec![other.irradiance_w_m2_nm()],
             };
             for spectrum in given {
                 ground += spectrum.to_array().into_iter().take(3).map(f64::from).sum::<f64>() / 3.0;
             }
-            let LightRecord::Daylight { sun_elevation_deg, sun_azimuth_deg, turbidity, cloud, .. } = one else {
-                continue;
-            };
-            light.elevation_deg.add(*sun_elevation_deg);
+            let LightRecord::Daylight(day) = one else { continue };
+            light.elevation_deg.add(day.sun_elevation_deg);
             // Takes every n-th image, so that the chart has at most `MOST_SUNS` suns.
             if self.images.is_multiple_of(self.of.div_ceil(MOST_SUNS).max(1)) {
-                light.suns.push([*sun_azimuth_deg, *sun_elevation_deg, f64::from(*cloud)]);
+                light.suns.push([day.sun_azimuth_deg, day.sun_elevation_deg, f64::from(day.cloud)]);
             }
-            light.cloud.add(100.0 * f64::from(*cloud));
-            light.turbidity.add(*turbidity);
+            light.cloud.add(100.0 * f64::from(day.cloud));
+            light.turbidity.add(day.turbidity);
         }
         if !lights.is_empty() {
             light.irradiance.add(ground);

@@ -6,7 +6,7 @@ use crate::model::split::Split;
 use furrow_base::math::Spectrum;
 use furrow_field::assemble::{Options, field_of};
 use furrow_field::record::Conditions;
-use furrow_optics::light::LightRecord;
+use furrow_optics::light::{ConstantRecord, EnvironmentMapRecord, LampRecord, LightRecord, OvercastRecord};
 
 /// Returns the conditions of a field with a sun, soil and camera.
 fn conditions() -> Conditions {
@@ -89,10 +89,15 @@ fn conditions_come_back_from_json_with_every_kind_of_light() {
     let s = Spectrum::new(0.1, 0.2, 0.3, 0.4);
     let mut of = conditions();
     of.lights.extend([
-        LightRecord::Overcast { illuminance_klx: 0.1, irradiance_w_m2_nm: s },
-        LightRecord::Constant { radiance_w_m2_sr_nm: s, irradiance_w_m2_nm: s },
-        LightRecord::EnvironmentMap { file: "a.hdr".into(), scale: 0.1, rotate_deg: 0.7, irradiance_w_m2_nm: s },
-        LightRecord::Lamp {
+        LightRecord::Overcast(OvercastRecord { illuminance_klx: 0.1, irradiance_w_m2_nm: s }),
+        LightRecord::Constant(ConstantRecord { radiance_w_m2_sr_nm: s, irradiance_w_m2_nm: s }),
+        LightRecord::EnvironmentMap(EnvironmentMapRecord {
+            file: "a.hdr".into(),
+            scale: 0.1,
+            rotate_deg: 0.7,
+            irradiance_w_m2_nm: s,
+        }),
+        LightRecord::Lamp(LampRecord {
             size_m: [0.1; 2],
             round: true,
             position_m: [0.1, 0.2, 0.3],
@@ -100,7 +105,7 @@ fn conditions_come_back_from_json_with_every_kind_of_light() {
             radiance_w_m2_sr_nm: s,
             power_w_nm: s,
             irradiance_w_m2_nm: s,
-        },
+        }),
     ]);
     for light in &of.lights {
         assert_eq!(serde_json::to_value(light).unwrap()["kind"], light.kind());

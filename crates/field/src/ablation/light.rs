@@ -1,6 +1,6 @@
 //! Edits of the lights.
 
-use furrow_optics::light::{Constant, Light};
+use furrow_optics::light::{Constant, Form, Light};
 use std::f32::consts::PI;
 
 /// Size of a point light relative to the original light: the sun's disc is then 0.5′ across, and its penumbrae are narrower than a pixel.
@@ -8,7 +8,7 @@ const POINT: f32 = 1.0 / 64.0;
 
 /// Returns `true` for lights that shine from all directions.
 fn is_dome(light: &Light) -> bool {
-    matches!(light, Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_))
+    matches!(light.form(), Form::Dome { .. })
 }
 
 /// Removes the sky, unless there is no other light.
@@ -21,7 +21,7 @@ pub(super) fn no_sky(lights: &mut Vec<Light>) {
 /// Replaces each sky by constant radiance L with the same irradiance E on level ground: E = πL.
 pub(super) fn hard_ambient(lights: &mut Vec<Light>) {
     for light in lights {
-        if matches!(light, Light::Sky(_) | Light::EnvironmentMap(_)) {
+        if light.form() == (Form::Dome { uniform: false }) {
             *light = Light::Constant(Constant::new(light.horizontal_irradiance() / PI));
         }
     }
@@ -30,10 +30,8 @@ pub(super) fn hard_ambient(lights: &mut Vec<Light>) {
 /// Shrinks sun and lamps almost to points.
 pub(super) fn points(lights: &mut Vec<Light>) {
     for light in lights {
-        match light {
-            Light::Sun(sun) => *sun = sun.shrunk(POINT),
-            Light::Lamp(lamp) => *lamp = lamp.shrunk(POINT),
-            Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => {}
+        if let Some(point) = light.shrunk(POINT) {
+            *light = point;
         }
     }
 }

@@ -75,6 +75,7 @@ mod tests {
     use crate::assemble::{self, Options};
     use furrow_base::Result;
     use furrow_base::math::Spectrum;
+    use furrow_base::ron_file::RonFile;
     use furrow_base::sampling::{Purpose, Stream};
     use furrow_optics::light::{LightDesc, LightRecord};
 
@@ -112,8 +113,8 @@ mod tests {
     }
 
     fn radiance(of: &LightRecord) -> Spectrum {
-        let LightRecord::Constant { radiance_w_m2_sr_nm, .. } = of else { panic!("{of:?}") };
-        *radiance_w_m2_sr_nm
+        let LightRecord::Constant(of) = of else { panic!("{of:?}") };
+        of.radiance_w_m2_sr_nm
     }
 
     /// Expected: the numbers of the drawn list, and of the lights after it, equal those of a scene file with that list written out. A
@@ -127,7 +128,7 @@ mod tests {
             assert_eq!(of.lights, plain.lights);
             assert!(plain.lighting.is_empty() && serde_json::to_value(&plain).unwrap().get("lighting").is_none());
             for (i, desc) in [DAY, FLASH].into_iter().enumerate() {
-                let desc: LightDesc = ron::from_str(desc).unwrap();
+                let desc: LightDesc = RonFile::of(desc).parse().unwrap();
                 let mut stream = Stream::of(5, index, Purpose::Page, 1 + i as u64);
                 let (record, _) = desc.draw(&mut stream, &mut |_, _| unreachable!()).unwrap();
                 assert_eq!(field(&format!("{DAY}, {FLASH}"), index).unwrap().conditions.lights[i], record);

@@ -1,8 +1,14 @@
 //! Constant environment: the same radiance from all directions, as in the white-furnace test.
 
+use super::described::{Described, Open, Recorded, irradiance};
+use super::form::{Form, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
+use furrow_base::Result;
 use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::ron_file::{NonNegative, Vary};
+use furrow_base::sampling::rng::Stream;
 use furrow_base::sampling::warp;
+use serde::{Deserialize, Serialize};
 use std::f32::consts::PI;
 
 /// Constant radiance from all directions, including those below the horizon.
@@ -51,5 +57,53 @@ impl Emitter for Constant {
 
     fn horizontal_irradiance(&self) -> Spectrum {
         self.radiance * PI
+    }
+}
+
+impl Portable for Constant {
+    fn form(&self) -> Form {
+        Form::Dome { uniform: true }
+    }
+}
+
+/// Fields of `Constant`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename = "Constant")]
+#[schemars(inline)]
+pub struct ConstantDesc {
+    /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
+    #[schemars(extend("x-example" = "(0.3, 0.3, 0.3, 0.2)"))]
+    pub radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
+}
+
+/// Sampled values of `Constant`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConstantRecord {
+    /// Radiance.
+    pub radiance_w_m2_sr_nm: Spectrum,
+    /// Irradiance of the ground.
+    pub irradiance_w_m2_nm: Spectrum,
+}
+
+impl Described for ConstantDesc {
+    type Record = ConstantRecord;
+    type Sources = Option<Constant>;
+
+    fn draw(&self, stream: &mut Stream, _: &mut Open<'_>) -> Result<(ConstantRecord, Option<Constant>)> {
+        let (r, g, b, nir) = &self.radiance;
+        let radiance = Spectrum::from([r, g, b, nir].map(|band| band.draw32(stream)));
+        let light = (!radiance.is_black()).then(|| Constant::new(radiance));
+        let irradiance_w_m2_nm = irradiance(light.as_ref());
+        Ok((ConstantRecord { radiance_w_m2_sr_nm: radiance, irradiance_w_m2_nm }, light))
+    }
+
+    fn examples() -> Vec<(&'static str, Option<Constant>)> {
+        vec![("constant environment", Some(Constant::new(Spectrum::new(0.5, 1.0, 2.0, 4.0))))]
+    }
+}
+
+impl Recorded for ConstantRecord {
+    fn irradiance_w_m2_nm(&self) -> Spectrum {
+        self.irradiance_w_m2_nm
     }
 }

@@ -8,12 +8,13 @@
 //! The dome keeps 1 − N of the clear sky's light; the rest comes from an overcast dome with the colour of clouds.
 
 use super::clearsky::{ClearSky, clear_sky, optical_depth};
+use super::described::{Described, Open, Recorded, irradiance};
 use super::hosek::HosekWilkie;
 use super::position::{SunPosition, Utc, sun_position};
 use super::sky::{Dome, Sky};
 use super::sun::Sun;
-use furrow_base::math::{Spectrum, Vec3, direction};
-use furrow_base::ron_file::{Bound, Finite, Pick, Positive, Vary};
+use furrow_base::math::{Spectrum, Vec3, direction, vec3};
+use furrow_base::ron_file::{Bound, Finite, Fraction, Pick, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -94,16 +95,84 @@ pub enum SunDesc {
     },
 }
 
-pub(super) fn zero<B: Bound>() -> Vary<B> {
+fn zero<B: Bound>() -> Vary<B> {
     Vary::fixed(0.0)
 }
 
-pub(super) fn clear_air() -> Vary<Turbidity> {
+fn clear_air() -> Vary<Turbidity> {
     Vary::fixed(3.0)
 }
 
-pub(super) fn bright_cloud() -> Vary<Positive> {
-    Vary::fixed(20.0)
+/// Fields of `Daylight`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename = "Daylight")]
+#[schemars(inline)]
+pub struct DaylightDesc {
+    /// Position of the sun.
+    pub sun: SunDesc,
+    /// Turbidity (haze), 1.7 to 10; default 3.
+    #[serde(default = "clear_air")]
+    pub turbidity: Vary<Turbidity>,
+    /// Cloud cover, 0 clear to 1 overcast; default 0.
+    #[serde(default = "zero::<Fraction>")]
+    pub cloud: Vary<Fraction>,
+}
+
+/// Sampled values of `Daylight`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DaylightRecord {
+    /// Elevation of the sun above the horizon.
+    pub sun_elevation_deg: f64,
+    /// Azimuth of the sun, clockwise from north.
+    pub sun_azimuth_deg: f64,
+    /// Turbidity (haze), 1.7 to 10.
+    pub turbidity: f64,
+    /// Cloud cover, 0 to 1.
+    pub cloud: f32,
+    /// Irradiance of the ground from the sun's disc.
+    pub sun_irradiance_w_m2_nm: Spectrum,
+    /// Irradiance of the ground from the sky.
+    pub sky_irradiance_w_m2_nm: Spectrum,
+}
+
+impl Recorded for DaylightRecord {
+    fn irradiance_w_m2_nm(&self) -> Spectrum {
+        self.sun_irradiance_w_m2_nm + self.sky_irradiance_w_m2_nm
+    }
+}
+
+impl Described for DaylightDesc {
+    type Record = DaylightRecord;
+    type Sources = (Option<Sun>, Option<Box<Sky>>);
+
+    fn draw(&self, stream: &mut Stream, _: &mut Open<'_>) -> Result<(Self::Record, Self::Sources)> {
+        let at = self.sun.draw(stream)?;
+        let (turbidity, cloud) = (self.turbidity.draw(stream), self.cloud.draw32(stream));
+        let (sun, sky) = daylight(at.elevation_deg, at.azimuth_deg, turbidity, cloud);
+        let record = DaylightRecord {
+            sun_elevation_deg: at.elevation_deg,
+            sun_azimuth_deg: at.azimuth_deg,
+            turbidity,
+            cloud,
+            sun_irradiance_w_m2_nm: irradiance(sun.as_ref()),
+            sky_irradiance_w_m2_nm: irradiance(sky.as_ref()),
+        };
+        Ok((record, (sun, sky.map(Box::new))))
+    }
+
+    fn examples() -> Vec<(&'static str, Self::Sources)> {
+        let mut all = Vec::new();
+        for (sun_name, sky_name, elevation, azimuth, turbidity, cloud) in [
+            ("high sun", "clear sky", 60.0, 170.0, 3.0, 0.0),
+            ("low sun", "hazy sky at a low sun", 6.0, 265.0, 6.0, 0.0),
+            ("veiled sun", "half clouded sky", 35.0, 95.0, 2.0, 0.5),
+        ] {
+            let (sun, sky) = daylight(elevation, azimuth, turbidity, cloud);
+            all.extend([(sun_name, (sun, None)), (sky_name, (None, sky.map(Box::new)))]);
+        }
+        all.push(("uniform sun", (Some(Sun::uniform(vec3(0.6, 0.0, 0.8), Spectrum::ONE)), None)));
+        all
+    }
 }
 
 impl SunDesc {

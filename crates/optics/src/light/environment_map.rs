@@ -11,14 +11,12 @@
 //! air this agrees with SPCTRL2 within a tenth. Plants and ground in the image are brighter in near infrared than it
 //! predicts.
 
+use super::form::{Form, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::texture::panorama::Panorama;
 use furrow_base::math::{Spectrum, Vec3, vec3};
-use furrow_base::ron_file::{Finite, NonNegative, Positive, Vary};
 use furrow_base::sampling::distribution::Distribution2D;
-use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
-use serde::{Deserialize, Serialize};
 use std::f32::consts::{PI, TAU};
 use std::path::Path;
 use std::sync::Arc;
@@ -27,17 +25,6 @@ use std::sync::Arc;
 const WAVELENGTHS: [f32; 3] = [470.0, 615.0, 824.0];
 /// Range of its exponent α: haze and clean air.
 const EXPONENT: (f32, f32) = (0.3, 4.1);
-
-/// Near-infrared source of an environment map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub enum InfraredDesc {
-    /// The file's channel NIR.
-    Channel,
-    /// Extrapolated from blue and red, as for a sky.
-    Sky,
-    /// Red times this factor.
-    OfRed(Vary<NonNegative>),
-}
 
 /// Source of the near infrared, as requested from the loader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,26 +50,6 @@ pub struct Table {
     edges: Vec<f64>,
     /// Irradiance of planes that face +x, −x, +y, −y, +z, −z of the image.
     faces: [Spectrum; 6],
-}
-
-/// Default scale, 1.
-pub(super) fn as_it_is() -> Vary<Positive> {
-    Vary::fixed(1.0)
-}
-
-/// Default azimuth, 0.
-pub(super) fn north() -> Vary<Finite> {
-    Vary::fixed(0.0)
-}
-
-/// Returns the near-infrared source and the sampled factor on that band.
-pub(super) fn draw_infrared(desc: Option<&InfraredDesc>, stream: &mut Stream) -> (Infrared, f32) {
-    match desc {
-        None => (Infrared::Found, 1.0),
-        Some(InfraredDesc::Channel) => (Infrared::Channel, 1.0),
-        Some(InfraredDesc::Sky) => (Infrared::Sky, 1.0),
-        Some(InfraredDesc::OfRed(share)) => (Infrared::Red, share.draw32(stream)),
-    }
 }
 
 impl Table {
@@ -271,6 +238,12 @@ impl Emitter for EnvironmentMap {
 
     fn horizontal_irradiance(&self) -> Spectrum {
         self.table.faces[4] * self.scale
+    }
+}
+
+impl Portable for EnvironmentMap {
+    fn form(&self) -> Form {
+        Form::Dome { uniform: false }
     }
 }
 

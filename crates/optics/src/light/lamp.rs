@@ -8,6 +8,8 @@
 //! AD-130's channels, divided by the signal under ASTM G173 global sunlight and multiplied by that sunlight's band
 //! irradiances. For the halogen lamp, Planck's law at 3000 K agrees within 1 %.
 
+use super::described::{Described, Open, Recorded};
+use super::form::{Form, Outline, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, vec3};
 use furrow_base::ron_file::{Finite, NonNegative, Positive, Vary};
@@ -25,15 +27,6 @@ const WHITE_LED: Spectrum = Spectrum::new(0.951, 1.0, 0.426, 0.0022);
 
 /// Infrared light-emitting diode, 810 to 850 nm, relative to NIR.
 const NIR_LED: Spectrum = Spectrum::new(0.0, 0.0, 0.0, 1.0);
-
-/// Outline of a lamp.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outline {
-    /// Half of the width and height, metres.
-    Rectangle(Vec2),
-    /// Radius, metres.
-    Disc(f32),
-}
 
 /// Flat area that emits on the side of its frame's z axis.
 #[derive(Clone, Copy, Debug)]
@@ -59,41 +52,6 @@ impl Lamp {
         };
         let lamp = Self { outline, centre, frame, radiance, area, reach, below: 0.0 };
         Self { below: lamp.form_factor(Vec3::ZERO, Vec3::Z), ..lamp }
-    }
-
-    /// Returns a lamp of the same power whose outline is scaled by `by` > 0.
-    #[must_use]
-    pub fn shrunk(&self, by: f32) -> Self {
-        let outline = match self.outline {
-            Outline::Rectangle(half) => Outline::Rectangle(half * by),
-            Outline::Disc(radius) => Outline::Disc(radius * by),
-        };
-        Self::new(outline, self.centre, self.frame, self.radiance / (by * by))
-    }
-
-    /// Returns the outline.
-    pub fn outline(&self) -> Outline {
-        self.outline
-    }
-
-    /// Returns the centre, metres.
-    pub fn centre(&self) -> Vec3 {
-        self.centre
-    }
-
-    /// Returns the frame: the lamp emits along z; a rectangle's width is along x.
-    pub fn frame(&self) -> Frame {
-        self.frame
-    }
-
-    /// Returns the radiance, W·m⁻²·sr⁻¹·nm⁻¹ per band.
-    pub fn radiance(&self) -> Spectrum {
-        self.radiance
-    }
-
-    /// Returns the area, m².
-    pub fn area(&self) -> f32 {
-        self.area
     }
 
     /// Returns the point of the area for `u` in [0, 1)².
@@ -202,6 +160,32 @@ impl Emitter for Lamp {
     fn horizontal_irradiance(&self) -> Spectrum {
         self.radiance * self.below
     }
+
+    #[inline]
+    fn is_narrow(&self) -> bool {
+        true
+    }
+
+    #[inline]
+    fn is_infinite(&self) -> bool {
+        false
+    }
+}
+
+impl Portable for Lamp {
+    fn form(&self) -> Form {
+        let Self { outline, centre, frame, radiance, area, .. } = *self;
+        Form::Area { outline, centre, frame, radiance, area }
+    }
+
+    /// Scales the outline at constant power.
+    fn shrunk(&self, by: f32) -> Option<Self> {
+        let outline = match self.outline {
+            Outline::Rectangle(half) => Outline::Rectangle(half * by),
+            Outline::Disc(radius) => Outline::Disc(radius * by),
+        };
+        Some(Self::new(outline, self.centre, self.frame, self.radiance / (by * by)))
+    }
 }
 
 /// Outline of a lamp.
@@ -264,20 +248,77 @@ pub enum GlowDesc {
 /// Point with coordinates in metres.
 pub type PointDesc = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
 
-pub(super) fn origin() -> PointDesc {
+fn origin() -> PointDesc {
     (Vary::fixed(0.0), Vary::fixed(0.0), Vary::fixed(0.0))
 }
 
-impl Lamp {
-    /// Samples a lamp at `position_m` that faces `look_at_m`. Returns a
-    /// [`Kind::Input`](furrow_base::error::Kind::Input) error if both points are equal.
-    pub fn draw(
-        shape: &ShapeDesc,
-        position_m: &PointDesc,
-        look_at_m: &PointDesc,
-        glow: &GlowDesc,
-        stream: &mut Stream,
-    ) -> Result<Self> {
+/// Fields of `Lamp`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, rename = "Lamp")]
+#[schemars(inline)]
+pub struct LampDesc {
+    /// Outline of the area.
+    pub shape: ShapeDesc,
+    /// Centre, metres.
+    #[schemars(extend("x-example" = "(-0.35, 0.2, 1)"))]
+    pub position_m: PointDesc,
+    /// Point that the lamp faces, metres; default the origin.
+    #[serde(default = "origin")]
+    pub look_at_m: PointDesc,
+    /// Brightness and colour.
+    pub glow: GlowDesc,
+}
+
+/// Sampled values of `Lamp`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LampRecord {
+    /// Horizontal and other side of a rectangle; twice the radius for a disc.
+    pub size_m: [f32; 2],
+    /// `true` for a disc.
+    pub round: bool,
+    /// Centre of the area.
+    pub position_m: [f32; 3],
+    /// Unit direction of emission.
+    pub direction: [f32; 3],
+    /// Radiance.
+    pub radiance_w_m2_sr_nm: Spectrum,
+    /// Total emitted power: π times radiance times area.
+    pub power_w_nm: Spectrum,
+    /// Irradiance of the ground.
+    pub irradiance_w_m2_nm: Spectrum,
+}
+
+impl LampRecord {
+    fn of(lamp: &Lamp) -> Self {
+        let (size_m, round) = match lamp.outline {
+            Outline::Rectangle(half) => ((half * 2.0).to_array(), false),
+            Outline::Disc(radius) => ([2.0 * radius; 2], true),
+        };
+        Self {
+            size_m,
+            round,
+            position_m: lamp.centre.to_array(),
+            direction: lamp.frame.z.to_array(),
+            radiance_w_m2_sr_nm: lamp.radiance,
+            power_w_nm: lamp.radiance * (PI * lamp.area),
+            irradiance_w_m2_nm: lamp.horizontal_irradiance(),
+        }
+    }
+}
+
+impl Recorded for LampRecord {
+    fn irradiance_w_m2_nm(&self) -> Spectrum {
+        self.irradiance_w_m2_nm
+    }
+}
+
+impl Described for LampDesc {
+    type Record = LampRecord;
+    type Sources = Option<Lamp>;
+
+    /// Returns a [`Kind::Input`](furrow_base::error::Kind::Input) error if position and target are equal.
+    fn draw(&self, stream: &mut Stream, _: &mut Open<'_>) -> Result<(LampRecord, Option<Lamp>)> {
+        let Self { shape, position_m, look_at_m, glow } = self;
         let outline = match shape {
             ShapeDesc::Rectangle { width_m, height_m } => {
                 Outline::Rectangle(Vec2::new(width_m.draw32(stream), height_m.draw32(stream)) * 0.5)
@@ -308,6 +349,19 @@ impl Lamp {
                 NIR_LED * (irradiance.draw32(stream) * per_irradiance(at_m.draw32(stream)))
             }
         };
-        Ok(Self { radiance, ..lamp })
+        let lamp = Lamp { radiance, ..lamp };
+        Ok((LampRecord::of(&lamp), Some(lamp)))
+    }
+
+    fn examples() -> Vec<(&'static str, Option<Lamp>)> {
+        let radiance = Spectrum::new(2.0, 3.0, 1.0, 0.5);
+        let lamp = |outline, centre: Vec3, axis: Vec3| {
+            Some(Lamp::new(outline, centre, Frame::about(axis.normalize()), radiance))
+        };
+        vec![
+            ("rectangle above", lamp(Outline::Rectangle(Vec2::new(0.3, 0.1)), vec3(0.1, 0.2, 0.9), -Vec3::Z)),
+            ("disc aside", lamp(Outline::Disc(0.15), vec3(0.5, -0.3, 0.6), vec3(-0.5, 0.3, -0.6))),
+            ("large near rectangle", lamp(Outline::Rectangle(Vec2::ONE), vec3(0.0, 0.0, 0.4), vec3(0.2, 0.1, -1.0))),
+        ]
     }
 }

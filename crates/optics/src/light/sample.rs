@@ -66,4 +66,17 @@ pub trait Emitter {
 
     /// Returns the unoccluded irradiance of a horizontal plane at the world's origin, W·m⁻²·nm⁻¹ per band.
     fn horizontal_irradiance(&self) -> Spectrum;
+
+    /// Returns `true` if neighbouring points see the whole light in nearly the same direction, so that shadow rays to it
+    /// are best traced together.
+    #[inline]
+    fn is_narrow(&self) -> bool {
+        false
+    }
+
+    /// Returns `true` if rays that leave the scene see the light, `false` if it has a position.
+    #[inline]
+    fn is_infinite(&self) -> bool {
+        true
+    }
 }

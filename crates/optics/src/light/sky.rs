@@ -13,6 +13,7 @@
 //! between cells fails where the map is folded, at the four azimuths of the axes. Below the horizon, where the scene
 //! has no ground, the camera sees the radiance at the horizon.
 
+use super::form::{Form, Portable};
 use super::hosek::HosekWilkie;
 use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{Spectrum, Vec3, vec3};
@@ -203,6 +204,12 @@ impl Emitter for Sky {
 
     fn horizontal_irradiance(&self) -> Spectrum {
         self.irradiance
+    }
+}
+
+impl Portable for Sky {
+    fn form(&self) -> Form {
+        Form::Dome { uniform: false }
     }
 }
 

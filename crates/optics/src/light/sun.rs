@@ -7,6 +7,7 @@
 //! L₀ follows from the direct normal irradiance E. With r = sin γ / sin α, the projected solid angle of the disc is π
 //! sin²α and the mean of the law over it is 1 − u/3, so L₀ = E / (π sin²α (1 − u/3)) exactly.
 
+use super::form::{Form, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{Frame, Spectrum, Vec3};
 use furrow_base::sampling::warp;
@@ -55,14 +56,6 @@ impl Sun {
         let mean = Spectrum::ONE - limb * (1.0 / 3.0);
         let centre = normal_irradiance / (mean * (PI * SIN * SIN));
         Self { frame: Frame::about(towards), normal_irradiance, centre, limb, sin: SIN, one_minus_cos: ONE_MINUS_COS }
-    }
-
-    /// Returns a sun of the same irradiance whose half angle has a sine `by` times as large; 0 < `by` ≤ 1.
-    #[must_use]
-    pub fn shrunk(self, by: f32) -> Self {
-        let sin = self.sin * by;
-        let one_minus_cos = sin * sin / (1.0 + (1.0 - sin * sin).sqrt());
-        Self { centre: self.centre / (by * by), sin, one_minus_cos, ..self }
     }
 
     /// Returns the unit direction to the disc's centre.
@@ -128,5 +121,23 @@ impl Emitter for Sun {
 
     fn horizontal_irradiance(&self) -> Spectrum {
         self.normal_irradiance * self.frame.z.z.max(0.0)
+    }
+
+    #[inline]
+    fn is_narrow(&self) -> bool {
+        true
+    }
+}
+
+impl Portable for Sun {
+    fn form(&self) -> Form {
+        Form::Distant { towards: self.direction(), normal_irradiance: self.normal_irradiance }
+    }
+
+    /// Scales the sine of the half angle.
+    fn shrunk(&self, by: f32) -> Option<Self> {
+        let sin = self.sin * by;
+        let one_minus_cos = sin * sin / (1.0 + (1.0 - sin * sin).sqrt());
+        Some(Self { centre: self.centre / (by * by), sin, one_minus_cos, ..*self })
     }
 }

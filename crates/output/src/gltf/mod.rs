@@ -21,7 +21,7 @@ mod look;
 mod pack;
 mod skins;
 
-use super::{Export, write_atomically};
+use super::{Export, unheld, write_atomically};
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
@@ -29,7 +29,7 @@ use furrow_grow::model::document::{
     Asset, Camera, DIFFUSE_TRANSMISSION, Document, LIGHTS, Mesh, Node, Perspective, Primitive, Scene as GltfScene,
 };
 use furrow_grow::model::{Label, glb};
-use furrow_optics::light::Light;
+use furrow_optics::light::Form;
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Part, Scene};
 use look::Looks;
@@ -178,17 +178,16 @@ fn camera(scene: &Scene, cameras: &mut Vec<Camera>) -> Node {
 fn lights(scene: &Scene, nodes: &mut Vec<Node>) -> Vec<Value> {
     let mut lights = Vec::new();
     for light in &scene.lights {
-        let (name, kind, strength, frame, at) = match light {
-            Light::Sun(sun) => {
-                let frame = furrow_base::math::Frame::about(sun.direction());
-                ("sun", "directional", sun.normal_irradiance(), frame, Vec3::ZERO)
+        let (name, kind, strength, frame, at) = match light.form() {
+            Form::Distant { towards, normal_irradiance } => {
+                let frame = furrow_base::math::Frame::about(towards);
+                ("sun", "directional", normal_irradiance, frame, Vec3::ZERO)
             }
-            Light::Lamp(lamp) => {
-                let mut frame = lamp.frame();
+            Form::Area { centre, mut frame, radiance, area, .. } => {
                 (frame.y, frame.z) = (-frame.y, -frame.z);
-                ("lamp", "spot", lamp.radiance() * lamp.area(), frame, lamp.centre())
+                ("lamp", "spot", radiance * area, frame, centre)
             }
-            Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => continue,
+            Form::Dome { .. } | Form::Unheld => continue,
         };
         let strength = Spectrum(strength.0.truncate().extend(0.0));
         let most = strength.max().max(f32::MIN_POSITIVE);
@@ -214,15 +213,13 @@ fn warnings(scene: &Scene) -> Vec<String> {
             warnings.push(what.to_owned());
         }
     };
-    let lights = &scene.lights;
-    say(
-        lights.iter().any(|l| matches!(l, Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_))),
-        "glTF has no sky: shadows will be black",
-    );
-    say(lights.iter().any(|l| matches!(l, Light::Lamp(_))), "glTF has no area lamps: they become spot lights");
+    let has = |is: fn(&Form) -> bool| scene.lights.iter().any(|light| is(&light.form()));
+    say(has(|form| matches!(form, Form::Dome { .. })), "glTF has no sky: shadows will be black");
+    say(has(|form| matches!(form, Form::Area { .. })), "glTF has no area lamps: they become spot lights");
     say(
         !scene.camera.distortion().is_none(),
         "glTF has no lens distortion: the camera becomes a pinhole; see its extras",
     );
+    warnings.extend(unheld(&scene.lights));
     warnings
 }

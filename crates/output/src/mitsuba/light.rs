@@ -8,7 +8,7 @@ use super::xml::Element;
 
 use furrow_base::Result;
 use furrow_base::math::{Frame, Spectrum, Vec3, direction, vec3};
-use furrow_optics::light::{Light, Outline, Sun};
+use furrow_optics::light::{Form, Light, Outline};
 use std::f32::consts::{PI, TAU};
 
 /// Distance of the sun's disc, metres. At 1 m from the origin, a shadow's direction is off by 10⁻⁴ rad, a hundredth of
@@ -25,7 +25,15 @@ pub(super) struct Lights {
     /// Each sun: its frame, half the side of its square, and the image's stem.
     suns: Vec<(Frame, f32, String)>,
     sky: Option<Dome>,
-    lamps: Vec<furrow_optics::light::Lamp>,
+    lamps: Vec<Lamp>,
+}
+
+/// Flat light that emits along z of its frame.
+struct Lamp {
+    outline: Outline,
+    centre: Vec3,
+    frame: Frame,
+    radiance: Spectrum,
 }
 
 enum Dome {
@@ -39,20 +47,23 @@ impl Lights {
         let mut of = Self { suns: Vec::new(), sky: None, lamps: Vec::new() };
         let mut around: Vec<&Light> = Vec::new();
         for light in lights {
-            match light {
-                Light::Sun(sun) => {
+            match light.form() {
+                Form::Distant { towards, normal_irradiance } => {
                     let stem = format!("textures/sun-{}", of.suns.len());
-                    let half = sun_picture(sun, &stem, files)?;
-                    of.suns.push((Frame::about(-sun.direction()), half, stem));
+                    let half = sun_picture(light, towards, normal_irradiance, &stem, files)?;
+                    of.suns.push((Frame::about(-towards), half, stem));
                 }
-                Light::Lamp(lamp) => of.lamps.push(*lamp),
-                Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => around.push(light),
+                Form::Area { outline, centre, frame, radiance, .. } => {
+                    of.lamps.push(Lamp { outline, centre, frame, radiance });
+                }
+                Form::Dome { .. } => around.push(light),
+                Form::Unheld => {}
             }
         }
         let radiance = |d: Vec3| around.iter().fold(Spectrum::ZERO, |sum, l| sum + l.le(d));
         of.sky = if around.is_empty() {
             None
-        } else if around.iter().all(|l| matches!(l, Light::Constant(_))) {
+        } else if around.iter().all(|l| l.form() == Form::Dome { uniform: true }) {
             Some(Dome::Constant(radiance(Vec3::Z)))
         } else {
             let (w, h) = SKY;
@@ -105,12 +116,12 @@ impl Lights {
             None => {}
         }
         for lamp in &self.lamps {
-            let (shape, half) = match lamp.outline() {
+            let (shape, half) = match lamp.outline {
                 Outline::Rectangle(half) => ("rectangle", half.to_array()),
                 Outline::Disc(radius) => ("disk", [radius; 2]),
             };
-            let emitter = Element::plugin("emitter", "area").inside([band.rgb("radiance", lamp.radiance())]);
-            all.push(area(shape, &lamp.frame(), half, lamp.centre(), emitter));
+            let emitter = Element::plugin("emitter", "area").inside([band.rgb("radiance", lamp.radiance)]);
+            all.push(area(shape, &lamp.frame, half, lamp.centre, emitter));
         }
         all
     }
@@ -124,11 +135,16 @@ fn area(shape: &str, frame: &Frame, half: [f32; 2], centre: Vec3, emitter: Eleme
 
 /// Writes the image of the square around the sun's disc, normalised to give exactly the sun's irradiance. Returns half
 /// the square's side, metres.
-fn sun_picture(sun: &Sun, stem: &str, files: &mut Files<'_>) -> Result<f32> {
+fn sun_picture(
+    light: &Light,
+    towards: Vec3,
+    normal_irradiance: Spectrum,
+    stem: &str,
+    files: &mut Files<'_>,
+) -> Result<f32> {
     const SUB: u32 = 4;
     let half = SUN_M * furrow_optics::light::HALF_ANGLE_DEG.to_radians().tan();
-    let light = Light::Sun(*sun);
-    let frame = Frame::about(-sun.direction());
+    let frame = Frame::about(-towards);
     let n = SUN_SIDE * SUB;
     let place = |i: u32| half * (2.0 * (i as f32 + 0.5) / n as f32 - 1.0);
     let mut pixels = vec![Spectrum::ZERO; (SUN_SIDE * SUN_SIDE) as usize];
@@ -143,7 +159,7 @@ fn sun_picture(sun: &Sun, stem: &str, files: &mut Files<'_>) -> Result<f32> {
         let p = p.to_array();
         std::array::from_fn(|i| sum[i] + f64::from(p[i]) * f64::from(solid_angle))
     });
-    let wanted = sun.normal_irradiance().to_array();
+    let wanted = normal_irradiance.to_array();
     let scale =
         Spectrum::from(std::array::from_fn(
             |i| {

@@ -34,7 +34,7 @@ mod surface;
 mod xml;
 
 use super::png::{self, Picture};
-use super::{Export, Together};
+use super::{Export, Together, unheld};
 use files::{Band, Files, Plugins, SCALE, matrix};
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::Spectrum;
@@ -84,6 +84,7 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     let mut warnings = camera_warnings(scene);
     let groups = groups(scene, leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
+    warnings.extend(unheld(&scene.lights));
     if lights.has_lamps() && lights.has_sky() {
         warnings.push("with lamps in the scene the camera does not see the sky".into());
     }

@@ -14,7 +14,7 @@ use crate::settings::{Technique, Techniques};
 use furrow_base::geometry::Window;
 use furrow_base::math::{Spectrum, Vec3, Vec4};
 use furrow_base::{Error, Result};
-use furrow_optics::light::Light;
+use furrow_optics::light::{Form, Light};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
     BufferUsages, Color, CommandEncoder, CommandEncoderDescriptor, CompareFunction, FilterMode, IndexFormat, LoadOp,
@@ -108,10 +108,10 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: 
 
 /// Factor that scales radiance to about one.
 fn scale(scene: &Scene) -> f32 {
-    let strength = |light: &Light| match light {
+    let strength = |light: &Light| match light.form() {
         // The sun counts with its normal irradiance, whatever its elevation.
-        Light::Sun(sun) => sun.normal_irradiance(),
-        other => other.horizontal_irradiance(),
+        Form::Distant { normal_irradiance, .. } => normal_irradiance,
+        Form::Area { .. } | Form::Dome { .. } | Form::Unheld => light.horizontal_irradiance(),
     };
     let all = scene.lights.iter().map(strength).fold(Spectrum::ZERO, |sum, s| sum + s);
     std::f32::consts::PI / all.max().max(1e-6)

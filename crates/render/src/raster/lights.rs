@@ -8,7 +8,7 @@ use super::vertices::STRIDE;
 use crate::scene::Scene;
 use crate::settings::{Technique, Techniques};
 use furrow_base::math::{Frame, Spectrum, Vec3, Vec4, vec3};
-use furrow_optics::light::Light;
+use furrow_optics::light::{Form, Light};
 use std::f32::consts::PI;
 
 /// Width and height of a shadow map, texels.
@@ -36,17 +36,20 @@ impl Lights {
         let mut each = Vec::new();
         let mut ambient = [Vec4::ZERO; 9];
         for light in &scene.lights {
-            match light {
-                Light::Sun(sun) => each.push(sunlight(sun.direction(), sun.normal_irradiance(), corners)),
-                Light::Lamp(lamp) => {
-                    each.push(lamplight(lamp.centre(), lamp.frame(), lamp.radiance() * lamp.area()));
+            let around = match light.form() {
+                Form::Distant { towards, normal_irradiance } => {
+                    each.push(sunlight(towards, normal_irradiance, corners));
+                    continue;
                 }
-                Light::Sky(_) | Light::Constant(_) | Light::EnvironmentMap(_) => {
-                    let of = if techniques.has(Technique::Harmonics) { harmonics(light) } else { even(light) };
-                    for (sum, add) in ambient.iter_mut().zip(of) {
-                        *sum += add;
-                    }
+                Form::Area { centre, frame, radiance, area, .. } => {
+                    each.push(lamplight(centre, frame, radiance * area));
+                    continue;
                 }
+                Form::Dome { .. } if techniques.has(Technique::Harmonics) => harmonics(light),
+                Form::Dome { .. } | Form::Unheld => even(light),
+            };
+            for (sum, add) in ambient.iter_mut().zip(around) {
+                *sum += add;
             }
         }
         Self { each, ambient }
