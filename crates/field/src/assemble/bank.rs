@@ -12,7 +12,7 @@
 //! The product is the organ's colour on this plant. Near infrared and transmittance are derived from it during shading and never sum to
 //! more than 0.99 with it ([`furrow_optics::optics::LeafOptics::at`]). Damage is that of the bank plant.
 
-use super::builder::Builder;
+use super::drawn::Drawn;
 use super::grown::Grown;
 use super::member::Member;
 use super::progress::Stage;
@@ -79,36 +79,34 @@ fn placed(axis: &LeafAxis, at: &Placement) -> LeafAxis {
     LeafAxis { size, ..axis.clone().moved(|p| at.point(p)) }
 }
 
-impl Builder<'_> {
-    /// Returns the bank plant that the plant at `at` is an instance of; `None` if the plant has its own shape.
-    pub(super) fn member(&self, population: u64, stream: &Stream, at: Vec2) -> Option<Member> {
-        let whole = self.options.preview.is_some() || self.options.rigged;
-        let shared = self.desc.detail == Detail::Instanced && !whole && self.camera_pixel_at(at) >= COARSE;
-        shared.then(|| Member::of(population, stream, self.cell(at)))
-    }
+/// Returns the bank plant that the plant at `at` is an instance of; `None` if the plant has its own shape.
+pub(super) fn member(drawn: &Drawn<'_>, population: u64, stream: &Stream, at: Vec2) -> Option<Member> {
+    let whole = drawn.options.preview.is_some() || drawn.options.rigged;
+    let shared = drawn.desc.detail == Detail::Instanced && !whole && drawn.camera_pixel_at(at) >= COARSE;
+    shared.then(|| Member::of(population, stream, drawn.cell(at)))
+}
 
-    /// Grows the bank plants that these seedlings are instances of.
-    pub(super) fn bank(&self, seedlings: &[Seedling], dust: Spectrum) -> Result<BTreeMap<Member, Arc<Model>>> {
-        let mut wanted: BTreeMap<Member, &Seedling> = BTreeMap::new();
-        for seedling in seedlings {
-            if let Some(member) = seedling.member {
-                wanted.entry(member).or_insert(seedling);
-            }
+/// Grows the bank plants that these seedlings are instances of.
+pub(super) fn bank(drawn: &Drawn<'_>, seedlings: &[Seedling], dust: Spectrum) -> Result<BTreeMap<Member, Arc<Model>>> {
+    let mut wanted: BTreeMap<Member, &Seedling> = BTreeMap::new();
+    for seedling in seedlings {
+        if let Some(member) = seedling.member {
+            wanted.entry(member).or_insert(seedling);
         }
-        let wanted: Vec<(Member, &Seedling)> = wanted.into_iter().collect();
-        let progress = &self.options.progress;
-        if !wanted.is_empty() {
-            progress.enter(Stage::Shared);
-            progress.shared.expect(wanted.len());
-        }
-        let raise = |(member, like): &(Member, &Seedling)| {
-            self.options.wanted()?;
-            let stream = self.stream(Purpose::Plant, member.population).child(BANK, member.number);
-            let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
-            let place = Place { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
-            let (record, organs) = grow(&own, &place, |_| true);
-            Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
-        };
-        wanted.par_iter().map(raise).inspect(|_| progress.shared.add()).collect()
     }
+    let wanted: Vec<(Member, &Seedling)> = wanted.into_iter().collect();
+    let progress = &drawn.options.progress;
+    if !wanted.is_empty() {
+        progress.enter(Stage::Shared);
+        progress.shared.expect(wanted.len());
+    }
+    let raise = |(member, like): &(Member, &Seedling)| {
+        drawn.options.wanted()?;
+        let stream = drawn.stream(Purpose::Plant, member.population).child(BANK, member.number);
+        let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
+        let place = Place { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
+        let (record, organs) = grow(&own, &place, |_| true);
+        Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
+    };
+    wanted.par_iter().map(raise).inspect(|_| progress.shared.add()).collect()
 }

@@ -1,13 +1,11 @@
 //! Data of a field's ground during construction.
 
 use super::ground_view::Onlooker;
-use crate::PartKind;
 use crate::desc::Detail;
 use crate::layer::Layer;
 use furrow_base::math::Spectrum;
 use furrow_grow::soil::{Debris, Ground, Pile, Site, SoilDesc};
-use furrow_render::material::{BakedGround, Material};
-use furrow_render::scene::Part;
+use furrow_render::material::BakedGround;
 use std::sync::Arc;
 
 /// All inputs of the ground that do not depend on the plants.
@@ -48,12 +46,4 @@ pub(super) struct Bed {
     pub(super) soil: Soil,
     pub(super) earth: Earth,
     pub(super) baked: Arc<BakedGrounds>,
-}
-
-/// The ground, clods and debris as scene parts. Their material indices refer to `materials` here.
-#[derive(Default)]
-pub(super) struct Laid {
-    pub(super) parts: Vec<Part>,
-    pub(super) kinds: Vec<PartKind>,
-    pub(super) materials: Vec<Material>,
 }

@@ -1,14 +1,15 @@
 //! Estimates the cost of a field before it is built: film, LiDAR echoes, ground, debris, plants, models, images.
 
-use super::PLANT_MARGIN;
-use super::builder::Builder;
 use super::census::Population;
+use super::drawn::Drawn;
 use super::member::Member;
 use super::preview::Counted;
 use super::seedling::{Place, Seedling, grow};
-use super::view::View;
+use super::view::Sight;
+use super::{ground, sow};
 use crate::desc::Detail;
 use crate::estimate::{Estimate, Share};
+use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::geometry::Cost;
 use furrow_base::math::Vec3;
@@ -44,103 +45,97 @@ const SECONDS_PER_INSTANCE: f64 = 1e-5;
 /// Core seconds per triangle of a plant.
 const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 
-impl Builder<'_> {
-    /// Estimates the cost of the field for the ground in `view`.
-    pub(super) fn estimate(&mut self, view: View) -> Result<Estimate> {
-        let camera = &self.scene.camera;
-        let pixels = f64::from(camera.width()) * f64::from(camera.height());
-        let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
-        let coarser = if self.desc.detail == Detail::Full {
-            ", or lower the camera, or set detail: ByPixel"
-        } else {
-            ", or lower the camera"
-        };
-        let mut shares = Vec::new();
-        let fewer = match (self.desc.drive.is_some(), self.scanners.is_empty()) {
-            (false, true) => "",
-            (true, true) => "use fewer frames, or ",
-            (false, false) => "lower reach_m, or ",
-            (true, false) => "use fewer frames, lower reach_m, or ",
-        };
-        let mut add = |at: &[Step<'static>], cost, advice: &str| {
-            shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
-        };
-        add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
-        // Only one frame is scanned at a time, and all frames have the same number of pulses.
-        if let Some(lidar) = self.scanners.first() {
-            let pulses = f64::from(lidar.columns()) * f64::from(lidar.beams());
-            let echoes = Cost::work(pulses * BYTES_PER_PULSE, pulses * SECONDS_PER_PULSE);
-            add(&[Step::Field("lidar")], echoes, "use fewer beams, or a larger step in `pulses`");
-        }
-        if let Some(soil) = &self.desc.soil {
-            let (bare, all) = self.expected_soil(soil, view);
-            add(
-                &[Step::Field("camera")],
-                bare,
-                "lower the camera, narrow its angle of view, or make the image smaller",
-            );
-            for Expected { at, cost, advice } in all {
-                add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}{coarser}"));
-            }
-        }
-        let (seedlings, populations) = self.seedlings(view.area.grown(PLANT_MARGIN), &[])?;
-        let mut counted = Vec::new();
-        for (population, range) in populations {
-            let (at, advice) = population.place();
-            let number = range.len();
-            let some = self.count(&seedlings, population, range.clone());
-            let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
-            add(&at, expected(&some, number, &shared), &format!("{advice}{coarser}"));
-            counted.extend(some);
-        }
-        if let Some(preview) = &self.options.preview {
-            preview.keep_counted(counted);
-        }
-        for (k, model) in self.desc.models.iter().enumerate() {
-            let model = self.library.model(self.page, model)?;
-            let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
-            let cost = Cost::of(triangles as f64, model.parts.len() as f64);
-            add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
-        }
-        shares.extend(self.pictured()?);
-        Ok(Estimate { shares })
+/// Estimates the cost of the field for the ground in sight.
+pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Sight) -> Result<Estimate> {
+    let camera = &drawn.camera;
+    let pixels = f64::from(camera.width()) * f64::from(camera.height());
+    let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
+    let coarser = if drawn.desc.detail == Detail::Full {
+        ", or lower the camera, or set detail: ByPixel"
+    } else {
+        ", or lower the camera"
+    };
+    let mut shares = Vec::new();
+    let fewer = match (drawn.desc.drive.is_some(), drawn.scanners.is_empty()) {
+        (false, true) => "",
+        (true, true) => "use fewer frames, or ",
+        (false, false) => "lower reach_m, or ",
+        (true, false) => "use fewer frames, lower reach_m, or ",
+    };
+    let mut add = |at: &[Step<'static>], cost, advice: &str| {
+        shares.push(Share { at: at.to_vec(), cost, advice: format!("{fewer}{advice}") });
+    };
+    add(&[Step::Field("camera"), Step::Field("size")], film, "make the image smaller, with --width");
+    // Only one frame is scanned at a time, and all frames have the same number of pulses.
+    if let Some(lidar) = drawn.scanners.first() {
+        let pulses = f64::from(lidar.columns()) * f64::from(lidar.beams());
+        let echoes = Cost::work(pulses * BYTES_PER_PULSE, pulses * SECONDS_PER_PULSE);
+        add(&[Step::Field("lidar")], echoes, "use fewer beams, or a larger step in `pulses`");
     }
-
-    /// Estimates the memory of images: soil textures, leaf images and model textures.
-    fn pictured(&mut self) -> Result<Vec<Share>> {
-        let (page, desc) = (self.page, self.desc);
-        let at = |list, k, field| vec![Step::Field(list), Step::Item(k), Step::Field(field)];
-        let mut places = Vec::new();
-        let layers = desc.soil.iter().flat_map(|soil| &soil.layers);
-        for (k, layer) in layers.enumerate() {
-            let place = [vec![Step::Field("soil")], at("layers", k, "albedo")].concat();
-            places.push((place, vec![self.library.layer_pictures(page, layer)?]));
+    if let Some(soil) = &drawn.desc.soil {
+        let (bare, all) = ground::expected_soil(drawn, soil, sight.view);
+        add(&[Step::Field("camera")], bare, "lower the camera, narrow its angle of view, or make the image smaller");
+        for Expected { at, cost, advice } in all {
+            add(&[&[Step::Field("soil")], &at[..]].concat(), cost, &format!("{advice}{coarser}"));
         }
-        let crops = self.sown.clone().map(|k| ("crops", k, &desc.crops[k].species));
-        let weeds = desc.weeds.iter().enumerate().map(|(k, weed)| ("weeds", k, &weed.species));
-        let plants = desc.plants.iter().enumerate().map(|(k, plant)| ("plants", k, &plant.species));
-        for (list, k, species) in crops.chain(weeds).chain(plants) {
-            places.push((at(list, k, "species"), self.library.species(page, species)?.pictures.clone()));
-        }
-        for (k, model) in desc.models.iter().enumerate() {
-            places.push((at("models", k, "file"), vec![self.library.model_pictures(page, model)?]));
-        }
-        Ok(self.library.counted.shares(places))
     }
-
-    /// Counts triangles and organs of sample plants of a population by growing them. A plant that might itself be too large is not grown.
-    fn count(&self, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
+    let (seedlings, populations) = sow::seedlings(drawn, library, sight, &[])?;
+    let mut counted = Vec::new();
+    for (population, range) in populations {
+        let (at, advice) = population.place();
         let number = range.len();
-        let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
-        let tried = number.min(most);
-        let samples = (0..tried).into_par_iter().map(|k| {
-            let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
-            let cell = self.cell(seedling.position);
-            let known = self.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
-            Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
-        });
-        samples.collect()
+        let some = count(drawn, &seedlings, population, range.clone());
+        let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
+        add(&at, expected(&some, number, &shared), &format!("{advice}{coarser}"));
+        counted.extend(some);
     }
+    if let Some(preview) = &drawn.options.preview {
+        preview.keep_counted(counted);
+    }
+    for (k, model) in drawn.desc.models.iter().enumerate() {
+        let model = library.model(drawn.page, model)?;
+        let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+        let cost = Cost::of(triangles as f64, model.parts.len() as f64);
+        add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
+    }
+    shares.extend(pictured(drawn, library)?);
+    Ok(Estimate { shares })
+}
+
+/// Estimates the memory of images: soil textures, leaf images and model textures.
+fn pictured(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Share>> {
+    let (page, desc) = (drawn.page, drawn.desc);
+    let at = |list, k, field| vec![Step::Field(list), Step::Item(k), Step::Field(field)];
+    let mut places = Vec::new();
+    let layers = desc.soil.iter().flat_map(|soil| &soil.layers);
+    for (k, layer) in layers.enumerate() {
+        let place = [vec![Step::Field("soil")], at("layers", k, "albedo")].concat();
+        places.push((place, vec![library.layer_pictures(page, layer)?]));
+    }
+    let crops = drawn.sown.clone().map(|k| ("crops", k, &desc.crops[k].species));
+    let weeds = desc.weeds.iter().enumerate().map(|(k, weed)| ("weeds", k, &weed.species));
+    let plants = desc.plants.iter().enumerate().map(|(k, plant)| ("plants", k, &plant.species));
+    for (list, k, species) in crops.chain(weeds).chain(plants) {
+        places.push((at(list, k, "species"), library.species(page, species)?.pictures.clone()));
+    }
+    for (k, model) in desc.models.iter().enumerate() {
+        places.push((at("models", k, "file"), vec![library.model_pictures(page, model)?]));
+    }
+    Ok(library.counted.shares(places))
+}
+
+/// Counts triangles and organs of sample plants of a population by growing them. A plant that might itself be too large is not grown.
+fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
+    let number = range.len();
+    let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
+    let tried = number.min(most);
+    let samples = (0..tried).into_par_iter().map(|k| {
+        let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
+        let cell = drawn.cell(seedling.position);
+        let known = drawn.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
+        Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
+    });
+    samples.collect()
 }
 
 /// Returns the numbers of triangles and organs of a plant; for a plant that may exceed [`TRIED`], the upper bound and 1.

@@ -1,15 +1,19 @@
 //! Builds the ground of a field: the surface with its stones, then clods and litter, then scene parts.
 
-use super::PLANT_MARGIN;
-use super::builder::{Builder, Floor};
-use super::earth::{BakedGrounds, Bed, Earth, Laid, Soil};
+use super::drawn::{Drawn, Floor};
+use super::earth::{BakedGrounds, Bed, Earth, Soil};
 use super::ground_view::{Onlooker, from_view};
+use super::parts::Parts;
+use super::populate::{self, Stocked};
 use super::preview::Under;
 use super::terrain::{GROUND_MARGIN, tilted_to};
+use super::view::Sight;
 use super::view::View;
+use super::{sow, unlikely, view};
+use crate::PartKind;
 use crate::desc::Detail;
 use crate::layer::Layer;
-use crate::{PartKind, PlantRecord};
+use crate::library::Library;
 use furrow_base::geometry::{Cost, Mesh};
 use furrow_base::math::{Spectrum, Vec2};
 use furrow_base::ron_file::{Step, Vary};
@@ -53,178 +57,175 @@ const DUST_PATCH: f32 = 3e-3;
 /// Number of quantisation steps of the moisture of debris, from air-dry to saturated.
 const MOISTURE_STEPS: f32 = 12.0;
 
-impl Builder<'_> {
-    /// Builds the ground, the plants on it, and the clods and litter below them. Returns the plants and the record of the soil.
-    pub(super) fn cultivate(
-        &mut self,
-        desc: &SoilDesc,
-        view: View,
-        shown: Option<Rect>,
-    ) -> Result<(Vec<PlantRecord>, SoilRecord)> {
-        let soil = self.soil(desc, view)?;
-        let options = self.options;
-        let preview = options.preview.as_ref();
-        let known = preview.and_then(|preview| preview.bed(&soil));
-        let mut earth = match &known {
-            Some(bed) => bed.earth.clone(),
-            None => self.break_ground(&soil)?,
-        };
-        self.options.wanted()?;
-        let bare = preview.map(|_| earth.clone());
-        let ground = earth.ground.clone();
-        let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
-        let record = self.soil_record(desc, &ground);
-        self.warn_of_burial(floor);
-        let seen = in_view(&soil.onlookers, ground.area(), |p| floor.height(p.x, p.y));
-        // Baking takes about as long as everything else, and the two are independent.
-        let (baked, rest) = rayon::join(
-            || match &known {
-                _ if options.unlit || options.told_only => None,
-                Some(bed) => Some(bed.baked.clone()),
-                None => Some(Arc::new(bake(&ground, &soil))),
-            },
-            || {
-                let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-                let (seedlings, _) = self.seedlings(view.area.grown(PLANT_MARGIN), &taken)?;
-                // Plants first: they push the clods aside, not the other way round.
-                let plants = self.populate(&seedlings, Some(floor), shown)?;
-                let meshes = || self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
-                let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
-                let uncovered = same.is_some() || options.told_only;
-                let cover = if uncovered { Vec::new() } else { self.cover(desc, &mut earth, &seen) };
-                Ok::<_, Error>((plants, same, cover))
-            },
-        );
-        let (plants, same, clods) = rest?;
-        self.options.wanted()?;
-        let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
-        if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
-            let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
-            let plants = self.scene.parts.iter().map(|part| part.mesh.clone()).collect();
-            preview.keep_ground(Under { bed, plants }, &laid);
-        }
-        self.put(&laid);
-        Ok((plants, record))
+/// Builds the ground, the plants and models on it, and the clods and litter below them. Returns all parts with the records of the plants,
+/// and the record of the soil.
+pub(super) fn cultivate(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    warnings: &mut Vec<String>,
+    desc: &SoilDesc,
+    sight: &Sight,
+) -> Result<(Stocked, SoilRecord)> {
+    let soil = soil(drawn, library, desc, sight.view)?;
+    let options = drawn.options;
+    let preview = options.preview.as_ref();
+    let known = preview.and_then(|preview| preview.bed(&soil));
+    let mut earth = match &known {
+        Some(bed) => bed.earth.clone(),
+        None => break_ground(drawn, &soil)?,
+    };
+    drawn.options.wanted()?;
+    let bare = preview.map(|_| earth.clone());
+    let ground = earth.ground.clone();
+    let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
+    let record = soil_record(drawn, desc, &ground);
+    warnings.extend(unlikely::burial(drawn, floor));
+    let seen = in_view(&soil.onlookers, ground.area(), |p| floor.height(p.x, p.y));
+    // Baking takes about as long as everything else, and the two are independent.
+    let (baked, rest) = rayon::join(
+        || match &known {
+            _ if options.unlit || options.told_only => None,
+            Some(bed) => Some(bed.baked.clone()),
+            None => Some(Arc::new(bake(&ground, &soil))),
+        },
+        || {
+            let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+            let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
+            // Plants first: they push the clods aside, not the other way round.
+            let stocked = populate::populate(drawn, library, warnings, &seedlings, Some(floor), sight)?;
+            let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
+            let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
+            let uncovered = same.is_some() || options.told_only;
+            let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
+            Ok::<_, Error>((stocked, same, cover))
+        },
+    );
+    let (mut stocked, same, clods) = rest?;
+    drawn.options.wanted()?;
+    let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
+    if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
+        let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
+        let plants = stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
+        preview.keep_ground(Under { bed, plants }, &laid);
     }
+    stocked.parts.lay_below(&laid);
+    Ok((stocked, record))
+}
 
-    /// Collects the inputs of the ground: layers, colours, site, texel size, cameras.
-    pub(super) fn soil(&mut self, desc: &SoilDesc, view: View) -> Result<Soil> {
-        let mut maps: Vec<Arc<Layer>> = Vec::new();
-        for layer in &desc.layers {
-            maps.push(self.library.layer(self.page, layer)?);
-        }
-        let mut read = |file: &str| self.library.soil_spectrum(self.page, file);
-        let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
-        let (site, texel, of) = (self.site(view), self.texel(view), (self.seed, self.index));
-        let (desc, onlookers) = (self.weathered(desc), self.onlookers(view));
-        Ok(Soil { desc, detail: self.desc.detail, colors, maps, site, texel, onlookers, of })
+/// Collects the inputs of the ground: layers, colours, site, texel size, cameras.
+pub(super) fn soil(drawn: &Drawn<'_>, library: &mut Library, desc: &SoilDesc, view: View) -> Result<Soil> {
+    let mut maps: Vec<Arc<Layer>> = Vec::new();
+    for layer in &desc.layers {
+        maps.push(library.layer(drawn.page, layer)?);
     }
+    let mut read = |file: &str| library.soil_spectrum(drawn.page, file);
+    let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
+    let (site, texel, of) = (site(drawn, view), texel(drawn, view), (drawn.seed, drawn.index));
+    let (desc, onlookers) = (weathered(drawn, desc), view::onlookers(drawn, view));
+    Ok(Soil { desc, detail: drawn.desc.detail, colors, maps, site, texel, onlookers, of })
+}
 
-    /// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
-    fn weathered(&self, desc: &SoilDesc) -> SoilDesc {
-        let mut desc = desc.clone();
-        if let Some(today) = &self.today {
-            let mean = desc.moisture.mean.draw(&mut today.stream(&self.stream(Purpose::Soil, 0)));
-            desc.moisture.mean = Vary::fixed(mean);
-            desc.crust = today.crust;
-        }
-        desc
+/// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
+fn weathered(drawn: &Drawn<'_>, desc: &SoilDesc) -> SoilDesc {
+    let mut desc = desc.clone();
+    if let Some(today) = &drawn.today {
+        let mean = desc.moisture.mean.draw(&mut today.stream(&drawn.stream(Purpose::Soil, 0)));
+        desc.moisture.mean = Vary::fixed(mean);
+        desc.crust = today.crust;
     }
+    desc
+}
 
-    /// Builds the surface and the stones, which must exist before plants are placed.
-    fn break_ground(&self, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<Earth> {
-        let ground = Ground::new(desc, colors, maps, site, &self.stream(Purpose::Soil, 0))
-            .map_err(|e| self.page.blame(&[Step::Field("soil")], e))?;
-        self.options.wanted()?;
-        let mut pile = Pile::new(&ground).until(self.options.stop.as_ref());
-        let stones = soil::stones(&desc.stones, &ground, &mut pile, &self.stream(Purpose::Debris, STONES));
-        Ok(Earth { ground: Arc::new(ground), pile, stones })
-    }
+/// Builds the surface and the stones, which must exist before plants are placed.
+fn break_ground(drawn: &Drawn<'_>, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<Earth> {
+    let ground = Ground::new(desc, colors, maps, site, &drawn.stream(Purpose::Soil, 0))
+        .map_err(|e| drawn.page.blame(&[Step::Field("soil")], e))?;
+    drawn.options.wanted()?;
+    let mut pile = Pile::new(&ground).until(drawn.options.stop.as_ref());
+    let stones = soil::stones(&desc.stones, &ground, &mut pile, &drawn.stream(Purpose::Debris, STONES));
+    Ok(Earth { ground: Arc::new(ground), pile, stones })
+}
 
-    /// Returns the area of ground to be built, and its resolution.
-    pub(super) fn site(&self, view: View) -> Site {
-        let pixel = self.soil_pixel();
-        let [cells, _, things] = coarser(view);
-        let (coarsest, smallest_mm) = match self.desc.detail {
-            Detail::Full => (soil::FULL_CELL_M, 0.0),
-            Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
-        };
-        Site {
-            area: view.near.grown(GROUND_MARGIN),
-            grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
-            margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
-            growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
-            level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
-            smallest_mm,
-            rows: self.seed_rows(),
-        }
+/// Returns the area of ground to be built, and its resolution.
+pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
+    let pixel = soil_pixel(drawn);
+    let [cells, _, things] = coarser(view);
+    let (coarsest, smallest_mm) = match drawn.desc.detail {
+        Detail::Full => (soil::FULL_CELL_M, 0.0),
+        Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
+    };
+    Site {
+        area: view.near.grown(GROUND_MARGIN),
+        grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
+        margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
+        growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
+        level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
+        smallest_mm,
+        rows: seed_rows(drawn),
     }
+}
 
-    /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
-    fn seed_rows(&self) -> Option<SeedRows> {
-        self.sown.clone().next().map(|k| {
-            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
-            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
-        })
-    }
+/// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
+fn seed_rows(drawn: &Drawn<'_>) -> Option<SeedRows> {
+    drawn.sown.clone().next().map(|k| {
+        let rows = Rows::draw(&drawn.desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k as u64));
+        SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+    })
+}
 
-    /// Returns the bounds of the ground's height.
-    pub(super) fn envelope(&self) -> Envelope {
-        let soil = self.desc.soil.as_ref();
-        soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, self.seed_rows(), &self.stream(Purpose::Soil, 0)))
-    }
+/// Returns the bounds of the ground's height.
+pub(super) fn envelope(drawn: &Drawn<'_>) -> Envelope {
+    let soil = drawn.desc.soil.as_ref();
+    soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, seed_rows(drawn), &drawn.stream(Purpose::Soil, 0)))
+}
 
-    /// Returns the texel size of the ground's maps, metres.
-    pub(super) fn texel(&self, view: View) -> f32 {
-        let coarsest = if self.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
-        let [_, texels, _] = coarser(view);
-        (0.9 * texels * self.soil_pixel()).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
-    }
+/// Returns the texel size of the ground's maps, metres.
+pub(super) fn texel(drawn: &Drawn<'_>, view: View) -> f32 {
+    let coarsest = if drawn.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
+    let [_, texels, _] = coarser(view);
+    (0.9 * texels * soil_pixel(drawn)).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
+}
 
-    /// Returns the pixel footprint on the ground that sets its resolution, metres.
-    fn soil_pixel(&self) -> f32 {
-        if self.desc.detail == Detail::Full { self.ground_pixel() } else { self.finest_pixel() }
-    }
+/// Returns the pixel footprint on the ground that sets its resolution, metres.
+fn soil_pixel(drawn: &Drawn<'_>) -> f32 {
+    if drawn.desc.detail == Detail::Full { drawn.ground_pixel() } else { drawn.finest_pixel() }
+}
 
-    /// Estimates the cost of the ground, and of each kind of debris and clods on it, before they are built.
-    pub(super) fn expected_soil(&self, desc: &SoilDesc, view: View) -> (Cost, Vec<Expected>) {
-        let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
-        let streams = streams.map(|(purpose, index)| self.stream(purpose, index));
-        let site = self.site(view);
-        let seen = in_view(&self.onlookers(view), site.area, |_| 0.0);
-        soil::expected(desc, &site, self.texel(view), &seen, streams.each_ref())
-    }
+/// Estimates the cost of the ground, and of each kind of debris and clods on it, before they are built.
+pub(super) fn expected_soil(drawn: &Drawn<'_>, desc: &SoilDesc, view: View) -> (Cost, Vec<Expected>) {
+    let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
+    let streams = streams.map(|(purpose, index)| drawn.stream(purpose, index));
+    let site = site(drawn, view);
+    let seen = in_view(&view::onlookers(drawn, view), site.area, |_| 0.0);
+    soil::expected(desc, &site, texel(drawn, view), &seen, streams.each_ref())
+}
 
-    /// Returns the record of the ground with its drawn values.
-    pub(super) fn soil_record(&self, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
-        ground.record(desc, &self.stream(Purpose::Debris, STONES), &self.stream(Purpose::Debris, LITTER))
-    }
+/// Returns the record of the ground with its drawn values.
+pub(super) fn soil_record(drawn: &Drawn<'_>, desc: &SoilDesc, ground: &Ground) -> SoilRecord {
+    ground.record(desc, &drawn.stream(Purpose::Debris, STONES), &drawn.stream(Purpose::Debris, LITTER))
+}
 
-    /// Places clods below the plants, and adds litter to the debris. Returns the clods; none if the ground is flat.
-    fn cover(&self, desc: &SoilDesc, Earth { ground, pile, stones: debris }: &mut Earth, seen: &InView) -> Vec<Clods> {
-        let mut canopy = Canopy::none(ground);
-        for part in self.scene.parts.iter().filter(|_| !desc.flat) {
-            canopy.add(&part.in_world());
-        }
-        let clods = soil::clods(ground, pile, &canopy, seen);
-        debris.extend(soil::litter(&desc.litter, ground, pile, &self.stream(Purpose::Debris, LITTER)));
-        if !desc.flat {
-            return clods;
-        }
-        for thing in debris {
-            thing.lower(ground);
-        }
-        Vec::new()
+/// Places clods below the plants, and adds litter to the debris. Returns the clods; none if the ground is flat.
+fn cover(
+    drawn: &Drawn<'_>,
+    above: &Parts,
+    desc: &SoilDesc,
+    Earth { ground, pile, stones: debris }: &mut Earth,
+    seen: &InView,
+) -> Vec<Clods> {
+    let mut canopy = Canopy::none(ground);
+    for part in above.parts.iter().filter(|_| !desc.flat) {
+        canopy.add(&part.in_world());
     }
-
-    /// Inserts the parts of the ground before those of the plants.
-    fn put(&mut self, laid: &Laid) {
-        let first = self.scene.materials.len() as u32;
-        let parts = laid.parts.iter().map(|part| Part { material: first + part.material, ..part.clone() });
-        self.scene.parts.splice(0..0, parts);
-        self.scene.materials.extend(laid.materials.iter().cloned());
-        self.ground.extend(&laid.kinds);
+    let clods = soil::clods(ground, pile, &canopy, seen);
+    debris.extend(soil::litter(&desc.litter, ground, pile, &drawn.stream(Purpose::Debris, LITTER)));
+    if !desc.flat {
+        return clods;
     }
+    for thing in debris {
+        thing.lower(ground);
+    }
+    Vec::new()
 }
 
 /// Returns size factors for cells, texels and the smallest aggregates of the ground, relative to the needs of the smallest pixels.
@@ -264,8 +265,8 @@ fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> Baked
 }
 
 /// Creates scene parts of the ground, clods and debris in view. They are black if the textures were not baked.
-fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>, seen: &InView) -> Laid {
-    let mut laid = Laid::default();
+fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>, seen: &InView) -> Parts {
+    let mut laid = Parts::default();
     let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
     let mut add = |mesh: Mesh, material: Material, kind| {
         let material_of = laid.materials.len() as u32;

@@ -1,94 +1,93 @@
 //! Records of a built field: species table, model names, drawn crops and weeds.
 
-use super::builder::Builder;
+use super::drawn::Drawn;
 use super::models::{self, called};
 use super::record::{CropRecord, SpeciesRecord, WeedRecord};
+use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::ron_file::Step;
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
 use furrow_grow::scatter::{Rows, WeedsRecord};
 
-impl Builder<'_> {
-    /// Returns every species that the scene file can place (crops, weeds, plants, models), in the scene file's order, each once. The
-    /// list is the same for every index, even if a field has no plant of a species.
-    pub(super) fn species(&mut self) -> Result<Vec<SpeciesRecord>> {
-        let (page, desc) = (self.page, self.desc);
-        let crops = desc.crops.iter().map(|c| &c.species);
-        let weeds = desc.weeds.iter().map(|w| &w.species);
-        let plants = desc.plants.iter().map(|p| &p.species);
-        let mut all: Vec<SpeciesRecord> = Vec::new();
-        let mut add = |record| {
-            if !all.contains(&record) {
-                all.push(record);
-            }
-        };
-        for path in crops.chain(weeds).chain(plants) {
-            let desc = &self.library.species(page, path)?.desc;
-            add(SpeciesRecord { name: desc.name.clone(), eppo: desc.eppo.clone(), class: desc.role.class() });
+/// Returns every species that the scene file can place (crops, weeds, plants, models), in the scene file's order, each once. The
+/// list is the same for every index, even if a field has no plant of a species.
+pub(super) fn species(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<SpeciesRecord>> {
+    let (page, desc) = (drawn.page, drawn.desc);
+    let crops = desc.crops.iter().map(|c| &c.species);
+    let weeds = desc.weeds.iter().map(|w| &w.species);
+    let plants = desc.plants.iter().map(|p| &p.species);
+    let mut all: Vec<SpeciesRecord> = Vec::new();
+    let mut add = |record| {
+        if !all.contains(&record) {
+            all.push(record);
         }
-        for desc in &desc.models {
-            let model = self.library.model(page, desc)?;
-            for class in models::classes(desc, &model) {
-                add(SpeciesRecord { name: called(desc), eppo: String::new(), class });
-            }
-        }
-        self.tell_apart(&all)?;
-        Ok(all)
+    };
+    for path in crops.chain(weeds).chain(plants) {
+        let desc = &library.species(page, path)?.desc;
+        add(SpeciesRecord { name: desc.name.clone(), eppo: desc.eppo.clone(), class: desc.role.class() });
     }
+    for desc in &desc.models {
+        let model = library.model(page, desc)?;
+        for class in models::classes(desc, &model) {
+            add(SpeciesRecord { name: called(desc), eppo: String::new(), class });
+        }
+    }
+    tell_apart(drawn, &all)?;
+    Ok(all)
+}
 
-    /// Returns an error if a model has the name of a role or of a species: dataset classes could not distinguish them.
-    fn tell_apart(&self, species: &[SpeciesRecord]) -> Result<()> {
-        let grown =
-            |name: &str| species.iter().any(|s| !s.eppo.is_empty() && [&s.name, &s.eppo].contains(&&name.to_owned()));
-        let taken = |name: &str| ["soil", "crop", "weed"].contains(&name) || grown(name);
-        for (k, desc) in self.desc.models.iter().enumerate() {
-            if let Some(name) = desc.name.as_ref().filter(|name| taken(name)) {
-                let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
-                let fault = Error::input(format!("`{name}` is a role or a species, so no class can mean the model"));
-                return Err(self.page.blame(&at, fault.help("give the model a name of its own such as \"robot\"")));
-            }
+/// Returns an error if a model has the name of a role or of a species: dataset classes could not distinguish them.
+fn tell_apart(drawn: &Drawn<'_>, species: &[SpeciesRecord]) -> Result<()> {
+    let grown =
+        |name: &str| species.iter().any(|s| !s.eppo.is_empty() && [&s.name, &s.eppo].contains(&&name.to_owned()));
+    let taken = |name: &str| ["soil", "crop", "weed"].contains(&name) || grown(name);
+    for (k, desc) in drawn.desc.models.iter().enumerate() {
+        if let Some(name) = desc.name.as_ref().filter(|name| taken(name)) {
+            let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
+            let fault = Error::input(format!("`{name}` is a role or a species, so no class can mean the model"));
+            return Err(drawn.page.blame(&at, fault.help("give the model a name of its own such as \"robot\"")));
         }
-        Ok(())
     }
+    Ok(())
+}
 
-    /// Returns the names of models from disk in the scene file's order, each once. The list is the same for every index.
-    pub(super) fn model_names(&self) -> Result<Vec<String>> {
-        let mut all: Vec<String> = Vec::new();
-        for (k, desc) in self.desc.models.iter().enumerate() {
-            let Some(name) = desc.name.as_ref().filter(|name| !all.contains(name)) else { continue };
-            if let Some(fault) = fault_of_name(name, all.len()) {
-                let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
-                let help = "give a short name such as \"robot\"; models of the same class may share it";
-                return Err(self.page.blame(&at, Error::input(fault).help(help)));
-            }
-            all.push(name.clone());
+/// Returns the names of models from disk in the scene file's order, each once. The list is the same for every index.
+pub(super) fn model_names(drawn: &Drawn<'_>) -> Result<Vec<String>> {
+    let mut all: Vec<String> = Vec::new();
+    for (k, desc) in drawn.desc.models.iter().enumerate() {
+        let Some(name) = desc.name.as_ref().filter(|name| !all.contains(name)) else { continue };
+        if let Some(fault) = fault_of_name(name, all.len()) {
+            let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
+            let help = "give a short name such as \"robot\"; models of the same class may share it";
+            return Err(drawn.page.blame(&at, Error::input(fault).help(help)));
         }
-        Ok(all)
+        all.push(name.clone());
     }
+    Ok(all)
+}
 
-    /// Returns the records of the crops that this field has, with their drawn values.
-    pub(super) fn crop_records(&mut self) -> Result<Vec<CropRecord>> {
-        let mut all = Vec::new();
-        for k in self.sown.clone() {
-            let crop = &self.desc.crops[k];
-            let species = self.library.species(self.page, &crop.species)?.desc.name.clone();
-            let rows = Rows::draw(&crop.rows, &self.stream(Purpose::Scatter, k as u64)).record();
-            all.push(CropRecord { species, rows });
-        }
-        Ok(all)
+/// Returns the records of the crops that this field has, with their drawn values.
+pub(super) fn crop_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<CropRecord>> {
+    let mut all = Vec::new();
+    for k in drawn.sown.clone() {
+        let crop = &drawn.desc.crops[k];
+        let species = library.species(drawn.page, &crop.species)?.desc.name.clone();
+        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k as u64)).record();
+        all.push(CropRecord { species, rows });
     }
+    Ok(all)
+}
 
-    /// Returns the records of the weeds, with their drawn values.
-    pub(super) fn weed_records(&mut self) -> Result<Vec<WeedRecord>> {
-        let mut all = Vec::new();
-        for (k, weed) in self.desc.weeds.iter().enumerate() {
-            let species = self.library.species(self.page, &weed.species)?.desc.name.clone();
-            let spread = WeedsRecord::draw(&weed.spread, &self.stream(Purpose::Scatter, 1000 + k as u64));
-            all.push(WeedRecord { species, spread });
-        }
-        Ok(all)
+/// Returns the records of the weeds, with their drawn values.
+pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<WeedRecord>> {
+    let mut all = Vec::new();
+    for (k, weed) in drawn.desc.weeds.iter().enumerate() {
+        let species = library.species(drawn.page, &weed.species)?.desc.name.clone();
+        let spread = WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, 1000 + k as u64));
+        all.push(WeedRecord { species, spread });
     }
+    Ok(all)
 }
 
 /// Returns the fault of a new model name, if there is one; `known` is the number of other names.

@@ -1,9 +1,12 @@
 //! Places models from disk on the ground and labels them.
 
-use super::builder::{Builder, FARTHEST, Floor};
+use super::drawn::{Drawn, FARTHEST, Floor};
 use super::identity;
+use super::known;
+use super::parts::Parts;
 use super::preview::Stood;
 use crate::desc::ModelDesc;
+use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{Mat3, Spectrum, Vec3};
@@ -18,139 +21,135 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-impl Builder<'_> {
-    /// Places all models. `numbered` is the number of plants that already have a label number. Returns the plants among the models.
-    pub(super) fn models(&mut self, numbered: usize, floor: Option<Floor<'_>>) -> Result<Vec<PlantRecord>> {
-        let names = self.model_names()?;
-        let mut records: Vec<PlantRecord> = Vec::new();
-        let mut last = numbered;
-        for (k, desc) in self.desc.models.iter().enumerate() {
-            let parts = self.scene.parts.len();
-            let found = self.place(k, desc, last, floor)?;
-            let named = names.iter().position(|name| desc.name.as_ref() == Some(name));
-            let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place as u8));
-            self.things.extend(self.scene.parts[parts..].iter().map(|_| kind));
-            last = found.iter().map(|r| r.number as usize).max().unwrap_or(last);
-            records.extend(found);
-        }
-        Ok(records)
+/// Adds all models to `parts`. `numbered` is the number of plants that already have a label number. Returns the plants among the models.
+pub(super) fn models(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    parts: &mut Parts,
+    numbered: usize,
+    floor: Option<Floor<'_>>,
+) -> Result<Vec<PlantRecord>> {
+    let names = known::model_names(drawn)?;
+    let mut records: Vec<PlantRecord> = Vec::new();
+    let mut last = numbered;
+    for (k, desc) in drawn.desc.models.iter().enumerate() {
+        let named = names.iter().position(|name| desc.name.as_ref() == Some(name));
+        let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place as u8));
+        let found = place(drawn, library, parts, (k, desc, kind), last, floor)?;
+        last = found.iter().map(|r| r.number as usize).max().unwrap_or(last);
+        records.extend(found);
     }
+    Ok(records)
+}
 
-    fn place(
-        &mut self,
-        k: usize,
-        desc: &ModelDesc,
-        numbered: usize,
-        floor: Option<Floor<'_>>,
-    ) -> Result<Vec<PlantRecord>> {
-        let at = [Step::Field("models"), Step::Item(k)];
-        let model = self.library.model(self.page, desc)?;
-        if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
-            let fault = Error::input("this model's file defines no class")
-                .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
-            return Err(self.page.blame(&at, fault));
-        }
-        let mut stream = self.stream(Purpose::Scatter, 3000 + k as u64);
-        let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
-        let turn = desc.turn_deg.draw32(&mut stream).to_radians();
-        let scale = desc.scale.draw32(&mut stream);
-        let foot = Vec3::new(x, y, floor.map_or(0.0, |f| f.height(x, y)) + desc.lift_m.draw32(&mut stream));
-        let repaint = Repaint {
-            roughness: desc.roughness.map(Num::f32),
-            transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
-            nir: desc.nir.map(Num::f32),
-        };
-        let materials: Vec<u32> =
-            model.surfaces.iter().map(|s| self.material(Material::Painted(Painted::new(s, &repaint)))).collect();
-        let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        let meshes = self.meshes(k, &Stood { model: model.clone(), turn, scale, foot });
-        for (part, mesh) in model.parts.iter().zip(meshes) {
-            let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
-                let words = format!("label maps can number {MOST_PLANTS} plants, and this model exceeds that");
-                self.page.blame(&at, Error::input(words).help("place fewer"))
-            })?;
-            let (lo, hi) = mesh.bounds().unwrap_or_default();
-            let reach = lo.abs().max(hi.abs()).max_element();
-            if !reach.is_finite() || reach > FARTHEST {
-                let size = (hi - lo).max_element();
-                let words = format!("`{}` of this model is {size:.0} m large or too far from the origin", part.name);
-                let fault = Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001");
-                return Err(self.page.blame(&at, fault));
-            }
-            if tag.plant > 0 {
-                plants.entry(tag.plant).or_default().push(self.scene.parts.len());
-            }
-            let mask = model.surfaces[part.surface].mask.clone();
-            self.scene.parts.push(Part { mesh, mask, material: materials[part.surface], tag, instance: None });
-        }
-        let plants = plants.into_iter().map(|(number, parts)| {
-            // Plant number within the model, independent of the number of plants before it.
-            let own = u64::from(number) - numbered as u64;
-            let id = identity::of(self.seed, self.index, identity::MODELS + k as u64, own);
-            self.record((number, id), &parts, called(desc), foot, &model)
-        });
-        Ok(plants.collect())
+fn place(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    all: &mut Parts,
+    (k, desc, kind): (usize, &ModelDesc, PartKind),
+    numbered: usize,
+    floor: Option<Floor<'_>>,
+) -> Result<Vec<PlantRecord>> {
+    let at = [Step::Field("models"), Step::Item(k)];
+    let model = library.model(drawn.page, desc)?;
+    if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
+        let fault = Error::input("this model's file defines no class")
+            .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
+        return Err(drawn.page.blame(&at, fault));
     }
-
-    /// Returns the meshes of a model's parts in world space.
-    fn meshes(&self, k: usize, stood: &Stood) -> Vec<Arc<Mesh>> {
-        let preview = self.options.preview.as_ref();
-        if let Some(known) = preview.and_then(|preview| preview.model(k, stood)) {
-            return known;
+    let mut stream = drawn.stream(Purpose::Scatter, 3000 + k as u64);
+    let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
+    let turn = desc.turn_deg.draw32(&mut stream).to_radians();
+    let scale = desc.scale.draw32(&mut stream);
+    let foot = Vec3::new(x, y, floor.map_or(0.0, |f| f.height(x, y)) + desc.lift_m.draw32(&mut stream));
+    let repaint = Repaint {
+        roughness: desc.roughness.map(Num::f32),
+        transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
+        nir: desc.nir.map(Num::f32),
+    };
+    let materials: Vec<u32> =
+        model.surfaces.iter().map(|s| all.material(Material::Painted(Painted::new(s, &repaint)))).collect();
+    let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    let meshes = meshes(drawn, k, &Stood { model: model.clone(), turn, scale, foot });
+    for (part, mesh) in model.parts.iter().zip(meshes) {
+        let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
+            let words = format!("label maps can number {MOST_PLANTS} plants, and this model exceeds that");
+            drawn.page.blame(&at, Error::input(words).help("place fewer"))
+        })?;
+        let (lo, hi) = mesh.bounds().unwrap_or_default();
+        let reach = lo.abs().max(hi.abs()).max_element();
+        if !reach.is_finite() || reach > FARTHEST {
+            let size = (hi - lo).max_element();
+            let words = format!("`{}` of this model is {size:.0} m large or too far from the origin", part.name);
+            let fault = Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001");
+            return Err(drawn.page.blame(&at, fault));
         }
-        let Stood { model, turn, scale, foot } = stood;
-        let put = |part: &model::Part| {
-            let mut mesh = part.mesh.clone();
-            // Skip the identity transform, so that the vertices stay bit-identical.
-            if *turn != 0.0 || *scale != 1.0 || *foot != Vec3::ZERO {
-                mesh.transform(Mat3::from_rotation_z(-turn) * *scale, *foot);
-            }
-            Arc::new(mesh)
-        };
-        let meshes: Vec<Arc<Mesh>> = model.parts.iter().map(put).collect();
-        if let Some(preview) = preview {
-            preview.keep_model(k, stood, &meshes);
+        if tag.plant > 0 {
+            plants.entry(tag.plant).or_default().push(all.parts.len());
         }
-        meshes
+        let mask = model.surfaces[part.surface].mask.clone();
+        all.push(Part { mesh, mask, material: materials[part.surface], tag, instance: None }, kind);
     }
+    let plants = plants.into_iter().map(|(number, parts)| {
+        // Plant number within the model, independent of the number of plants before it.
+        let own = u64::from(number) - numbered as u64;
+        let id = identity::of(drawn.seed, drawn.index, identity::MODELS + k as u64, own);
+        let parts: Vec<&Part> = parts.iter().map(|i| &all.parts[*i]).collect();
+        record((number, id), &parts, called(desc), foot, &model)
+    });
+    Ok(plants.collect())
+}
 
-    /// Returns the record of a plant that is a model or part of one.
-    fn record(
-        &self,
-        (number, id): (u32, u32),
-        parts: &[usize],
-        name: String,
-        foot: Vec3,
-        model: &Model,
-    ) -> PlantRecord {
-        let parts: Vec<&Part> = parts.iter().map(|i| &self.scene.parts[*i]).collect();
-        let mut all = Mesh::default();
-        for part in &parts {
-            all.positions.extend_from_slice(&part.mesh.positions);
+/// Returns the meshes of a model's parts in world space.
+fn meshes(drawn: &Drawn<'_>, k: usize, stood: &Stood) -> Vec<Arc<Mesh>> {
+    let preview = drawn.options.preview.as_ref();
+    if let Some(known) = preview.and_then(|preview| preview.model(k, stood)) {
+        return known;
+    }
+    let Stood { model, turn, scale, foot } = stood;
+    let put = |part: &model::Part| {
+        let mut mesh = part.mesh.clone();
+        // Skip the identity transform, so that the vertices stay bit-identical.
+        if *turn != 0.0 || *scale != 1.0 || *foot != Vec3::ZERO {
+            mesh.transform(Mat3::from_rotation_z(-turn) * *scale, *foot);
         }
-        let (lo, hi) = all.bounds().unwrap_or((foot, foot));
-        // A single plant is at the scene file's position; one of several is at the centre of its own bounding box.
-        let position = if parts.len() == model.parts.len() { foot } else { ((lo + hi) * 0.5).with_z(lo.z) };
-        let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
-        PlantRecord {
-            number,
-            id,
-            leaf_ids: Vec::new(),
-            species: name,
-            eppo: String::new(),
-            kind: 0,
-            class: parts[0].tag.class,
-            position,
-            axis: Vec3::Z,
-            bbch: 0,
-            age_days: 0.0,
-            height: hi.z - position.z,
-            radius: across,
-            leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
-            leaf_axes: Vec::new(),
-            rig: Vec::new(),
-            condition: None,
-        }
+        Arc::new(mesh)
+    };
+    let meshes: Vec<Arc<Mesh>> = model.parts.iter().map(put).collect();
+    if let Some(preview) = preview {
+        preview.keep_model(k, stood, &meshes);
+    }
+    meshes
+}
+
+/// Returns the record of a plant that is a model or part of one.
+fn record((number, id): (u32, u32), parts: &[&Part], name: String, foot: Vec3, model: &Model) -> PlantRecord {
+    let mut all = Mesh::default();
+    for part in parts {
+        all.positions.extend_from_slice(&part.mesh.positions);
+    }
+    let (lo, hi) = all.bounds().unwrap_or((foot, foot));
+    // A single plant is at the scene file's position; one of several is at the centre of its own bounding box.
+    let position = if parts.len() == model.parts.len() { foot } else { ((lo + hi) * 0.5).with_z(lo.z) };
+    let across = all.positions.iter().map(|p| (p - position).truncate().length()).fold(0.0, f32::max);
+    PlantRecord {
+        number,
+        id,
+        leaf_ids: Vec::new(),
+        species: name,
+        eppo: String::new(),
+        kind: 0,
+        class: parts[0].tag.class,
+        position,
+        axis: Vec3::Z,
+        bbch: 0,
+        age_days: 0.0,
+        height: hi.z - position.z,
+        radius: across,
+        leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
+        leaf_axes: Vec::new(),
+        rig: Vec::new(),
+        condition: None,
     }
 }
 

@@ -1,10 +1,11 @@
 //! LiDAR of a scanned field: its pose at each frame, and the ground that it sees, which the field is built for.
 
-use super::builder::{Builder, FARTHEST, PLANT_MARGIN};
+use super::drawn::{Drawn, FARTHEST, PLANT_MARGIN};
 use super::ground_view::GroundView;
 use super::options::Scanner;
 use super::terrain::{Look, Reach, Seen};
-use super::view::{LONGEST_REACH, View, meets};
+use super::view::{LONGEST_REACH, Sight, View, meets};
+use super::{ground, view};
 use crate::desc::Detail;
 use crate::desc::FieldDesc;
 use crate::drive::{Capture, FIRST};
@@ -74,69 +75,66 @@ pub(super) fn at_frames(
     frames.map(carried).collect()
 }
 
-impl Builder<'_> {
-    /// Returns the minimum spacing of LiDAR rays on the ground, metres; `None` if the field is not scanned.
-    pub(super) fn scanned_ground(&self) -> Option<f32> {
-        let least = |lidar: &Lidar| {
-            let far = looks(lidar).filter_map(|(origin, direction)| slant(origin, direction));
-            lidar.spacing(far.fold(f32::INFINITY, f32::min).min(lidar.range[1]).max(lidar.range[0]))
-        };
-        self.scanners.iter().map(least).reduce(f32::min)
-    }
+/// Returns the minimum spacing of LiDAR rays on the ground, metres; `None` if the field is not scanned.
+pub(super) fn scanned_ground(drawn: &Drawn<'_>) -> Option<f32> {
+    let least = |lidar: &Lidar| {
+        let far = looks(lidar).filter_map(|(origin, direction)| slant(origin, direction));
+        lidar.spacing(far.fold(f32::INFINITY, f32::min).min(lidar.range[1]).max(lidar.range[0]))
+    };
+    drawn.scanners.iter().map(least).reduce(f32::min)
+}
 
-    /// Returns the minimum spacing of LiDAR rays on a plant at `at`, metres; `None` if the field is not scanned.
-    pub(super) fn scanned_at(&self, at: Vec2) -> Option<f32> {
-        let on = |lidar: &Lidar| {
-            let distance = lidar.position.distance(at.extend(0.0)) - PLANT_MARGIN;
-            lidar.spacing(distance.max(lidar.range[0]))
-        };
-        self.scanners.iter().map(on).reduce(f32::min)
-    }
+/// Returns the minimum spacing of LiDAR rays on a plant at `at`, metres; `None` if the field is not scanned.
+pub(super) fn scanned_at(drawn: &Drawn<'_>, at: Vec2) -> Option<f32> {
+    let on = |lidar: &Lidar| {
+        let distance = lidar.position.distance(at.extend(0.0)) - PLANT_MARGIN;
+        lidar.spacing(distance.max(lidar.range[0]))
+    };
+    drawn.scanners.iter().map(on).reduce(f32::min)
+}
 
-    /// Returns the ground that the LiDAR sees in all frames. Adds a warning if some of it is not planted.
-    pub(super) fn scanned(&mut self) -> Result<View> {
-        let reach = self.reach()?;
-        self.seen.clear();
-        let mut whole: Option<View> = None;
-        let mut bare = Bare::default();
-        for lidar in std::mem::take(&mut self.scanners) {
-            let view = self.view_of_lidar(&lidar, reach, &mut bare);
-            whole = Some(whole.map_or(view, |before| before.join(view)));
-            self.scanners.push(lidar);
-        }
-        let whole = whole.unwrap_or(View::NONE);
-        let most = 4.0 * LONGEST_REACH.powi(2);
-        if whole.area.area() > most {
-            let words = format!("the drive sees {:.0} m² of ground, more than {most} m²", whole.area.area());
-            let help = "use fewer frames, or lower reach_m";
-            return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
-        }
-        self.warnings.extend(bare.warning(reach));
-        Ok(whole)
+/// Returns the ground that the LiDAR sees in all frames. Adds a warning if some of it is not planted.
+pub(super) fn scanned(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<Sight> {
+    let reach = view::reach(drawn)?;
+    let mut each = Vec::new();
+    let mut whole: Option<View> = None;
+    let mut bare = Bare::default();
+    for lidar in &drawn.scanners {
+        let view = view_of_lidar(drawn, lidar, reach, &mut bare, &mut each);
+        whole = Some(whole.map_or(view, |before| before.join(view)));
     }
+    let whole = whole.unwrap_or(View::NONE);
+    let most = 4.0 * LONGEST_REACH.powi(2);
+    if whole.area.area() > most {
+        let words = format!("the drive sees {:.0} m² of ground, more than {most} m²", whole.area.area());
+        let help = "use fewer frames, or lower reach_m";
+        return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
+    }
+    warnings.extend(bare.warning(reach));
+    Ok(Sight { view: whole, each })
+}
 
-    fn view_of_lidar(&mut self, lidar: &Lidar, reach: f32, bare: &mut Bare) -> View {
-        let below = lidar.position.truncate();
-        let mut seen = vec![below];
-        for (origin, direction) in looks(lidar) {
-            let ahead = direction.truncate();
-            // The ray ends at the ground, at the maximum range, or at the reach.
-            let ground = meets(origin, direction).map_or(f32::INFINITY, |at| at.distance(below));
-            let far = ground.min(lidar.range[1] * ahead.length());
-            let along = ahead.normalize_or_zero();
-            seen.push(below + along * far.min(reach / along.abs().max_element().max(f32::MIN_POSITIVE)));
-        }
-        let (lo, hi) = seen.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        let area = Rect::new(lo.x, lo.y, hi.x, hi.y);
-        let near = self.nearest(looks(lidar), area);
-        let down = looks(lidar).filter(|(_, direction)| direction.z < 0.0);
-        let down: Vec<Look> = down.map(|(_, direction)| (lidar.position, direction)).collect();
-        let far = Reach { field_m: reach, ray_m: lidar.range[1], travel_m: 0.0 };
-        let Seen { area, near, met, .. } = Seen::of(self.envelope(), area, near, &down, &far);
-        self.seen.push(GroundView::around(seen.into_iter().chain(met)));
-        let open = bare.count(lidar, area.grown(1e-3));
-        View { area, near, open }
+fn view_of_lidar(drawn: &Drawn<'_>, lidar: &Lidar, reach: f32, bare: &mut Bare, each: &mut Vec<GroundView>) -> View {
+    let below = lidar.position.truncate();
+    let mut seen = vec![below];
+    for (origin, direction) in looks(lidar) {
+        let ahead = direction.truncate();
+        // The ray ends at the ground, at the maximum range, or at the reach.
+        let ground = meets(origin, direction).map_or(f32::INFINITY, |at| at.distance(below));
+        let far = ground.min(lidar.range[1] * ahead.length());
+        let along = ahead.normalize_or_zero();
+        seen.push(below + along * far.min(reach / along.abs().max_element().max(f32::MIN_POSITIVE)));
     }
+    let (lo, hi) = seen.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+    let area = Rect::new(lo.x, lo.y, hi.x, hi.y);
+    let near = view::nearest(drawn, looks(lidar), area);
+    let down = looks(lidar).filter(|(_, direction)| direction.z < 0.0);
+    let down: Vec<Look> = down.map(|(_, direction)| (lidar.position, direction)).collect();
+    let far = Reach { field_m: reach, ray_m: lidar.range[1], travel_m: 0.0 };
+    let Seen { area, near, met, .. } = Seen::of(ground::envelope(drawn), area, near, &down, &far);
+    each.push(GroundView::around(seen.into_iter().chain(met)));
+    let open = bare.count(lidar, area.grown(1e-3));
+    View { area, near, open }
 }
 
 /// Returns origin and direction of the pulses of all beams, for columns that are evenly spaced over the turn.

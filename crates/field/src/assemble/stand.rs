@@ -1,17 +1,21 @@
 //! Grows plants and places them in the field, each with its own meshes or as an instance of a bank plant.
 
+use super::bank;
 use super::bank::Variation;
-use super::builder::{Builder, Floor};
+use super::drawn::{Drawn, Floor};
 use super::grown::Grown;
 use super::member::Member;
+use super::parts::Parts;
 use super::preview::Standing;
 use super::progress::Stage;
 use super::seedling::{Place, Seedling, grow};
-use crate::PlantRecord;
+use crate::library::Library;
+use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::Placement;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{Spectrum, Vec2, Vec3};
 use furrow_base::{Error, Result};
 use furrow_grow::soil::Rect;
+use furrow_optics::optics::soil::LOESS;
 use furrow_render::material::Material;
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Instance, Part};
@@ -40,109 +44,116 @@ impl Stands {
     }
 }
 
-impl Builder<'_> {
-    /// Grows every plant and places it on the ground. Returns the records of the plants that reach the view.
-    pub(super) fn plant(
-        &mut self,
-        seedlings: &[Seedling],
-        floor: Option<Floor<'_>>,
-        view: Option<Rect>,
-    ) -> Result<Vec<PlantRecord>> {
-        let (dust, options) = (self.dust()?, self.options);
-        let bank = self.bank(seedlings, dust)?;
-        options.progress.enter(Stage::Plants);
-        options.progress.plants.expect(seedlings.len());
-        let cell = |at: Vec2| self.cell(at);
-        // A plant is grown to know its size; its organs are dropped if neither it nor its shadow reaches the view.
-        let reaches = |plant: &PlantRecord| {
-            let reach = plant.radius + SHADOW * plant.height;
-            view.is_none_or(|v| v.grown(reach).contains(plant.position.truncate()))
-        };
-        let stand = |seedling: &Seedling| {
-            options.wanted()?;
-            let Vec2 { x, y } = seedling.position;
-            let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
-            if let Some(member) = seedling.member {
-                let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
-                return Ok(Stands::Shared(Box::new(record), member, own));
-            }
-            let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
-            let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
-            let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
-            Ok(Stands::Own(known.unwrap_or_else(|| {
-                let (record, organs) = grow(seedling, &place, reaches);
-                Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
-            })))
-        };
-        let grown = seedlings.par_iter().map(stand).inspect(|_| options.progress.plants.add());
-        let grown: Vec<Stands> = grown.collect::<Result<_>>()?;
-        if let Some(preview) = &options.preview {
-            preview.keep_plants(&grown.iter().filter_map(Stands::own).collect::<Vec<_>>());
+/// Grows every plant, places it on the ground, and adds it to `parts`. Returns the records of the plants that reach the view.
+pub(super) fn plant(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    parts: &mut Parts,
+    seedlings: &[Seedling],
+    floor: Option<Floor<'_>>,
+    view: Option<Rect>,
+) -> Result<Vec<PlantRecord>> {
+    let (dust, options) = (dust(drawn, library)?, drawn.options);
+    let bank = bank::bank(drawn, seedlings, dust)?;
+    options.progress.enter(Stage::Plants);
+    options.progress.plants.expect(seedlings.len());
+    let cell = |at: Vec2| drawn.cell(at);
+    // A plant is grown to know its size; its organs are dropped if neither it nor its shadow reaches the view.
+    let reaches = |plant: &PlantRecord| {
+        let reach = plant.radius + SHADOW * plant.height;
+        view.is_none_or(|v| v.grown(reach).contains(plant.position.truncate()))
+    };
+    let stand = |seedling: &Seedling| {
+        options.wanted()?;
+        let Vec2 { x, y } = seedling.position;
+        let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
+        if let Some(member) = seedling.member {
+            let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
+            return Ok(Stands::Shared(Box::new(record), member, own));
         }
-        let mut records = Vec::with_capacity(grown.len());
-        let mut worn: BTreeMap<Member, Vec<u32>> = BTreeMap::new();
-        for (number, stands) in (1..).zip(grown) {
-            match stands {
-                Stands::Own(plant) => {
-                    let (true, Some(organs)) = (reaches(&plant.record), &plant.organs) else { continue };
-                    let record = PlantRecord { number, ..plant.record.clone() };
-                    let materials = self.dress(&record, organs)?;
-                    self.put_organs(number, organs, &materials, None);
-                    records.push(record);
-                }
-                Stands::Shared(record, member, own) => {
-                    let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
-                    let record = PlantRecord { number, ..*record };
-                    if let Entry::Vacant(first) = worn.entry(member) {
-                        first.insert(self.dress(&record, organs)?);
-                    }
-                    self.put_organs(number, organs, &worn[&member], Some(own));
-                    records.push(record);
-                }
-            }
-        }
-        Ok(records)
+        let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
+        let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
+        let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
+        Ok(Stands::Own(known.unwrap_or_else(|| {
+            let (record, organs) = grow(seedling, &place, reaches);
+            Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
+        })))
+    };
+    let grown = seedlings.par_iter().map(stand).inspect(|_| options.progress.plants.add());
+    let grown: Vec<Stands> = grown.collect::<Result<_>>()?;
+    if let Some(preview) = &options.preview {
+        preview.keep_plants(&grown.iter().filter_map(Stands::own).collect::<Vec<_>>());
     }
-
-    /// Creates the materials of a plant's organs. Returns the material index of each organ.
-    fn dress(&mut self, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
-        // One material per plant and name, because plants differ in chlorophyll. Organs with damage have their own material.
-        let mut made: Vec<(&str, usize, u32)> = Vec::new();
-        let mut materials = Vec::with_capacity(organs.len());
-        for organ in organs {
-            if let Some(fault) = organ.part.mesh.fault() {
-                let (species, number) = (&record.species, record.number);
-                return Err(Error::input(format!(
-                    "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
-                    self.page.path.display()
-                ))
-                .help("check its species file for extreme sizes"));
+    let mut records = Vec::with_capacity(grown.len());
+    let mut worn: BTreeMap<Member, Vec<u32>> = BTreeMap::new();
+    for (number, stands) in (1..).zip(grown) {
+        match stands {
+            Stands::Own(plant) => {
+                let (true, Some(organs)) = (reaches(&plant.record), &plant.organs) else { continue };
+                let record = PlantRecord { number, ..plant.record.clone() };
+                let materials = dress(drawn, parts, &record, organs)?;
+                put_organs(parts, number, organs, &materials, None);
+                records.push(record);
             }
-            let same = |m: &&(&str, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
-            let known = made.iter().find(same).map(|m| m.2);
-            materials.push(known.unwrap_or_else(|| {
-                let material = self.material(Material::Leaf(organ.material.clone()));
-                if !organ.own {
-                    made.push((&organ.key, organ.choice, material));
+            Stands::Shared(record, member, own) => {
+                let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
+                let record = PlantRecord { number, ..*record };
+                if let Entry::Vacant(first) = worn.entry(member) {
+                    first.insert(dress(drawn, parts, &record, organs)?);
                 }
-                material
-            }));
+                put_organs(parts, number, organs, &worn[&member], Some(own));
+                records.push(record);
+            }
         }
-        Ok(materials)
     }
+    Ok(records)
+}
 
-    /// Adds a plant's organs to the scene: meshes in world space, or those of a bank plant with the transform of an instance.
-    fn put_organs(&mut self, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
-        let instance = instance.map(|Variation { at, greener }| (Arc::new(at), greener));
-        for (organ, material) in organs.iter().zip(materials) {
-            self.organs.push(organ.kind);
-            let tag = Tag { plant: number, ..organ.part.tag };
-            let own = |(placement, greener): &(Arc<Placement>, f32)| {
-                let tint = organ.tint(*greener);
-                Instance { placement: placement.clone(), tint }
-            };
-            let instance = instance.as_ref().map(own);
-            self.scene.parts.push(Part { material: *material, tag, instance, ..organ.part.clone() });
+/// Creates the materials of a plant's organs. Returns the material index of each organ.
+fn dress(drawn: &Drawn<'_>, parts: &mut Parts, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
+    // One material per plant and name, because plants differ in chlorophyll. Organs with damage have their own material.
+    let mut made: Vec<(&str, usize, u32)> = Vec::new();
+    let mut materials = Vec::with_capacity(organs.len());
+    for organ in organs {
+        if let Some(fault) = organ.part.mesh.fault() {
+            let (species, number) = (&record.species, record.number);
+            return Err(Error::input(format!(
+                "{}: plant {number}, a {species}, grew a broken mesh: {fault}",
+                drawn.page.path.display()
+            ))
+            .help("check its species file for extreme sizes"));
         }
+        let same = |m: &&(&str, usize, u32)| !organ.own && m.0 == organ.key && m.1 == organ.choice;
+        let known = made.iter().find(same).map(|m| m.2);
+        materials.push(known.unwrap_or_else(|| {
+            let material = parts.material(Material::Leaf(organ.material.clone()));
+            if !organ.own {
+                made.push((&organ.key, organ.choice, material));
+            }
+            material
+        }));
+    }
+    Ok(materials)
+}
+
+/// Adds a plant's organs to the scene: meshes in world space, or those of a bank plant with the transform of an instance.
+fn put_organs(parts: &mut Parts, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
+    let instance = instance.map(|Variation { at, greener }| (Arc::new(at), greener));
+    for (organ, material) in organs.iter().zip(materials) {
+        let tag = Tag { plant: number, ..organ.part.tag };
+        let own = |(placement, greener): &(Arc<Placement>, f32)| {
+            let tint = organ.tint(*greener);
+            Instance { placement: placement.clone(), tint }
+        };
+        let instance = instance.as_ref().map(own);
+        parts.push(Part { material: *material, tag, instance, ..organ.part.clone() }, PartKind::Organ(organ.kind));
+    }
+}
+
+/// Returns the reflectance of the dry soil that covers leaves as dust.
+fn dust(drawn: &Drawn<'_>, library: &mut Library) -> Result<Spectrum> {
+    match drawn.desc.soil.as_ref().and_then(|soil| soil.layers.first()) {
+        Some(layer) => Ok(library.layer(drawn.page, layer)?.mean()),
+        None => Ok(LOESS),
     }
 }

@@ -1,8 +1,9 @@
 //! Warnings about settings that are valid but probably not intended. The field is built all the same.
 
-use super::builder::{Builder, Floor};
+use super::drawn::{Drawn, Floor};
 use crate::PlantRecord;
 use crate::desc::{Detail, Growth, SpeciesDesc};
+use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::math::Vec3;
 use furrow_base::ron_file::{Step, place};
@@ -18,100 +19,94 @@ const WIDE_IN_ROW_M: f32 = 1.5;
 /// Camera height above which a warning is given, metres: robots carry cameras at 0.5 to 2 m, masts at 3 m.
 const HIGH_M: f32 = 5.0;
 
-impl Builder<'_> {
-    /// Adds warnings about the camera and the sensor.
-    pub(super) fn warn_of_camera(&mut self) {
-        let height = match self.scanners.first() {
-            None => self.scene.camera.pose().height(),
-            // A scan does not use the camera.
-            Some(_) => 0.0,
-        };
-        // Any other detail is a deliberate choice for a high camera.
-        if height > HIGH_M && self.desc.detail == Detail::Full {
-            self.warnings
-                .push(format!("the camera is {height:.1} m above the ground; heights are in metres, 0.85 for 85 cm"));
-        }
-        let first = |field| {
-            let at = place(&self.page.text, &[Step::Field(field)]);
-            let value = &self.page.text[at];
-            value[..value.find(|c: char| !c.is_alphanumeric()).unwrap_or(value.len())].to_owned()
-        };
-        let (camera, sensor) = (first("camera"), first("sensor"));
-        let known = |name: &str| furrow_optics::sensor::PRESETS.contains(&name);
-        if known(&camera) && known(&sensor) && camera != sensor {
-            self.warnings.push(format!(
-                "the camera is {camera}, but the sensor is that of {sensor}; its own sensor is `sensor: {camera}`"
-            ));
-        }
+/// Returns warnings about the camera and the sensor.
+pub(super) fn camera(drawn: &Drawn<'_>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let height = match drawn.scanners.first() {
+        None => drawn.camera.pose().height(),
+        // A scan does not use the camera.
+        Some(_) => 0.0,
+    };
+    // Any other detail is a deliberate choice for a high camera.
+    if height > HIGH_M && drawn.desc.detail == Detail::Full {
+        warnings.push(format!("the camera is {height:.1} m above the ground; heights are in metres, 0.85 for 85 cm"));
     }
-
-    /// Adds warnings about row spacing and growth stages of the field's crops, and about growth stages of its weeds and single plants.
-    pub(super) fn warn_of_plants(&mut self) -> Result<()> {
-        let (page, desc) = (self.page, self.desc);
-        for k in self.sown.clone() {
-            let crop = &desc.crops[k];
-            let rows = Rows::draw(&crop.rows, &self.stream(Purpose::Scatter, k as u64));
-            let (species, spacing, in_row) = (&crop.species, rows.spacing_m, rows.in_row_m);
-            if spacing > WIDE_ROWS_M {
-                let words =
-                    format!("rows of {species} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm");
-                self.warnings.push(words);
-            }
-            if in_row > WIDE_IN_ROW_M {
-                let words =
-                    format!("{species} stands {in_row} m apart in its rows; in_row_m is in metres, 0.16 for 16 cm");
-                self.warnings.push(words);
-            }
-        }
-        let crops = self.sown.clone().map(|k| (&desc.crops[k].species, &desc.crops[k].growth));
-        let weeds = desc.weeds.iter().map(|weed| (&weed.species, &weed.growth));
-        let plants = desc.plants.iter().map(|plant| (&plant.species, &plant.growth));
-        for (path, growth) in crops.chain(weeds).chain(plants) {
-            let species = self.library.species(page, path)?;
-            if let Some(words) = beyond(&species.desc, growth, self.season.place()) {
-                let words = format!("{path}: {words}");
-                // Several entries may have the same species.
-                if !self.warnings.contains(&words) {
-                    self.warnings.push(words);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Adds a warning if a camera or the LiDAR is inside the ground, which may be higher than z = 0; it then sees only the ground's inside.
-    pub(super) fn warn_of_burial(&mut self, floor: Floor<'_>) {
-        let depth = |at: Vec3| floor.height(at.x, at.y) - at.z;
-        let (what, places): (_, Vec<Vec3>) = if self.scanners.is_empty() {
-            ("camera", self.captures.iter().map(|capture| capture.camera.pose().position).collect())
-        } else {
-            ("LiDAR", self.scanners.iter().map(|lidar| lidar.position).collect())
-        };
-        let deepest = places.iter().copied().max_by(|a, b| depth(*a).total_cmp(&depth(*b)));
-        if let Some(at) = deepest.filter(|at| depth(*at) > 0.0) {
-            let Vec3 { x, y, z } = at;
-            let words = format!(
-                "the {what} at ({x:.3}, {y:.3}, {z:.3}) is {:.0} mm below the ground, which is {:.0} mm high there: raise it, or lower the soil's relief",
-                (1e3 * depth(at)).ceil(),
-                1e3 * (depth(at) + z)
-            );
-            self.warnings.push(words);
-        }
-    }
-
-    /// Adds a warning if no crop is in view.
-    pub(super) fn warn_of_view(&mut self, plants: &[PlantRecord], shown: Option<Rect>) {
-        // On some days nothing has emerged yet.
-        let (Some(view), false) = (shown, self.sown.is_empty() || self.today.is_some()) else { return };
-        let near = |plant: &&PlantRecord| view.grown(plant.radius).contains(plant.position.truncate());
-        if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
-            return;
-        }
-        let whose = if self.scanners.is_empty() { "the camera's view" } else { "the LiDAR's view" };
-        self.warnings.push(format!(
-            "no crop is in {whose}; rows.offset_m moves the rows, spacing_m and in_row_m bring plants closer"
+    let first = |field| {
+        let at = place(&drawn.page.text, &[Step::Field(field)]);
+        let value = &drawn.page.text[at];
+        value[..value.find(|c: char| !c.is_alphanumeric()).unwrap_or(value.len())].to_owned()
+    };
+    let (camera, sensor) = (first("camera"), first("sensor"));
+    let known = |name: &str| furrow_optics::sensor::PRESETS.contains(&name);
+    if known(&camera) && known(&sensor) && camera != sensor {
+        warnings.push(format!(
+            "the camera is {camera}, but the sensor is that of {sensor}; its own sensor is `sensor: {camera}`"
         ));
     }
+    warnings
+}
+
+/// Returns warnings about row spacing and growth stages of the field's crops, and about growth stages of its weeds and single plants.
+pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<String>> {
+    let mut warnings = Vec::new();
+    let (page, desc) = (drawn.page, drawn.desc);
+    for k in drawn.sown.clone() {
+        let crop = &desc.crops[k];
+        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k as u64));
+        let (species, spacing, in_row) = (&crop.species, rows.spacing_m, rows.in_row_m);
+        if spacing > WIDE_ROWS_M {
+            let words = format!("rows of {species} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm");
+            warnings.push(words);
+        }
+        if in_row > WIDE_IN_ROW_M {
+            let words = format!("{species} stands {in_row} m apart in its rows; in_row_m is in metres, 0.16 for 16 cm");
+            warnings.push(words);
+        }
+    }
+    let crops = drawn.sown.clone().map(|k| (&desc.crops[k].species, &desc.crops[k].growth));
+    let weeds = desc.weeds.iter().map(|weed| (&weed.species, &weed.growth));
+    let plants = desc.plants.iter().map(|plant| (&plant.species, &plant.growth));
+    for (path, growth) in crops.chain(weeds).chain(plants) {
+        let species = library.species(page, path)?;
+        if let Some(words) = beyond(&species.desc, growth, drawn.season.place()) {
+            let words = format!("{path}: {words}");
+            // Several entries may have the same species.
+            if !warnings.contains(&words) {
+                warnings.push(words);
+            }
+        }
+    }
+    Ok(warnings)
+}
+
+/// Returns a warning if a camera or the LiDAR is inside the ground, which may be higher than z = 0; it then sees only the ground's inside.
+pub(super) fn burial(drawn: &Drawn<'_>, floor: Floor<'_>) -> Option<String> {
+    let depth = |at: Vec3| floor.height(at.x, at.y) - at.z;
+    let (what, places): (_, Vec<Vec3>) = if drawn.scanners.is_empty() {
+        ("camera", drawn.captures.iter().map(|capture| capture.camera.pose().position).collect())
+    } else {
+        ("LiDAR", drawn.scanners.iter().map(|lidar| lidar.position).collect())
+    };
+    let deepest = places.iter().copied().max_by(|a, b| depth(*a).total_cmp(&depth(*b)));
+    let at = deepest.filter(|at| depth(*at) > 0.0)?;
+    let Vec3 { x, y, z } = at;
+    Some(format!(
+        "the {what} at ({x:.3}, {y:.3}, {z:.3}) is {:.0} mm below the ground, which is {:.0} mm high there: raise it, or lower the soil's relief",
+        (1e3 * depth(at)).ceil(),
+        1e3 * (depth(at) + z)
+    ))
+}
+
+/// Returns a warning if no crop is in view.
+pub(super) fn view(drawn: &Drawn<'_>, plants: &[PlantRecord], shown: Option<Rect>) -> Option<String> {
+    // On some days nothing has emerged yet.
+    let (Some(view), false) = (shown, drawn.sown.is_empty() || drawn.today.is_some()) else { return None };
+    let near = |plant: &&PlantRecord| view.grown(plant.radius).contains(plant.position.truncate());
+    if plants.iter().filter(near).any(|plant| plant.class == Class::Crop) {
+        return None;
+    }
+    let whose = if drawn.scanners.is_empty() { "the camera's view" } else { "the LiDAR's view" };
+    Some(format!("no crop is in {whose}; rows.offset_m moves the rows, spacing_m and in_row_m bring plants closer"))
 }
 
 /// Returns a warning if a growth is outside the stages of the species file: its plants then stay at the first or last stage.

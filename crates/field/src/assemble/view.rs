@@ -4,9 +4,10 @@
 //! camera that sees the horizon, or ground farther away, gets bare ground there, with pixels labelled soil. The field then has a
 //! warning with the bare share of the ground in view. If that share is more than half, the scene is refused.
 
-use super::builder::{Builder, FARTHEST};
+use super::drawn::{Drawn, FARTHEST};
 use super::ground_view::{GroundView, Onlooker};
 use super::terrain::{Look, Near, Reach, Seen};
+use super::{ground, scanner};
 use crate::desc::Detail;
 use crate::drive::{Capture, FIRST};
 use furrow_base::math::{Vec2, Vec3, vec2};
@@ -29,6 +30,14 @@ const NEAR: f32 = 4.5;
 /// With `detail: ByPixel`, the width of the planted margin around the view, metres: the shadow length of a plant of 0.5 m, plus
 /// [`PLANT_MARGIN`](super::builder::PLANT_MARGIN).
 const SIDEWAYS: f32 = 1.75;
+
+/// Ground that the images or scans of a field see.
+pub(super) struct Sight {
+    /// All of it.
+    pub(super) view: View,
+    /// Its outline in each image or scan; empty for a scene of single plants and models.
+    pub(super) each: Vec<GroundView>,
+}
 
 /// The extent of ground that cameras see.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,173 +83,180 @@ pub(super) fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
     (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
 }
 
-impl Builder<'_> {
-    /// Returns the ground that all images see together. Adds a warning if some of it is not planted.
-    pub(super) fn view(&mut self) -> Result<View> {
-        if !self.scanners.is_empty() {
-            return self.scanned();
-        }
-        let captures: Vec<Capture> = self.captures.clone();
-        let mut whole: Option<View> = None;
-        self.seen.clear();
-        for capture in &captures {
-            let view = self.view_of(capture, whole.is_some_and(|before| before.open))?;
-            whole = Some(whole.map_or(view, |before| before.join(view)));
-        }
-        let whole = whole.unwrap_or(View::NONE);
-        let area = whole.area.area();
-        // Area of the square that a camera sees if it sees up to the reach on all sides.
-        let most = 4.0 * self.reach()?.powi(2);
-        // The area of a single camera is already bounded by the reach and by the distance travelled during the exposure.
-        if captures.len() > 1 && area > most {
-            let words = format!("the drive sees {area:.0} m² of ground, more than the {most} m² of one field");
-            let help = "use fewer frames, drive along a row to the north or east, drive through several fields, or raise reach_m";
-            return Err(self.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
-        }
-        Ok(whole)
+/// Returns the ground that all images or scans see together, and adds a warning if some of it is not planted. Returns [`View::NONE`] for
+/// a scene of single plants and models.
+pub(super) fn sight(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<Sight> {
+    if !drawn.has_ground() {
+        return Ok(Sight { view: View::NONE, each: Vec::new() });
     }
-
-    /// Returns the distinct camera poses of a drive; the ground is then built only near their views. Returns an empty list if all of the
-    /// ground is to be built: for single images, for scans, and if a camera sees ground beyond the planted area.
-    pub(super) fn onlookers(&self, view: View) -> Vec<Onlooker> {
-        let drives = self.captures.last().is_some_and(|last| last.frame > 0);
-        if !drives || view.open || !self.scanners.is_empty() {
-            return Vec::new();
-        }
-        let mut captures: Vec<&Capture> = self.captures.iter().collect();
-        captures.sort_by(|a, b| a.name.cmp(&b.name));
-        let all: Option<Vec<Onlooker>> = captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
-        let mut all = all.unwrap_or_default();
-        all.dedup_by(|next, kept| next.like(kept));
-        all
+    if !drawn.scanners.is_empty() {
+        return scanner::scanned(drawn, warnings);
     }
-
-    /// Returns the name of a capture for error messages: its camera and, on a drive, its frame.
-    fn which(&self, capture: &Capture) -> String {
-        let Capture { name, frame, .. } = capture;
-        let camera = if name == FIRST { "the camera".into() } else { format!("camera `{name}`") };
-        if self.desc.drive.is_some() { format!("{camera} in frame {frame}") } else { camera }
+    let mut whole: Option<View> = None;
+    let mut each = Vec::new();
+    for capture in &drawn.captures {
+        let view = view_of(drawn, capture, whole.is_some_and(|before| before.open), &mut each, warnings)?;
+        whole = Some(whole.map_or(view, |before| before.join(view)));
     }
-
-    /// Points an error about a capture into the scene file: at `drive` if the vehicle has moved, otherwise at the camera.
-    fn blame_capture(&self, capture: &Capture, error: Error) -> Error {
-        let place = self.desc.cameras.iter().position(|mounted| mounted.name == capture.name);
-        match place {
-            _ if capture.frame > 0 => self.page.blame(&[Step::Field("drive")], error),
-            Some(k) => self.page.blame(&[Step::Field("cameras"), Step::Item(k)], error),
-            None => self.page.blame(&[Step::Field("camera")], error),
-        }
+    let whole = whole.unwrap_or(View::NONE);
+    let area = whole.area.area();
+    // Area of the square that a camera sees if it sees up to the reach on all sides.
+    let most = 4.0 * reach(drawn)?.powi(2);
+    // The area of a single camera is already bounded by the reach and by the distance travelled during the exposure.
+    if drawn.captures.len() > 1 && area > most {
+        let words = format!("the drive sees {area:.0} m² of ground, more than the {most} m² of one field");
+        let help =
+            "use fewer frames, drive along a row to the north or east, drive through several fields, or raise reach_m";
+        return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
     }
+    Ok(Sight { view: whole, each })
+}
 
-    /// Returns `reach_m`, the planted distance from the point below a camera, metres.
-    pub(super) fn reach(&self) -> Result<f32> {
-        let reach = self.desc.reach_m.f32();
-        if reach > LONGEST_REACH {
-            let error = Error::input(format!("reach_m is {reach}, more than {LONGEST_REACH}")).help("lower it");
-            return Err(self.page.blame(&[Step::Field("reach_m")], error));
-        }
-        Ok(reach)
+/// Returns the distinct camera poses of a drive; the ground is then built only near their views. Returns an empty list if all of the
+/// ground is to be built: for single images, for scans, and if a camera sees ground beyond the planted area.
+pub(super) fn onlookers(drawn: &Drawn<'_>, view: View) -> Vec<Onlooker> {
+    let drives = drawn.captures.last().is_some_and(|last| last.frame > 0);
+    if !drives || view.open || !drawn.scanners.is_empty() {
+        return Vec::new();
     }
+    let mut captures: Vec<&Capture> = drawn.captures.iter().collect();
+    captures.sort_by(|a, b| a.name.cmp(&b.name));
+    let all: Option<Vec<Onlooker>> = captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
+    let mut all = all.unwrap_or_default();
+    all.dedup_by(|next, kept| next.like(kept));
+    all
+}
 
-    /// Returns the ground that one camera sees. Adds a warning if some of it is not planted, unless `told` is `true`:
-    /// an earlier capture has added it.
-    fn view_of(&mut self, capture: &Capture, told: bool) -> Result<View> {
-        let (camera, reach) = (&capture.camera, self.reach()?);
-        let (w, h) = (camera.width() as f32, camera.height() as f32);
-        let below = camera.pose().position.truncate();
-        if camera.pose().position.abs().max_element() > FARTHEST {
-            let words = format!("{} is more than {FARTHEST} m from the field's origin", self.which(capture));
-            let error = Error::input(words)
-                .help("move it near the origin: the field is unbounded and alike everywhere; heights are in metres");
-            return Err(self.blame_capture(capture, error));
-        }
-        let mut seen: Vec<Vec2> = Vec::new();
-        let mut level: Vec<Vec2> = Vec::new();
-        let mut looks: Vec<Look> = Vec::new();
-        // Corners and midpoints of the sides: barrel distortion makes the sides bulge.
-        for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
-            let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
-            if direction.z < -HORIZON && origin.z > 0.0 {
-                seen.extend(meets(origin, direction));
-                looks.push((origin, direction));
-            } else {
-                level.push(below + direction.truncate().normalize_or_zero() * reach);
-            }
-        }
-        if seen.is_empty() {
-            return Err(self.blame_capture(capture, blind(&self.which(capture), camera)));
-        }
-        // If part of the image shows the horizon, the area ends at the reach.
-        let hull = seen.iter().chain(&level).copied();
-        let all = [hull.clone().fold(Vec2::INFINITY, Vec2::min), hull.fold(Vec2::NEG_INFINITY, Vec2::max)];
-        let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
-        // Rays are those of the middle of each row's exposure, so widen the area by the distance travelled.
-        let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
-        let near = self.nearest(raster(camera), area);
-        let far = Reach { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
-        let Seen { area, near, met, beyond: farther, terrain } = Seen::of(self.envelope(), area, near, &looks, &far);
-        // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
-        let points = seen.iter().chain(&level).chain(&met).copied();
-        self.seen.push(GroundView::around(points.chain([below])));
-        if level.is_empty() && [lo, hi] == all && !farther {
-            return Ok(View { area, near, open: false });
-        }
-        let (bare, farthest) = beyond(raster(camera).filter_map(|look| terrain.meets(look, 0.0)), area, below);
-        if bare <= 0.0 {
-            return Ok(View { area, near, open: false });
-        }
-        let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
-        let words = format!(
-            "{} sees ground {far}, but plants grow only up to {reach} m east, north, west and south of the point below it: \
-             {:.0} % of the ground in the image stays bare and is labelled soil",
-            self.which(capture),
-            (100.0 * bare).ceil()
-        );
-        let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
-        if self.desc.detail == Detail::Full && !told {
-            self.warnings.push(format!(
-                "{} sees ground {far}, and detail is Full: all of it is built as fine as the nearest; detail: ByPixel builds each place \
-                 only as fine as its pixels, in a fraction of the time and memory",
-                self.which(capture)
-            ));
-        }
-        if bare > TOO_BARE {
-            return Err(self.blame_capture(capture, Error::input(words).help(help)));
-        }
-        if !told {
-            self.warnings.push(format!("{words}; {help}"));
-        }
-        Ok(View { area, near, open: true })
+/// Returns the name of a capture for error messages: its camera and, on a drive, its frame.
+fn which(drawn: &Drawn<'_>, capture: &Capture) -> String {
+    let Capture { name, frame, .. } = capture;
+    let camera = if name == FIRST { "the camera".into() } else { format!("camera `{name}`") };
+    if drawn.desc.drive.is_some() { format!("{camera} in frame {frame}") } else { camera }
+}
+
+/// Points an error about a capture into the scene file: at `drive` if the vehicle has moved, otherwise at the camera.
+fn blame_capture(drawn: &Drawn<'_>, capture: &Capture, error: Error) -> Error {
+    let place = drawn.desc.cameras.iter().position(|mounted| mounted.name == capture.name);
+    match place {
+        _ if capture.frame > 0 => drawn.page.blame(&[Step::Field("drive")], error),
+        Some(k) => drawn.page.blame(&[Step::Field("cameras"), Step::Item(k)], error),
+        None => drawn.page.blame(&[Step::Field("camera")], error),
     }
 }
 
-impl Builder<'_> {
-    /// Returns the part of the ground in view that gets uniform cells; `None` if all of it does.
-    pub(super) fn nearest(&self, rays: impl Iterator<Item = Look>, area: Rect) -> Option<Near> {
-        if self.desc.detail == Detail::Full {
-            return None;
-        }
-        let seen: Vec<(Vec2, f32, Look)> = rays
-            .filter_map(|look @ (origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z, look)))
-            .filter(|(at, ..)| area.contains(*at))
-            .collect();
-        let ray_m = NEAR * seen.iter().map(|(_, distance, _)| *distance).fold(f32::INFINITY, f32::min);
-        let (near, far): (Vec<_>, Vec<_>) = seen.into_iter().partition(|(_, distance, _)| *distance <= ray_m);
-        if far.is_empty() {
-            return None;
-        }
-        let (lo, hi) = near.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), (p, ..)| (l.min(*p), h.max(*p)));
-        let looks = near.into_iter().map(|(_, _, look)| look).collect();
-        Some(Near { area: Rect::new(lo.x, lo.y, hi.x, hi.y), looks, ray_m })
+/// Returns `reach_m`, the planted distance from the point below a camera, metres.
+pub(super) fn reach(drawn: &Drawn<'_>) -> Result<f32> {
+    let reach = drawn.desc.reach_m.f32();
+    if reach > LONGEST_REACH {
+        let error = Error::input(format!("reach_m is {reach}, more than {LONGEST_REACH}")).help("lower it");
+        return Err(drawn.page.blame(&[Step::Field("reach_m")], error));
     }
+    Ok(reach)
+}
 
-    /// Returns `true` if a plant at `at` may be visible or cast a shadow into the view. Always `true` with `detail: Full`, where only
-    /// the rectangle around the view limits the plants.
-    pub(super) fn may_be_seen(&self, at: Vec2) -> bool {
-        self.desc.detail == Detail::Full
-            || self.seen.is_empty()
-            || self.seen.iter().any(|view| view.distance(at) <= SIDEWAYS)
+/// Returns the ground that one camera sees, and adds its outline to `each`. Adds a warning if some of it is not planted, unless `told` is `true`:
+/// an earlier capture has added it.
+fn view_of(
+    drawn: &Drawn<'_>,
+    capture: &Capture,
+    told: bool,
+    each: &mut Vec<GroundView>,
+    warnings: &mut Vec<String>,
+) -> Result<View> {
+    let (camera, reach) = (&capture.camera, reach(drawn)?);
+    let (w, h) = (camera.width() as f32, camera.height() as f32);
+    let below = camera.pose().position.truncate();
+    if camera.pose().position.abs().max_element() > FARTHEST {
+        let words = format!("{} is more than {FARTHEST} m from the field's origin", which(drawn, capture));
+        let error = Error::input(words)
+            .help("move it near the origin: the field is unbounded and alike everywhere; heights are in metres");
+        return Err(blame_capture(drawn, capture, error));
     }
+    let mut seen: Vec<Vec2> = Vec::new();
+    let mut level: Vec<Vec2> = Vec::new();
+    let mut looks: Vec<Look> = Vec::new();
+    // Corners and midpoints of the sides: barrel distortion makes the sides bulge.
+    for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
+        let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
+        if direction.z < -HORIZON && origin.z > 0.0 {
+            seen.extend(meets(origin, direction));
+            looks.push((origin, direction));
+        } else {
+            level.push(below + direction.truncate().normalize_or_zero() * reach);
+        }
+    }
+    if seen.is_empty() {
+        return Err(blame_capture(drawn, capture, blind(&which(drawn, capture), camera)));
+    }
+    // If part of the image shows the horizon, the area ends at the reach.
+    let hull = seen.iter().chain(&level).copied();
+    let all = [hull.clone().fold(Vec2::INFINITY, Vec2::min), hull.fold(Vec2::NEG_INFINITY, Vec2::max)];
+    let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
+    // Rays are those of the middle of each row's exposure, so widen the area by the distance travelled.
+    let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
+    let near = nearest(drawn, raster(camera), area);
+    let far = Reach { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
+    let Seen { area, near, met, beyond: farther, terrain } =
+        Seen::of(ground::envelope(drawn), area, near, &looks, &far);
+    // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
+    let points = seen.iter().chain(&level).chain(&met).copied();
+    each.push(GroundView::around(points.chain([below])));
+    if level.is_empty() && [lo, hi] == all && !farther {
+        return Ok(View { area, near, open: false });
+    }
+    let (bare, farthest) = beyond(raster(camera).filter_map(|look| terrain.meets(look, 0.0)), area, below);
+    if bare <= 0.0 {
+        return Ok(View { area, near, open: false });
+    }
+    let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
+    let words = format!(
+        "{} sees ground {far}, but plants grow only up to {reach} m east, north, west and south of the point below it: \
+         {:.0} % of the ground in the image stays bare and is labelled soil",
+        which(drawn, capture),
+        (100.0 * bare).ceil()
+    );
+    let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
+    if drawn.desc.detail == Detail::Full && !told {
+        warnings.push(format!(
+            "{} sees ground {far}, and detail is Full: all of it is built as fine as the nearest; detail: ByPixel builds each place \
+             only as fine as its pixels, in a fraction of the time and memory",
+            which(drawn, capture)
+        ));
+    }
+    if bare > TOO_BARE {
+        return Err(blame_capture(drawn, capture, Error::input(words).help(help)));
+    }
+    if !told {
+        warnings.push(format!("{words}; {help}"));
+    }
+    Ok(View { area, near, open: true })
+}
+
+/// Returns the part of the ground in view that gets uniform cells; `None` if all of it does.
+pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = Look>, area: Rect) -> Option<Near> {
+    if drawn.desc.detail == Detail::Full {
+        return None;
+    }
+    let seen: Vec<(Vec2, f32, Look)> = rays
+        .filter_map(|look @ (origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z, look)))
+        .filter(|(at, ..)| area.contains(*at))
+        .collect();
+    let ray_m = NEAR * seen.iter().map(|(_, distance, _)| *distance).fold(f32::INFINITY, f32::min);
+    let (near, far): (Vec<_>, Vec<_>) = seen.into_iter().partition(|(_, distance, _)| *distance <= ray_m);
+    if far.is_empty() {
+        return None;
+    }
+    let (lo, hi) = near.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), (p, ..)| (l.min(*p), h.max(*p)));
+    let looks = near.into_iter().map(|(_, _, look)| look).collect();
+    Some(Near { area: Rect::new(lo.x, lo.y, hi.x, hi.y), looks, ray_m })
+}
+
+/// Returns `true` if a plant at `at` may be visible or cast a shadow into the view. Always `true` with `detail: Full`, where only
+/// the rectangle around the view limits the plants.
+pub(super) fn may_be_seen(drawn: &Drawn<'_>, sight: &Sight, at: Vec2) -> bool {
+    drawn.desc.detail == Detail::Full
+        || sight.each.is_empty()
+        || sight.each.iter().any(|view| view.distance(at) <= SIDEWAYS)
 }
 
 /// Returns the error about a camera (named `which`) if no edge of its image meets the ground, because of its pose or its lens.

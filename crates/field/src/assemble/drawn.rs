@@ -1,0 +1,219 @@
+//! What a field draws from its scene file before anything is built: the input of every later step.
+
+use super::lighting::{Lighting, Listed};
+use super::options::Options;
+use super::season::Season;
+use super::today::Today;
+use super::view::Sight;
+use super::{rig, scanner};
+use crate::desc::{Detail, FieldDesc};
+use crate::drive::Capture;
+use crate::estimate::usual_memory;
+use crate::layer::Layer;
+use crate::library::Library;
+use furrow_base::math::{Vec2, Vec3};
+use furrow_base::ron_file::{RonFile, Step};
+use furrow_base::sampling::{Purpose, Stream};
+use furrow_base::{Error, Result};
+use furrow_grow::plant::GrowOptions;
+use furrow_grow::soil::{Ground, Rect};
+use furrow_optics::light::{Light, LightDesc, LightRecord};
+use furrow_optics::sensor::{Camera, Lidar};
+use std::sync::Arc;
+
+/// Maximum coordinate of a model or a camera along an axis, metres. Single precision resolves 0.06 mm there.
+pub(super) const FARTHEST: f32 = 1000.0;
+
+/// Width of the planted margin around the view, metres: plants in it may lean or cast shadows into the view.
+pub(super) const PLANT_MARGIN: f32 = 0.35;
+
+/// Random stream address of the season, beyond those of any number of lights.
+const SEASON: u64 = 1 << 32;
+/// First random stream address for the choice of a `OneOf` list; one stream for each index among the scene file's lights.
+const LIGHTING: u64 = 2 << 32;
+/// Random stream address for the choice of the sown crop.
+const SOWN: u64 = 3 << 32;
+/// Maximum number of lights of a field: each is evaluated at every hit point of a ray.
+const MOST_LIGHTS: usize = 256;
+
+/// What a field draws from its scene file.
+pub(super) struct Drawn<'a> {
+    pub(super) page: &'a RonFile,
+    pub(super) desc: &'a FieldDesc,
+    pub(super) options: &'a Options,
+    pub(super) seed: u64,
+    pub(super) index: u64,
+    pub(super) season: Season,
+    /// Day of the field; `None` if it has no days.
+    pub(super) today: Option<Today>,
+    /// Indices of the scene file's crops that this field has.
+    pub(super) sown: std::ops::Range<usize>,
+    /// Camera of the first image.
+    pub(super) camera: Camera,
+    /// Images to be taken of the field.
+    pub(super) captures: Vec<Capture>,
+    /// LiDAR at each frame of a scan; empty for images.
+    pub(super) scanners: Vec<Lidar>,
+}
+
+/// The lights that a field draws.
+pub(super) struct Lit {
+    pub(super) lights: Vec<Light>,
+    pub(super) records: Vec<LightRecord>,
+    pub(super) lighting: Vec<Lighting>,
+}
+
+impl<'a> Drawn<'a> {
+    /// Draws season, day, crops, lights, cameras and LiDAR. Also returns warnings about them.
+    pub(super) fn draw(
+        page: &'a RonFile,
+        desc: &'a FieldDesc,
+        options: &'a Options,
+        library: &mut Library,
+    ) -> Result<(Self, Lit, Vec<String>)> {
+        library.counted.begin(options.memory);
+        let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
+        let mut stream = Stream::of(seed, index, Purpose::Page, 0);
+        let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
+        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
+        let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+        let today = Today::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
+        let daily = |address| {
+            let stream = Stream::of(seed, index, Purpose::Page, address);
+            today.as_ref().map_or_else(|| stream.clone(), |today| today.stream(&stream))
+        };
+        let (mut lights, mut records) = (Vec::new(), Vec::new());
+        let lists = |place| daily(LIGHTING + place as u64);
+        let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
+        if listed.len() > MOST_LIGHTS {
+            let fault = Error::input(format!("{} lights: a field may have at most {MOST_LIGHTS}", listed.len()))
+                .help("remove some; one Daylight is both sun and sky");
+            return Err(page.blame(&[Step::Field("lights")], fault));
+        }
+        // Note the files of all lists, so that all fields have the same scene hash whichever list each of them draws.
+        for file in desc.lights.iter().flat_map(LightDesc::files) {
+            library.environment_map_file(page, file)?;
+        }
+        for (i, Listed { desc: light, at }) in listed.into_iter().enumerate() {
+            let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
+            let drawn = light.draw(&mut daily(1 + i as u64), &mut open);
+            let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
+            records.push(record);
+            lights.extend(drawn);
+        }
+        let mut warnings = Vec::new();
+        // A LiDAR is its own light source.
+        if lights.is_empty() && options.scan.is_none() {
+            warnings.push("no light in the scene: the image will be black".into());
+        }
+        let captures = rig::captures(page, desc, library, camera, sown.clone(), &|purpose, k| {
+            Stream::of(seed, index, purpose, k)
+        })?;
+        let scanners = scanner::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
+        let camera = captures.first().map_or(camera, |first| first.camera);
+        let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, captures, scanners };
+        Ok((drawn, Lit { lights, records, lighting }, warnings))
+    }
+
+    pub(super) fn stream(&self, purpose: Purpose, index: u64) -> Stream {
+        Stream::of(self.seed, self.index, purpose, index)
+    }
+
+    /// Returns the memory limit of the field, bytes.
+    pub(super) fn memory(&self) -> u64 {
+        self.options.memory.unwrap_or_else(usual_memory)
+    }
+
+    /// Returns the smallest ground footprint of a centre pixel over all cameras, metres; 1 mm if no camera looks down.
+    /// For a scan, the spacing of the LiDAR's rays.
+    pub(super) fn ground_pixel(&self) -> f32 {
+        if let Some(spacing) = scanner::scanned_ground(self) {
+            return spacing;
+        }
+        let side = |camera: &Camera| {
+            let (origin, direction) = camera.centre_ray(camera.width() / 2, camera.height() / 2);
+            (direction.z < -0.05).then(|| origin.z / -direction.z * camera.pixel_angle())
+        };
+        // The first frame of each camera is enough: later frames have about the same height.
+        let first = self.captures.iter().take_while(|capture| capture.frame == 0);
+        first.filter_map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
+    }
+
+    /// Returns the minimum cell length of the mesh of a plant at `at`, metres. A preview uses four pixels, the ratio that the default
+    /// cell has to the pixels of a field camera.
+    pub(super) fn cell(&self, at: Vec2) -> f32 {
+        let usual = GrowOptions::default().cell;
+        let by_pixel = match self.desc.detail {
+            _ if self.options.preview.is_some() => 4.0 * self.ground_pixel(),
+            Detail::ByPixel | Detail::Instanced => 1.5 * self.pixel_at(at),
+            Detail::Full => 0.0,
+        };
+        usual.max(by_pixel)
+    }
+
+    /// Returns the smallest pixel footprint on a plant at `at` over all images, metres, perpendicular to the line of sight.
+    pub(super) fn pixel_at(&self, at: Vec2) -> f32 {
+        scanner::scanned_at(self, at).unwrap_or_else(|| self.camera_pixel_at(at))
+    }
+
+    /// Returns the smallest camera pixel footprint on a plant at `at`, metres, even for a scan. It decides which plants share meshes, so
+    /// a LiDAR meets the same plants that the cameras see.
+    pub(super) fn camera_pixel_at(&self, at: Vec2) -> f32 {
+        let side = |camera: &Camera| {
+            let distance = camera.pose().position.distance(at.extend(0.0)) - PLANT_MARGIN;
+            distance.max(0.0) * camera.pixel_angle()
+        };
+        self.captures.iter().map(|capture| side(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
+    }
+
+    /// Returns the smallest pixel footprint on the ground over all images, metres; 1 mm if no camera looks down.
+    /// For a scan, the spacing of the LiDAR's rays.
+    pub(super) fn finest_pixel(&self) -> f32 {
+        if let Some(spacing) = scanner::scanned_ground(self) {
+            return spacing;
+        }
+        let finest = |camera: &Camera| {
+            let corner = |k: u32| (k % 3 * (camera.width() - 1) / 2, k / 3 * (camera.height() - 1) / 2);
+            let rays = (0..9).map(corner).map(|(x, y)| camera.centre_ray(x, y));
+            let sides = rays.filter(|(_, direction)| direction.z < -0.05);
+            sides.map(|(origin, direction)| origin.z / -direction.z * camera.pixel_angle()).reduce(f32::min)
+        };
+        self.captures.iter().filter_map(|capture| finest(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
+    }
+
+    /// Returns `true` if the scene has ground, crops or weeds, so that its extent depends on the view.
+    pub(super) fn has_ground(&self) -> bool {
+        self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty()
+    }
+
+    /// Returns the area that plants and their shadows must reach to be part of the scene; `None` if all are.
+    pub(super) fn shown(&self, sight: &Sight) -> Option<Rect> {
+        self.has_ground().then_some(sight.view.area)
+    }
+}
+
+/// Radius of the plane fit that gives the ground's normal at a plant, metres.
+const STANCE: f32 = 0.02;
+
+/// The ground that plants and models are placed on.
+#[derive(Clone, Copy)]
+pub(super) struct Floor<'a> {
+    pub(super) ground: &'a Ground,
+    /// Textures of the ground's layers.
+    pub(super) maps: &'a [Arc<Layer>],
+    /// Whether the ground is the plane z = 0. Plants then still lean as on the ground with its heights.
+    pub(super) flat: bool,
+}
+
+impl Floor<'_> {
+    /// Returns the height of the ground at a point, metres.
+    pub(super) fn height(&self, x: f32, y: f32) -> f32 {
+        if self.flat { 0.0 } else { self.ground.height(x, y) }
+    }
+
+    /// Returns the height of a plant's foot, metres, and the normal of the ground around it.
+    pub(super) fn stance(&self, x: f32, y: f32) -> (f32, Vec3) {
+        let (height, normal) = self.ground.stance(self.maps, x, y, STANCE);
+        (if self.flat { 0.0 } else { height }, normal)
+    }
+}

@@ -1,0 +1,36 @@
+//! Adds plants and models to an empty scene.
+
+use super::drawn::{Drawn, Floor};
+use super::parts::Parts;
+use super::progress::Stage;
+use super::seedling::Seedling;
+use super::view::Sight;
+use super::{identity, models, stand};
+use crate::PlantRecord;
+use crate::library::Library;
+use furrow_base::Result;
+
+/// Plants and models as scene parts, and the records of those that are plants.
+pub(super) struct Stocked {
+    pub(super) parts: Parts,
+    pub(super) plants: Vec<PlantRecord>,
+}
+
+/// Grows the plants, and places them and the models on the ground.
+pub(super) fn populate(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    warnings: &mut Vec<String>,
+    seedlings: &[Seedling],
+    floor: Option<Floor<'_>>,
+    sight: &Sight,
+) -> Result<Stocked> {
+    let mut parts = Parts::default();
+    let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, drawn.shown(sight))?;
+    plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), floor)?);
+    identity::settle(&mut plants);
+    if floor.is_some() {
+        drawn.options.progress.enter(Stage::Cover);
+    }
+    Ok(Stocked { parts, plants })
+}
