@@ -19,6 +19,7 @@ mod table;
 mod zoo;
 
 use clap::{Parser, Subcommand};
+use furrow_base::supervise::supervised;
 use furrow_cli::cli::{self, signal};
 use std::process::ExitCode;
 
@@ -90,7 +91,8 @@ fn main() -> ExitCode {
     };
     furrow_train::memory::keep();
     let signals = signal::Signals::watch();
-    let done = match verb {
+    // A panic ends the program with exit code 1 and a message like any other error.
+    let done = supervised(|| match verb {
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),
@@ -103,6 +105,6 @@ fn main() -> ExitCode {
         Verb::Report(args) => curves::run(&args),
         Verb::Explain(args) => explain::run(&args),
         Verb::Reference(args) => pages::run::<Cli>(&args),
-    };
-    cli::end(done)
+    });
+    cli::end(done.and_then(|done| done))
 }
