@@ -20,7 +20,7 @@ use furrow_train::measure::{Evaluation, Prediction, Report};
 use furrow_train::net;
 use furrow_train::refine::Refine;
 use furrow_train::run::{self, Identity, ModelCard, Results, TrainedModel};
-use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real};
+use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Predictor, Real, TableOptions};
 use furrow_train::weights::{self, Array};
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
@@ -164,8 +164,16 @@ impl Players {
         let experiment = Experiment::of(page, None)?;
         let real = [Real { name: "frames".into(), folder: frames().into() }];
         let bound = Bound::new(experiment, &real, &[], out)?;
-        let order =
-            Order { bound: &bound, out, page: &page.text, shard, only, seconds: None, threads: 1, precision: "f32" };
+        let order = TableOptions {
+            bound: &bound,
+            out,
+            page: &page.text,
+            shard,
+            only,
+            seconds: None,
+            threads: 1,
+            precision: "f32",
+        };
         let warned = &self.warned;
         table::run(
             &order,

@@ -10,7 +10,7 @@ use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
 use furrow_output::{Picture, write_png};
-use furrow_train::data::{Augment, Band, Loader, Normalization, Order, Pick, Selection, Shape, Store};
+use furrow_train::data::{Augment, Band, BatchSettings, Loader, Normalization, Pick, Selection, Shape, Store};
 use furrow_train::fit::{Plan, settings};
 use furrow_train::run::{self, Results, TrainedModel};
 use furrow_train::table::Experiment;
@@ -384,7 +384,7 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
     };
     let (seed, batch, crop_size) = (3, 3, (32, 24));
     let (augment, normalization) = (Augment::default(), Normalization::Image);
-    let order = Order { seed, batch, crop_size, rare: 0.5, augment, pixels: None, normalization };
+    let order = BatchSettings { seed, batch, crop_size, rare: 0.5, augment, pixels: None, normalization };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).unwrap().map(|b| b.unwrap()).collect()
     };

@@ -16,7 +16,7 @@ use furrow_train::figure::sheet;
 use furrow_train::fit::Plan;
 use furrow_train::measure::Report;
 use furrow_train::session::{self, Machine};
-use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Order, Predictor, Real, State};
+use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Predictor, Real, State, TableOptions};
 use furrow_train::torch::{Precision, device};
 use indicatif::HumanDuration;
 use std::path::{Path, PathBuf};
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let precision = Precision::named(&args.machine.precision, device::find(&machine.device)?);
     let precision = precision.map_err(Error::input)?.name();
     let scale = args.scale.as_ref().map(|s| format!("// At the scale \"{s}\".\n")).unwrap_or_default();
-    let order = Order {
+    let order = TableOptions {
         bound: &bound,
         out: &out,
         page: &(scale + &page.text),

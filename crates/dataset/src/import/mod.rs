@@ -97,7 +97,7 @@ pub struct Labelled {
 
 /// Settings of an import.
 #[derive(Clone, Debug)]
-pub struct Order {
+pub struct ImportSettings {
     /// Shares of the splits, for a source without splits.
     pub split: Shares,
     /// Licence of the images, as free text.
@@ -110,7 +110,7 @@ pub struct Order {
 pub fn import(
     folder: &Path,
     source: &dyn Source,
-    order: &Order,
+    order: &ImportSettings,
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
 ) -> Result<Set> {
@@ -142,7 +142,7 @@ pub fn import(
 }
 
 /// Creates the dataset with the recipe of the import, or opens the existing one.
-fn begin(folder: &Path, source: &dyn Source, order: &Order) -> Result<Set> {
+fn begin(folder: &Path, source: &dyn Source, order: &ImportSettings) -> Result<Set> {
     let images = source.images();
     let mut counts = [0_u32; Split::ALL.len()];
     images.iter().filter_map(|i| i.split).for_each(|split| counts[split as usize] += 1);

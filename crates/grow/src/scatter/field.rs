@@ -11,9 +11,9 @@ use furrow_base::sampling::Stream;
 const WAVES: usize = 96;
 
 /// Stationary field with mean 0 and variance 1.
-pub(super) struct Field(Vec<(Vec2, f32)>);
+pub(super) struct GaussianField(Vec<(Vec2, f32)>);
 
-impl Field {
+impl GaussianField {
     /// Draws a field with the correlation length `range_m`.
     pub(super) fn new(range_m: f32, stream: &mut Stream) -> Self {
         Self(
@@ -41,7 +41,7 @@ mod tests {
         let n = 3000;
         let (mut square, mut product) = (0.0, 0.0);
         for k in 0..n {
-            let field = Field::new(0.5, &mut Stream::of(k, 0, Purpose::Test, 0));
+            let field = GaussianField::new(0.5, &mut Stream::of(k, 0, Purpose::Test, 0));
             let (a, b) = (field.at(vec2(0.3, 0.7)), field.at(vec2(0.3, 1.2)));
             square += a * a;
             product += a * b;

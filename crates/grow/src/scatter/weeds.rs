@@ -5,7 +5,7 @@
 //! with the variance σ² = ln(1 + 1/k) has the same ratio if its range exceeds the quadrat. A fraction of the plants may
 //! be in Thomas clusters instead.
 
-use super::field::Field;
+use super::field::GaussianField;
 use super::record::WeedsRecord;
 use super::{Area, Disc, Spot, outside, within};
 use furrow_base::math::{Vec2, vec2};
@@ -106,7 +106,7 @@ pub fn weeds(desc: &WeedsDesc, area: Area, discs: &[Disc], stream: &Stream) -> V
     let (per_m2, share, plants) = (drawn.per_m2, drawn.clusters_share, drawn.clusters_plants);
     let (sd, apart) = (drawn.clusters_sd_m, drawn.min_distance_m);
     let variance = (1.0 + 1.0 / drawn.k).ln();
-    let field = Field::new(drawn.range_m, &mut stream.child(Purpose::Page, 3));
+    let field = GaussianField::new(drawn.range_m, &mut stream.child(Purpose::Page, 3));
     let intensity = |p: Vec2| (variance.sqrt() * field.at(p) - 0.5 * variance).exp() * per_m2;
 
     // Neighbours beyond the border also remove plants that are too close.

@@ -6,7 +6,7 @@
 use super::bands::Band;
 use super::crop::Crop;
 use super::fourier;
-use super::order::Order;
+use super::order::BatchSettings;
 use super::photos::{Photos, Views};
 use super::store::Store;
 use furrow_base::sampling::{Purpose, Stream};
@@ -39,7 +39,7 @@ const AHEAD: usize = 2;
 impl Loader {
     /// Starts to load the batches of the steps `from..to` with `threads` threads. The store must contain an image. The threads end
     /// when the loader is dropped.
-    pub fn start(store: &Arc<Store>, order: &Order, from: u64, to: u64, threads: usize) -> Result<Self> {
+    pub fn start(store: &Arc<Store>, order: &BatchSettings, from: u64, to: u64, threads: usize) -> Result<Self> {
         let maker = || {
             let (store, order) = (Arc::clone(store), order.clone());
             let mut epochs = Epochs { seed: order.seed, current: None };
@@ -51,7 +51,7 @@ impl Loader {
 
 impl Loader<Views> {
     /// Starts to load crops of photographs for the steps `from..to`. There must be at least one photograph.
-    pub fn photos(photos: &Arc<Photos>, order: &Order, from: u64, to: u64, threads: usize) -> Result<Self> {
+    pub fn photos(photos: &Arc<Photos>, order: &BatchSettings, from: u64, to: u64, threads: usize) -> Result<Self> {
         let maker = || {
             let (photos, order) = (Arc::clone(photos), order.clone());
             move |step| Ok(photos.views(&order, step))
@@ -120,7 +120,7 @@ impl Epochs {
     }
 }
 
-fn make(store: &Store, order: &Order, step: u64, epochs: &mut Epochs) -> Result<Batch> {
+fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) -> Result<Batch> {
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
     let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare, ground: None };

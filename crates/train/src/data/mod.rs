@@ -43,7 +43,7 @@ pub use example::{Example, Shape};
 pub use ground::{AugmentScale, Ground, PixelSizes};
 pub use loader::{Batch, Loader};
 pub use normalise::Normalization;
-pub use order::Order;
+pub use order::BatchSettings;
 pub use paste::paste;
 pub use photos::{Photos, Views};
 pub use resize::Resize;

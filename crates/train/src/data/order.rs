@@ -6,7 +6,7 @@ use super::normalise::Normalization;
 
 /// Parameters that determine the batches of a training, together with the images.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Order {
+pub struct BatchSettings {
     /// Seed of the order of images and of data augmentation.
     pub seed: u64,
     /// Images per batch; ≥ 1.

@@ -7,7 +7,7 @@ use super::augment::Augment;
 use super::bands::Band;
 use super::crop::Crop;
 use super::example::Example;
-use super::order::Order;
+use super::order::BatchSettings;
 use super::resize::Resize;
 use furrow_base::Result;
 use furrow_base::sampling::{Purpose, Stream};
@@ -79,7 +79,7 @@ impl Photos {
     }
 
     /// Returns the crops of a step; `order` gives their number, size and augmentation. There must be at least one photograph.
-    pub fn views(&self, order: &Order, step: u64) -> Views {
+    pub fn views(&self, order: &BatchSettings, step: u64) -> Views {
         let color: Vec<bool> = self.bands.iter().map(Band::is_color).collect();
         let Augment { flip, rotate, scale, crop, .. } = order.augment;
         let moved = Augment { flip, rotate, scale, crop, ..Augment::NONE };
@@ -120,8 +120,8 @@ mod tests {
     use super::*;
     use crate::data::Normalization;
 
-    fn order(batch: usize) -> Order {
-        Order {
+    fn order(batch: usize) -> BatchSettings {
+        BatchSettings {
             seed: 3,
             batch,
             crop_size: (32, 24),

@@ -10,7 +10,7 @@ use super::log::TrainingLog;
 use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
-use crate::data::{Batch, Loader, Normalization, Order, Photos, PixelSizes, Store, Views, augment};
+use crate::data::{Batch, BatchSettings, Loader, Normalization, Photos, PixelSizes, Store, Views, augment};
 use crate::figure::{Sheet, Shots, sheet};
 use crate::measure::{Confusion, Scores};
 use crate::torch::{Model, Pass, Where, classes, failed};
@@ -109,7 +109,7 @@ pub fn train(
     let mut optimiser = Optimiser::new(hyper.optimiser, hyper.decay, at.step, &at.memory, &model);
     let mut ema = if hyper.ema > 0.0 { Some(Ema::new(hyper.ema, &at.average, &model)?) } else { None };
     let rarities = class_weights::rarities(&data.train, classes)?;
-    let order = Order {
+    let order = BatchSettings {
         seed: plan.seed,
         batch: hyper.batch,
         crop_size: plan.crop_size(),

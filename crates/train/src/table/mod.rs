@@ -60,4 +60,4 @@ pub use pixels::check_pixel_sizes;
 pub use print::{RUNS, TIMES, Tables, listing, tables};
 pub use rows::{Learner, Row, rows};
 pub use sets::{Bound, Real};
-pub use work::{Callbacks, Only, Order, PAGE, Predictor, State, check_weights, run};
+pub use work::{Callbacks, Only, PAGE, Predictor, State, TableOptions, check_weights, run};

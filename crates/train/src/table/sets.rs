@@ -247,7 +247,7 @@ fn import(
         warn(warning);
     }
     progress.expect(source.images().len());
-    let order = import::Order { split: Shares::default(), licence: furrow_dataset::Order::NO_LICENCE.into() };
+    let order = import::ImportSettings { split: Shares::default(), licence: furrow_dataset::Order::NO_LICENCE.into() };
     let done = |_| progress.add();
     let set = Threads::all()?.install(|| import::import(folder, &source, &order, &done, stop))?;
     furrow_dataset::make::finish::finish(&set, None)

@@ -36,7 +36,7 @@ pub enum Only {
 
 /// Options of [`run()`].
 #[derive(Clone, Copy, Debug)]
-pub struct Order<'a> {
+pub struct TableOptions<'a> {
     /// The experiment and its datasets.
     pub bound: &'a Bound,
     /// Folder of the experiment.
@@ -93,8 +93,8 @@ pub struct State {
 }
 
 /// Runs everything that is missing; returns the paths of the tables (with [`Only::Sets`], of the datasets' recipes).
-pub fn run(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
-    let Order { bound, out, .. } = *order;
+pub fn run(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
+    let TableOptions { bound, out, .. } = *order;
     if order.only == Some(Only::Tables) {
         return tables(order, callbacks);
     }
@@ -163,7 +163,7 @@ pub fn check_weights(bound: &Bound) -> Result<()> {
 }
 
 /// Writes the tables of the results so far; returns their paths.
-fn tables(order: &Order<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
+fn tables(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     // Every shard would repeat the same measurement after each of its rows: only a run of all rows measures the distances.
     if order.shard == Shard::ALL {
         against::measure(order.bound, order.out)?;
@@ -193,7 +193,7 @@ fn alone<T>(out: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
 
 /// Work on one row.
 struct Work<'a> {
-    order: &'a Order<'a>,
+    order: &'a TableOptions<'a>,
     callbacks: &'a Callbacks<'a>,
     row: Row,
     folder: PathBuf,
@@ -243,7 +243,7 @@ impl Work<'_> {
         let path = self.folder.join(run::PLAN);
         let before: Option<Identity> = path.exists().then(|| run::read_json(&path)).transpose()?;
         let (train, val) = self.selections();
-        let Order { threads, precision, seconds, .. } = *self.order;
+        let TableOptions { threads, precision, seconds, .. } = *self.order;
         let (threads, precision) = match before {
             Some(Identity { plan, .. }) => (plan.threads, plan.precision),
             None => (threads, precision.to_owned()),
@@ -329,7 +329,7 @@ impl Work<'_> {
 
     /// Evaluates the row on the test sets that have no evaluation yet; returns `true` if there was one.
     fn evaluate(&self) -> Result<bool> {
-        let Order { bound, .. } = *self.order;
+        let TableOptions { bound, .. } = *self.order;
         let Some(of) = evaluation::who(&self.folder)? else {
             return Err(evaluation::foreign(&self.folder, "there is no trained model in this folder"));
         };
@@ -379,7 +379,7 @@ fn short(e: &Error) -> String {
 
 /// Estimates the seconds that the unfinished training runs take: each the mean of the finished runs of its network, or of all
 /// finished runs if there are none. Returns `None` before the first run is done.
-fn left(all: &[&Work<'_>], order: &Order<'_>) -> Result<Option<f64>> {
+fn left(all: &[&Work<'_>], order: &TableOptions<'_>) -> Result<Option<f64>> {
     let mut known: Vec<(Network, f64)> = Vec::new();
     for row in rows::rows(&order.bound.experiment) {
         if let Learner::Network(network, _) = row.learner

@@ -10,7 +10,7 @@ use furrow_dataset::import::classes::{Colors, Names};
 use furrow_dataset::import::coco::Coco;
 use furrow_dataset::import::masks::{Coding, Folders, Masks};
 use furrow_dataset::import::phenobench::PhenoBench;
-use furrow_dataset::import::{self, Order, Source};
+use furrow_dataset::import::{self, ImportSettings, Source};
 use furrow_dataset::model::split::Shares;
 use furrow_render::render;
 use std::path::PathBuf;
@@ -100,7 +100,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(source.images().len() as u64);
-    let order = Order { split: args.split, licence: args.licence.clone() };
+    let order = ImportSettings { split: args.split, licence: args.licence.clone() };
     let done = |_| progress.add();
     let stop = signals.heed();
     let pool = render::pool(args.threads)?;
