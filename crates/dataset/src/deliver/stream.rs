@@ -187,7 +187,7 @@ enum End {
     Left,
 }
 
-/// What was written of a stream.
+/// Written and failed images of a stream.
 #[derive(Default)]
 struct Written {
     /// Number of images.
@@ -282,7 +282,7 @@ fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Se
 mod tests {
     use super::*;
 
-    /// Runs the archive on images of which `make` makes the files; returns the indices of those written and failed.
+    /// Archives a hundred images with the result `make`; returns the indices of those written and failed.
     fn archived(make: impl Fn(u64) -> Result<()> + Sync) -> (Vec<u64>, Vec<u64>) {
         let schedule = Schedule::new((0..100).map(|index| vec![index]), ResultOrder::InOrder { ahead: 4 });
         let make = |index: &u64, _: &Threads, (): &mut ()| {

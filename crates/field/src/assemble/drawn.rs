@@ -1,4 +1,4 @@
-//! What a field draws from its scene file before anything is built: the input of every later step.
+//! Values that a field draws from its scene file before anything is built: the input of every later step.
 
 use super::lighting::{Lighting, Listed};
 use super::options::Options;
@@ -36,7 +36,7 @@ const SOWN: u64 = 3 << 32;
 /// Maximum number of lights of a field: each is evaluated at every hit point of a ray.
 const MOST_LIGHTS: usize = 256;
 
-/// What a field draws from its scene file.
+/// Values that a field draws from its scene file.
 pub(super) struct Drawn<'a> {
     pub(super) page: &'a RonFile,
     pub(super) desc: &'a FieldDesc,

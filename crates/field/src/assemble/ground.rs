@@ -1,9 +1,9 @@
 //! Builds the ground of a field: the surface with its stones, then clods and litter, then scene parts.
 
+use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
 use super::earth::{BakedGrounds, Bed, Earth, Soil};
 use super::ground_view::{Onlooker, from_view};
-use super::parts::Parts;
 use super::populate::{self, Stocked};
 use super::preview::Under;
 use super::terrain::{GROUND_MARGIN, tilted_to};
@@ -92,7 +92,7 @@ pub(super) fn cultivate(
             let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
             let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
             // Plants first: they push the clods aside, not the other way round.
-            let stocked = populate::populate(drawn, library, warnings, &seedlings, Some(floor), sight)?;
+            let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
             let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
             let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
             let uncovered = same.is_some() || options.told_only;
@@ -208,7 +208,7 @@ pub(super) fn soil_record(drawn: &Drawn<'_>, desc: &SoilDesc, ground: &Ground) -
 /// Places clods below the plants, and adds litter to the debris. Returns the clods; none if the ground is flat.
 fn cover(
     drawn: &Drawn<'_>,
-    above: &Parts,
+    above: &Contents,
     desc: &SoilDesc,
     Earth { ground, pile, stones: debris }: &mut Earth,
     seen: &InView,
@@ -265,8 +265,14 @@ fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> Baked
 }
 
 /// Creates scene parts of the ground, clods and debris in view. They are black if the textures were not baked.
-fn lay(floor: Floor<'_>, clods: Vec<Clods>, debris: Vec<Debris>, baked: Option<&BakedGrounds>, seen: &InView) -> Parts {
-    let mut laid = Parts::default();
+fn lay(
+    floor: Floor<'_>,
+    clods: Vec<Clods>,
+    debris: Vec<Debris>,
+    baked: Option<&BakedGrounds>,
+    seen: &InView,
+) -> Contents {
+    let mut laid = Contents::default();
     let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
     let mut add = |mesh: Mesh, material: Material, kind| {
         let material_of = laid.materials.len() as u32;

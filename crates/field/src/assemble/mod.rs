@@ -3,6 +3,7 @@
 mod bank;
 mod census;
 mod condition;
+mod contents;
 mod drawn;
 mod earth;
 mod estimate;
@@ -18,7 +19,6 @@ mod lighting;
 mod member;
 mod models;
 mod options;
-mod parts;
 mod populate;
 mod preview;
 mod progress;
@@ -38,6 +38,7 @@ use super::desc::FieldDesc;
 use super::estimate::Estimate;
 pub use super::growing::Growing;
 use super::library::Library;
+use contents::Contents;
 use drawn::Drawn;
 use expected::Asked;
 pub use field::Field;
@@ -48,7 +49,6 @@ use furrow_base::sampling::Purpose;
 use furrow_render::scene::Scene;
 pub use lighting::Lighting;
 pub use options::{Options, Scanner};
-use parts::Parts;
 use populate::Stocked;
 pub use preview::Preview;
 pub use progress::BuildProgress;
@@ -169,7 +169,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     let (Stocked { parts, mut plants }, soil) = match &desc.soil {
         None => {
             let (seedlings, _) = sow::seedlings(&drawn, library, &sight, &[])?;
-            (populate::populate(&drawn, library, &mut warnings, &seedlings, None, &sight)?, None)
+            (populate::populate(&drawn, library, &seedlings, None, &sight)?, None)
         }
         Some(soil) => {
             options.progress.enter(Stage::Ground);
@@ -191,7 +191,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         season: drawn.season,
     };
     warnings.extend(library.warnings());
-    let Parts { parts, kinds, materials } = parts;
+    let Contents { parts, kinds, materials } = parts;
     Ok(Field {
         scene: Scene { parts, materials, lights: lit.lights, camera: drawn.camera, filter: desc.filter.footprint() },
         captures: drawn.captures,

@@ -1,9 +1,9 @@
 //! Places models from disk on the ground and labels them.
 
+use super::contents::Contents;
 use super::drawn::{Drawn, FARTHEST, Floor};
 use super::identity;
 use super::known;
-use super::parts::Parts;
 use super::preview::Stood;
 use crate::desc::ModelDesc;
 use crate::library::Library;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 pub(super) fn models(
     drawn: &Drawn<'_>,
     library: &mut Library,
-    parts: &mut Parts,
+    parts: &mut Contents,
     numbered: usize,
     floor: Option<Floor<'_>>,
 ) -> Result<Vec<PlantRecord>> {
@@ -45,7 +45,7 @@ pub(super) fn models(
 fn place(
     drawn: &Drawn<'_>,
     library: &mut Library,
-    all: &mut Parts,
+    all: &mut Contents,
     (k, desc, kind): (usize, &ModelDesc, PartKind),
     numbered: usize,
     floor: Option<Floor<'_>>,

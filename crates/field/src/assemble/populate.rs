@@ -1,7 +1,7 @@
 //! Adds plants and models to an empty scene.
 
+use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
-use super::parts::Parts;
 use super::progress::Stage;
 use super::seedling::Seedling;
 use super::view::Sight;
@@ -12,7 +12,7 @@ use furrow_base::Result;
 
 /// Plants and models as scene parts, and the records of those that are plants.
 pub(super) struct Stocked {
-    pub(super) parts: Parts,
+    pub(super) parts: Contents,
     pub(super) plants: Vec<PlantRecord>,
 }
 
@@ -20,12 +20,11 @@ pub(super) struct Stocked {
 pub(super) fn populate(
     drawn: &Drawn<'_>,
     library: &mut Library,
-    warnings: &mut Vec<String>,
     seedlings: &[Seedling],
     floor: Option<Floor<'_>>,
     sight: &Sight,
 ) -> Result<Stocked> {
-    let mut parts = Parts::default();
+    let mut parts = Contents::default();
     let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, drawn.shown(sight))?;
     plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), floor)?);
     identity::settle(&mut plants);

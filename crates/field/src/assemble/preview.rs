@@ -2,9 +2,9 @@
 //!
 //! A cached result is used only if all its inputs are equal, so a preview equals the field that a build without a cache would give.
 
+use super::contents::Contents;
 use super::earth::{Bed, Soil};
 use super::grown::Grown;
-use super::parts::Parts;
 use super::seedling::{Place, Seedling};
 use crate::PlantRecord;
 use furrow_base::Result;
@@ -30,7 +30,7 @@ struct Kept {
     /// Meshes of models, by their index in the scene file.
     models: HashMap<usize, (Stood, Vec<Arc<Mesh>>)>,
     bed: Option<Arc<Bed>>,
-    laid: Option<(Under, Arc<Parts>)>,
+    laid: Option<(Under, Arc<Contents>)>,
     built: Option<(Vec<Shape>, Arc<EmbreeAccel>)>,
 }
 
@@ -141,12 +141,12 @@ impl Preview {
     }
 
     /// Returns the cached ground parts and cover, if the ground and the plants are the same.
-    pub(super) fn laid(&self, under: &Under) -> Option<Arc<Parts>> {
+    pub(super) fn laid(&self, under: &Under) -> Option<Arc<Contents>> {
         self.lock().laid.as_ref().filter(|(known, _)| known.same(under)).map(|(_, laid)| laid.clone())
     }
 
     /// Replaces the cached ground and its cover.
-    pub(super) fn keep_ground(&self, under: Under, laid: &Arc<Parts>) {
+    pub(super) fn keep_ground(&self, under: Under, laid: &Arc<Contents>) {
         let mut kept = self.lock();
         kept.bed = Some(under.bed.clone());
         kept.laid = Some((under, laid.clone()));

@@ -2,10 +2,10 @@
 
 use super::bank;
 use super::bank::Variation;
+use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
 use super::grown::Grown;
 use super::member::Member;
-use super::parts::Parts;
 use super::preview::Standing;
 use super::progress::Stage;
 use super::seedling::{Place, Seedling, grow};
@@ -48,7 +48,7 @@ impl Stands {
 pub(super) fn plant(
     drawn: &Drawn<'_>,
     library: &mut Library,
-    parts: &mut Parts,
+    parts: &mut Contents,
     seedlings: &[Seedling],
     floor: Option<Floor<'_>>,
     view: Option<Rect>,
@@ -110,7 +110,7 @@ pub(super) fn plant(
 }
 
 /// Creates the materials of a plant's organs. Returns the material index of each organ.
-fn dress(drawn: &Drawn<'_>, parts: &mut Parts, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
+fn dress(drawn: &Drawn<'_>, parts: &mut Contents, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
     // One material per plant and name, because plants differ in chlorophyll. Organs with damage have their own material.
     let mut made: Vec<(&str, usize, u32)> = Vec::new();
     let mut materials = Vec::with_capacity(organs.len());
@@ -137,7 +137,7 @@ fn dress(drawn: &Drawn<'_>, parts: &mut Parts, record: &PlantRecord, organs: &[G
 }
 
 /// Adds a plant's organs to the scene: meshes in world space, or those of a bank plant with the transform of an instance.
-fn put_organs(parts: &mut Parts, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
+fn put_organs(parts: &mut Contents, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
     let instance = instance.map(|Variation { at, greener }| (Arc::new(at), greener));
     for (organ, material) in organs.iter().zip(materials) {
         let tag = Tag { plant: number, ..organ.part.tag };

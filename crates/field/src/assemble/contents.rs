@@ -1,4 +1,4 @@
-//! Parts of a scene under construction, with their materials and kinds.
+//! Scene parts under construction, with their materials and kinds.
 
 use crate::PartKind;
 use furrow_render::material::Material;
@@ -6,14 +6,14 @@ use furrow_render::scene::Part;
 
 /// Scene parts. Their material indices refer to `materials` here.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(super) struct Contents {
     pub(super) parts: Vec<Part>,
     /// Kind of each part.
     pub(super) kinds: Vec<PartKind>,
     pub(super) materials: Vec<Material>,
 }
 
-impl Parts {
+impl Contents {
     /// Adds a material and returns its index.
     pub(super) fn material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
