@@ -55,7 +55,7 @@ impl Maps {
             }
         }
         let radius = |size: f32| (size * height as f32 * 0.5).round() as usize;
-        let wrap = texture.wrap();
+        let [wrap, _] = texture.wrap();
         let size = (width as usize, height as usize);
         let coarse = soften(&values, size, radius(relief.coarsest), wrap);
         let mut fine = soften(&values, size, radius(relief.finest), wrap);
@@ -89,7 +89,7 @@ impl Maps {
 #[derive(Clone, Debug)]
 pub struct NormalMap {
     pyramid: Pyramid<[f32; 2]>,
-    wrap: Wrap,
+    wrap: [Wrap; 2],
 }
 
 impl NormalMap {
@@ -106,7 +106,7 @@ impl NormalMap {
                 plane.values.push([(get(x + 1, y) - get(x - 1, y)) * scale, (get(x, y - 1) - get(x, y + 1)) * scale]);
             }
         }
-        Self { pyramid: build(plane), wrap }
+        Self { pyramid: build(plane), wrap: [wrap; 2] }
     }
 
     /// Converts a tangent-space normal map that was read as [`ColorSpace::Linear`](super::ColorSpace): R right, G up in
@@ -174,7 +174,7 @@ impl AmbientOcclusion {
     /// Returns the ambient occlusion at `uv`, bilinear on the level nearest to `lod`.
     #[inline]
     pub fn sample(&self, uv: Vec2, lod: f32) -> f32 {
-        self.pyramid.taps(uv, lod, self.wrap).iter().map(|(v, weight)| v[0] * weight).sum()
+        self.pyramid.taps(uv, lod, [self.wrap; 2]).iter().map(|(v, weight)| v[0] * weight).sum()
     }
 }
 

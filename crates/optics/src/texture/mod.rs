@@ -52,7 +52,8 @@ const MAX_BYTES: u64 = 1 << 29;
 pub struct Texture {
     pyramid: Pyramid<[u8; 4]>,
     decode: &'static [f32; 256],
-    wrap: Wrap,
+    /// Wrap modes in u and in v.
+    wrap: [Wrap; 2],
     opaque: bool,
 }
 
@@ -67,6 +68,14 @@ impl Texture {
     /// Decodes the bytes of a PNG or JPEG file, as embedded in models. The error is a message.
     pub fn decode(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
         let pixels = read(Cursor::new(bytes)).map_err(Fault::words)?.into_rgba8();
+        let (width, height) = pixels.dimensions();
+        Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
+    }
+
+    /// Decodes the bytes of a PNG or JPEG file without its alpha channel. The error is a message.
+    pub fn decode_opaque(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
+        let mut pixels = read(Cursor::new(bytes)).map_err(Fault::words)?.into_rgba8();
+        pixels.pixels_mut().for_each(|pixel| pixel.0[3] = u8::MAX);
         let (width, height) = pixels.dimensions();
         Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
     }
@@ -108,17 +117,23 @@ impl Texture {
         let coarse = planes.iter().map(|p| Level::new(p.width, p.height, |x, y| quantise(p.get(x, y))));
         let levels: Vec<_> = std::iter::once(finest).chain(coarse).collect();
         let opaque = rgba.iter().skip(3).step_by(4).all(|&a| a >= 128);
-        Self { pyramid: Pyramid { levels }, decode: table, wrap: Wrap::Clamp, opaque }
+        Self { pyramid: Pyramid { levels }, decode: table, wrap: [Wrap::Clamp; 2], opaque }
     }
 
     /// Returns the same texture with another wrap mode.
     #[must_use]
     pub fn wrapped(self, wrap: Wrap) -> Self {
+        self.wrapped_by([wrap; 2])
+    }
+
+    /// Returns the same texture with other wrap modes in u and in v.
+    #[must_use]
+    pub fn wrapped_by(self, wrap: [Wrap; 2]) -> Self {
         Self { wrap, ..self }
     }
 
-    /// Returns the wrap mode, which defines the colours outside uv ∈ [0, 1]².
-    pub fn wrap(&self) -> Wrap {
+    /// Returns the wrap modes in u and in v, which define the colours outside uv ∈ [0, 1]².
+    pub fn wrap(&self) -> [Wrap; 2] {
         self.wrap
     }
 

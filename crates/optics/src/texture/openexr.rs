@@ -1,4 +1,4 @@
-//! OpenEXR environment maps: which channels of which part are the colours, and where the pixels lie.
+//! OpenEXR environment maps: choice of part and channels, and placement of the pixels.
 //!
 //! Read are half, float and integer channels, scan lines in both orders, tiles (the finest level), and files of several
 //! parts or layers. Pixels of the display window that the data window does not cover are black.
@@ -102,7 +102,7 @@ fn choose(headers: &[Header]) -> Result<Choice, String> {
     Ok(choice)
 }
 
-/// Rectangle of the pixels that are kept, and where the stored ones lie in it.
+/// Rectangle of the pixels that are kept, and the position of the stored ones in it.
 struct Window {
     /// Width and height.
     size: (usize, usize),

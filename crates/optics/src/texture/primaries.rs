@@ -33,7 +33,7 @@ impl Primaries {
         xyz(self.0[3])
     }
 
-    /// Returns the matrix from linear colours to XYZ, in which (1, 1, 1) is the white.
+    /// Returns the matrix from linear colours to XYZ; it maps (1, 1, 1) to the white.
     fn to_xyz(self) -> DMat3 {
         let [red, green, blue, white] = self.0.map(xyz);
         let directions = DMat3::from_cols(red, green, blue);

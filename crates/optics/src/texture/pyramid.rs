@@ -11,6 +11,8 @@ pub enum Wrap {
     Clamp,
     /// Repeats the image, for textures that tile.
     Repeat,
+    /// Repeats the image, every second time mirrored.
+    Mirror,
 }
 
 impl Wrap {
@@ -20,6 +22,10 @@ impl Wrap {
         match self {
             Self::Clamp => i.clamp(0, n as i32 - 1) as u32,
             Self::Repeat => i.rem_euclid(n as i32) as u32,
+            Self::Mirror => {
+                let i = i.rem_euclid(2 * n as i32) as u32;
+                i.min(2 * n - 1 - i)
+            }
         }
     }
 
@@ -29,6 +35,10 @@ impl Wrap {
         match self {
             Self::Clamp => x.clamp(-1.0, 2.0),
             Self::Repeat => x - x.floor(),
+            Self::Mirror => {
+                let within = x - 2.0 * (0.5 * x).floor();
+                within.min(2.0 - within)
+            }
         }
     }
 
@@ -44,7 +54,8 @@ impl Wrap {
             Self::Repeat if i < 0 => n - 1,
             Self::Repeat if i as u32 >= n => 0,
             Self::Repeat => i as u32,
-            Self::Clamp => self.index(i, n),
+            // A mirrored image continues with its own edge.
+            Self::Clamp | Self::Mirror => Self::Clamp.index(i, n),
         };
         (index(i), index(i + 1), place - floor)
     }
@@ -88,11 +99,11 @@ pub(super) struct Pyramid<T> {
 impl<T: Copy> Pyramid<T> {
     /// Returns the four texels around `uv` on the level nearest to `lod`, with their bilinear weights.
     #[inline]
-    pub(super) fn taps(&self, uv: Vec2, lod: f32, wrap: Wrap) -> [(T, f32); 4] {
+    pub(super) fn taps(&self, uv: Vec2, lod: f32, [across, down]: [Wrap; 2]) -> [(T, f32); 4] {
         // `max` comes first so that NaN selects the finest level.
         let level = &self.levels[((lod.max(0.0) + 0.5) as usize).min(self.levels.len() - 1)];
-        let (x0, x1, fx) = wrap.pair(uv.x, level.width);
-        let (y0, y1, fy) = wrap.pair(uv.y, level.height);
+        let (x0, x1, fx) = across.pair(uv.x, level.width);
+        let (y0, y1, fy) = down.pair(uv.y, level.height);
         [
             (level.get(x0, y0), (1.0 - fx) * (1.0 - fy)),
             (level.get(x1, y0), fx * (1.0 - fy)),

@@ -14,7 +14,7 @@ use std::io::{BufRead, Cursor, Read};
 /// Largest size of a header in bytes.
 const MOST_HEADER: u64 = 1 << 20;
 
-/// What the header of a file says.
+/// Header of a file.
 struct Header {
     /// Factor that was applied to each band.
     exposure: [f32; 3],

@@ -65,6 +65,10 @@ fn sampling_is_exact_at_texel_centres_and_wraps() {
     let t = t.wrapped(Wrap::Repeat);
     assert_eq!(t.sample(vec2(0.0, 0.25), 0.0), [0.5, 0.0, 0.0, 1.0]);
     assert_eq!(t.sample(vec2(-5.25, 3.25), 0.0), [1.0, 0.0, 0.0, 1.0]);
+    let t = t.wrapped_by([Wrap::Mirror, Wrap::Clamp]);
+    for (u, red) in [(0.0, 0.0), (1.0, 1.0), (1.25, 1.0), (1.75, 0.0), (-0.25, 0.0), (-0.75, 1.0), (2.75, 1.0)] {
+        assert_eq!(t.sample(vec2(u, -3.0), 0.0)[0], red, "{u}");
+    }
     for odd in [f32::NAN, f32::INFINITY, f32::MIN, f32::MAX] {
         let c = t.sample(vec2(odd, odd), odd);
         assert!(c[3].is_nan() || (0.0..=1.001).contains(&c[3]), "{odd}: {c:?}");
