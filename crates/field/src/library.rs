@@ -88,7 +88,7 @@ pub(super) struct Library {
     /// Memory that all these images take.
     pub(super) counted: Pictures,
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
-    /// Warnings about species files, by file: images that look wrong.
+    /// Warnings about species files and models, by file: images that look wrong, and what a model loses.
     told: BTreeMap<PathBuf, Vec<String>>,
     /// Built-in files, by the names that the scene file uses for them.
     shipped: BTreeMap<String, PathBuf>,
@@ -172,7 +172,7 @@ impl Library {
         self.shipped.clone()
     }
 
-    /// Returns the warnings about the species files that were read, in the order of their paths.
+    /// Returns the warnings about the species files and models that were read, in the order of their paths.
     pub(super) fn warnings(&self) -> Vec<String> {
         self.told.values().flatten().cloned().collect()
     }
@@ -296,6 +296,8 @@ impl Library {
             let model = Model::load_within(&full, desc.up, lifted, self.counted.allowance());
             Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
         };
+        let warnings = model.warnings.iter().map(|words| format!("{path}: {words}")).collect();
+        self.told.insert(full.clone(), warnings);
         // Hashes of the bytes that the model was loaded from: the files may have changed since.
         self.files.extend(model.files.iter().map(|(file, digest)| (file.clone(), *digest)));
         self.counted.note(counted_model(&key), model.pictures);

@@ -27,6 +27,8 @@ pub const LINEAR: u32 = 9729;
 pub const LINEAR_MIPMAP_LINEAR: u32 = 9987;
 /// Wrapping mode: clamps to the edge.
 pub const CLAMP_TO_EDGE: u32 = 33071;
+/// Wrapping mode: repeats the image, every second time mirrored.
+pub const MIRRORED_REPEAT: u32 = 33648;
 /// Wrapping mode: repeats the image.
 pub const REPEAT: u32 = 10497;
 
@@ -34,6 +36,10 @@ pub const REPEAT: u32 = 10497;
 pub const DIFFUSE_TRANSMISSION: &str = "KHR_materials_diffuse_transmission";
 /// Extension: directional and punctual lights.
 pub const LIGHTS: &str = "KHR_lights_punctual";
+/// Extension: an older model of materials.
+pub const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+/// Extension: thin or solid sheets that transmit light without scattering.
+pub const TRANSMISSION: &str = "KHR_materials_transmission";
 /// Extension: translated, rotated and scaled textures.
 pub const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 
@@ -69,6 +75,8 @@ objects! {
         meshes: Vec<Mesh> = "Vec::is_empty",
         /// Skins: joints that deform meshes.
         skins: Vec<Skin> = "Vec::is_empty",
+        /// Animations, which are not read.
+        animations: Vec<Value> = "Vec::is_empty",
         /// Materials.
         materials: Vec<Material> = "Vec::is_empty",
         /// Textures: an image and its sampler.
@@ -90,6 +98,8 @@ objects! {
     Asset {
         /// "2.0".
         version: String,
+        /// Smallest version that a reader must support.
+        min_version: Option<String> = "Option::is_none",
         /// Name of the program that wrote the file.
         generator: Option<String> = "Option::is_none",
         /// Application-specific data.
@@ -118,6 +128,8 @@ objects! {
         scale: Option<[f64; 3]> = "Option::is_none",
         /// Index of the mesh at this node.
         mesh: Option<usize> = "Option::is_none",
+        /// Weights of the mesh's morph targets, overriding those of the mesh.
+        weights: Option<Vec<f64>> = "Option::is_none",
         /// Index of the skin that deforms the mesh.
         skin: Option<usize> = "Option::is_none",
         /// Index of the camera at this node.
@@ -165,6 +177,8 @@ objects! {
         name: Option<String> = "Option::is_none",
         /// Primitives.
         primitives: Vec<Primitive>,
+        /// Weights of the morph targets.
+        weights: Vec<f64> = "Vec::is_empty",
         /// Data of this program: the label.
         extras: Value = "Value::is_null",
     }
@@ -176,6 +190,8 @@ objects! {
         indices: Option<usize> = "Option::is_none",
         /// Index of the material.
         material: Option<usize> = "Option::is_none",
+        /// Morph targets: accessors of displacements by attribute name.
+        targets: Vec<std::collections::BTreeMap<String, usize>> = "Vec::is_empty",
         /// Mode: 4 or absent for triangles, 5 for a strip, 6 for a fan.
         mode: Option<u32> = "Option::is_none",
         /// Data of extensions.
@@ -189,6 +205,8 @@ objects! {
         pbr_metallic_roughness: Pbr,
         /// Normal map.
         normal_texture: Option<NormalInfo> = "Option::is_none",
+        /// Emitted light, linear R, G, B; default 0.
+        emissive_factor: Option<[f32; 3]> = "Option::is_none",
         /// Alpha mode: OPAQUE, MASK or BLEND.
         alpha_mode: Option<String> = "Option::is_none",
         /// Alpha threshold of MASK; default ½.
@@ -210,6 +228,17 @@ objects! {
         metallic_factor: Option<f32> = "Option::is_none",
         /// Roughness; default 1. GGX α is its square.
         roughness_factor: Option<f32> = "Option::is_none",
+        /// Texture that multiplies metalness and roughness.
+        metallic_roughness_texture: Option<TextureInfo> = "Option::is_none",
+    }
+    /// `KHR_materials_pbrSpecularGlossiness`, which precedes the metallic-roughness extensions.
+    SpecularGlossiness {
+        /// Linear R, G, B and alpha; default 1.
+        diffuse_factor: Option<[f32; 4]> = "Option::is_none",
+        /// Texture that multiplies it, sRGB.
+        diffuse_texture: Option<TextureInfo> = "Option::is_none",
+        /// One minus the roughness; default 1.
+        glossiness_factor: Option<f32> = "Option::is_none",
     }
     /// `KHR_materials_diffuse_transmission`.
     DiffuseTransmission {
@@ -237,6 +266,8 @@ objects! {
         tex_coord: usize = "is_zero",
         /// Factor on the normals' x and y; default 1.
         scale: Option<f32> = "Option::is_none",
+        /// Data of extensions.
+        extensions: Map<String, Value> = "Map::is_empty",
     }
     /// `KHR_texture_transform`: uv → offset + rotation · scale · uv.
     TextureTransform {
@@ -255,6 +286,8 @@ objects! {
         sampler: Option<usize> = "Option::is_none",
         /// Index of the image.
         source: Option<usize> = "Option::is_none",
+        /// Data of extensions.
+        extensions: Map<String, Value> = "Map::is_empty",
     }
     /// An image.
     Image {
@@ -298,7 +331,25 @@ objects! {
         /// Maximum of each component.
         max: Option<Vec<f32>> = "Option::is_none",
         /// Sparse elements that override those in the buffer view.
-        sparse: Value = "Value::is_null",
+        sparse: Option<Sparse> = "Option::is_none",
+    }
+    /// Elements that override others.
+    Sparse {
+        /// Number of elements.
+        count: usize,
+        /// Their indices.
+        indices: SparseBytes,
+        /// Their values, of the accessor's type.
+        values: SparseBytes,
+    }
+    /// Tightly packed indices or values of sparse elements.
+    SparseBytes {
+        /// Index of the buffer view.
+        buffer_view: usize,
+        /// Offset in the buffer view, bytes.
+        byte_offset: usize = "is_zero",
+        /// Type of the indices.
+        component_type: Option<u32> = "Option::is_none",
     }
     /// Byte range of a buffer.
     BufferView {

@@ -42,6 +42,8 @@ pub struct Model {
     pub files: BTreeMap<PathBuf, [u8; 32]>,
     /// Memory needed by its textures.
     pub pictures: Need,
+    /// Contents of the file that the model lacks, in the order of the file.
+    pub warnings: Vec<String>,
 }
 
 /// Part of a model.

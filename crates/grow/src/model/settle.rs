@@ -1,8 +1,13 @@
 //! Code shared by both formats: validation and normalisation of meshes, and error messages.
 
+use super::notes::Notes;
 use super::parts::MOST_TRIANGLES;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{DMat4, Vec2, Vec3};
+use furrow_optics::texture::Wrap;
+
+/// Largest distance of texture coordinates from an alpha mask, in tiles.
+const FAR_TILES: f32 = 100.0;
 
 /// Clamps to 0..1; NaN becomes 0.
 pub(super) fn fraction(x: f32) -> f32 {
@@ -52,22 +57,35 @@ pub(super) fn faceted(mesh: &mut Mesh) {
     mesh.recompute_normals();
 }
 
-/// Shifts the texture coordinates of an alpha-masked surface with a repeating texture into the one tile that its mask
-/// covers. Returns an error message if they span several tiles.
-pub(super) fn into_one_tile(uvs: &mut [Vec2], name: &str) -> Result<(), String> {
+/// Shifts the texture coordinates of an alpha-masked surface into the one tile that its mask covers, for the wrap modes
+/// of its texture. Returns an error message if they span several tiles. Coordinates beyond the edge of a texture that is
+/// clamped are cut away, which adds a warning.
+pub(super) fn into_one_tile(uvs: &mut [Vec2], wrap: [Wrap; 2], name: &str, notes: &mut Notes) -> Result<(), String> {
     let Some(low) = uvs.iter().copied().reduce(Vec2::min) else { return Ok(()) };
     let high = uvs.iter().copied().fold(low, Vec2::max);
-    // Tolerance of 10⁻³ for writers that round.
-    let tile = (low + 1e-3).floor();
-    if (high - tile).max_element() > 1.001 {
-        return Err(format!(
-            "the texture coordinates of `{name}`, which has an alpha mask, run from {:.2}, {:.2} to {:.2}, {:.2}: they must be within one tile",
-            low.x, low.y, high.x, high.y
-        ));
-    }
-    if tile != Vec2::ZERO {
-        for uv in uvs {
-            *uv -= tile;
+    for (k, wrap) in wrap.into_iter().enumerate() {
+        // Tolerance of 10⁻³ for writers that round.
+        let tile = (low[k] + 1e-3).floor();
+        let inside = high[k] - tile <= 1.001;
+        let near = low[k] >= -FAR_TILES && high[k] <= FAR_TILES;
+        match wrap {
+            Wrap::Clamp if inside && tile == 0.0 => {}
+            Wrap::Clamp if near => {
+                notes.about(
+                    "it is cut away where its texture coordinates are beyond the edge of a clamped picture",
+                    name,
+                );
+            }
+            Wrap::Repeat | Wrap::Mirror if inside && tile == 0.0 => {}
+            Wrap::Repeat if inside => uvs.iter_mut().for_each(|uv| uv[k] -= tile),
+            Wrap::Mirror if inside && tile.rem_euclid(2.0) == 0.0 => uvs.iter_mut().for_each(|uv| uv[k] -= tile),
+            Wrap::Mirror if inside => uvs.iter_mut().for_each(|uv| uv[k] = 1.0 - (uv[k] - tile)),
+            _ => {
+                return Err(format!(
+                    "the texture coordinates of `{name}`, which has an alpha mask, run from {:.2}, {:.2} to {:.2}, {:.2}: they must be within one tile",
+                    low.x, low.y, high.x, high.y
+                ));
+            }
         }
     }
     Ok(())

@@ -43,6 +43,14 @@ impl Default for Surface {
     }
 }
 
+impl Surface {
+    /// Returns the surface with its colours alone.
+    pub fn without_pictures(&self) -> Self {
+        let transmission = self.transmission.clone().map(|sheet| Transmission { picture: None, ..sheet });
+        Self { picture: None, mask: None, relief: None, transmission, ..self.clone() }
+    }
+}
+
 /// Normal map of a surface.
 #[derive(Clone, Debug)]
 pub struct NormalTexture {

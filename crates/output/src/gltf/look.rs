@@ -132,7 +132,11 @@ impl<'a> Looks<'a> {
                         buffer_view: view,
                         uri: None,
                     });
-                    document.textures.push(Texture { sampler: Some(sampler), source: Some(document.images.len() - 1) });
+                    document.textures.push(Texture {
+                        sampler: Some(sampler),
+                        source: Some(document.images.len() - 1),
+                        ..Texture::default()
+                    });
                     document.textures.len() - 1
                 })
             };
@@ -244,6 +248,7 @@ impl Sheet<'_> {
                 metallic_factor: Some(0.0),
                 // glTF's roughness is the square root of α.
                 roughness_factor: Some(swatch.roughness.sqrt()),
+                ..Pbr::default()
             },
             normal_texture: relief.map(|index| NormalInfo {
                 index,

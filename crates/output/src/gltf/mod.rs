@@ -69,6 +69,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
             version: "2.0".into(),
             generator: Some(format!("furrow {}", env!("CARGO_PKG_VERSION"))),
             extras: json!({ "provenance": provenance }),
+            ..Asset::default()
         },
         scene: Some(0),
         scenes: vec![GltfScene { name: Some("field".into()), nodes: vec![0] }],
@@ -136,6 +137,7 @@ fn mesh(part: &Part, material: usize, pack: &mut Pack) -> Mesh {
             ..Primitive::default()
         }],
         extras: json!(label),
+        ..Mesh::default()
     }
 }
 

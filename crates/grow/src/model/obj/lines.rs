@@ -1,0 +1,100 @@
+//! Lines of OBJ and MTL files: text in UTF-8 or ISO 8859-1, with or without a byte order mark, and lines that continue.
+
+use std::borrow::Cow;
+
+/// Returns the text of a file. Bytes that are not UTF-8 are taken for ISO 8859-1, which older Windows programs write.
+/// Returns an error message for UTF-16.
+pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err("its text is UTF-16; save it as UTF-8".into());
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    Ok(match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => {
+            let line = |line: &[u8]| match std::str::from_utf8(line) {
+                Ok(line) => line.to_owned(),
+                Err(_) => line.iter().map(|byte| char::from(*byte)).collect(),
+            };
+            bytes.split(|byte| *byte == b'\n').map(line).collect::<Vec<_>>().join("\n").into()
+        }
+    })
+}
+
+/// A statement: the number of its first line, its keyword, and the rest without surrounding spaces.
+pub(super) struct Statement<'a> {
+    pub(super) line: usize,
+    pub(super) keyword: &'a str,
+    pub(super) rest: Cow<'a, str>,
+}
+
+/// Returns the statements of a text, without comments and empty lines.
+pub(super) fn statements(text: &str) -> impl Iterator<Item = Statement<'_>> {
+    // Files of old Macintosh programs separate lines with carriage returns alone.
+    let separator = if text.contains('\n') { '\n' } else { '\r' };
+    let mut lines = text.split(separator).enumerate();
+    std::iter::from_fn(move || {
+        loop {
+            let (number, line) = lines.next()?;
+            let line = line.trim();
+            let keyword = line.split_whitespace().next().unwrap_or_default();
+            if keyword.is_empty() || keyword.starts_with('#') {
+                continue;
+            }
+            let mut rest = Cow::from(line[keyword.len()..].trim());
+            while let Some(before) = rest.strip_suffix('\\') {
+                let next = lines.next().map_or("", |(_, line)| line.trim());
+                rest = format!("{before} {next}").into();
+            }
+            return Some(Statement { line: number + 1, keyword, rest });
+        }
+    })
+}
+
+impl Statement<'_> {
+    /// Returns an error message about this statement.
+    pub(super) fn wrong(&self, what: &str) -> String {
+        format!("line {}: {what}", self.line)
+    }
+
+    /// Reads a number.
+    pub(super) fn number(&self, word: &str) -> Result<f64, String> {
+        word.parse().map_err(|_| self.wrong(&format!("`{word}` is not a number")))
+    }
+
+    /// Reads the first N numbers; `few` are enough, and the others are then 0.
+    pub(super) fn numbers<const N: usize>(&self, few: usize) -> Result<[f64; N], String> {
+        let mut numbers = [0.0; N];
+        let mut count = 0;
+        for (number, word) in numbers.iter_mut().zip(self.rest.split_whitespace()) {
+            *number = self.number(word)?;
+            count += 1;
+        }
+        if count < few {
+            return Err(self.wrong(&format!("`{}` has {count} of {few} numbers", self.keyword)));
+        }
+        Ok(numbers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_read_in_any_encoding_but_utf_16() {
+        assert_eq!(text(b"\xef\xbb\xbfo a").unwrap(), "o a");
+        assert_eq!(text("o ä".as_bytes()).unwrap(), "o ä");
+        assert_eq!(text(b"o \xe4\no \xc3\xa4").unwrap(), "o ä\no ä");
+        assert!(text(b"\xff\xfeo\0").is_err());
+    }
+
+    #[test]
+    fn statements_continue_over_lines() {
+        let all: Vec<_> = statements("# x\nf 1 2 \\\r\n 3 4\r\n\n v 1")
+            .map(|s| (s.line, s.keyword.to_owned(), s.rest.into_owned()))
+            .collect();
+        assert_eq!(all, [(2, "f".into(), "1 2  3 4".into()), (5, "v".into(), "1".into())]);
+        assert_eq!(statements("v 1\rv 2\\").count(), 2);
+    }
+}

@@ -1,0 +1,167 @@
+//! OBJ and MTL features one by one. Source: the Alias|Wavefront formats, and files as common programs write them.
+
+use super::super::samples::{self, png};
+use super::super::{Model, Up};
+use furrow_base::Result;
+use furrow_base::math::{Vec3, vec2, vec3};
+
+const SQUARE: &str = "mtllib m.mtl\no leaf\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl green\nf 1/1 2/2 3/3 4/4\n";
+const GREEN: &str = "newmtl green\nKd 0.1 0.5 0.1\n";
+
+fn load(obj: &[u8], mtl: &[u8]) -> Result<Model> {
+    // The left half of the picture is transparent, and so is its upper half.
+    let picture = png(2, &[[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [255, 0, 0, 255]]);
+    samples::load(&[("model.obj", obj), ("m.mtl", mtl), ("a picture.png", &picture)], Up::Z)
+}
+
+fn read(obj: &str, mtl: &str) -> Model {
+    load(obj.as_bytes(), mtl.as_bytes()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refused(obj: &str, mtl: &str) -> String {
+    load(obj.as_bytes(), mtl.as_bytes()).unwrap_err().to_string()
+}
+
+fn area(model: &Model) -> f32 {
+    model.parts.iter().map(|part| part.mesh.area()).sum()
+}
+
+#[test]
+fn a_plain_square_has_no_warnings() {
+    let model = read(SQUARE, GREEN);
+    assert_eq!(model.warnings, Vec::<String>::new());
+    assert_eq!((area(&model), model.surfaces[0].color), (1.0, [0.1, 0.5, 0.1]));
+    assert!(model.parts[0].mesh.normals.iter().all(|n| *n == Vec3::Z));
+}
+
+/// Expected: the L has its own area whichever corner comes first; crossed sides give a warning.
+#[test]
+fn concave_faces_are_not_filled() {
+    for first in 0..6 {
+        let corners: Vec<String> = (0..6).map(|k| ((k + first) % 6 + 1).to_string()).collect();
+        let text = format!("v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 3 0\nv 0 3 0\nf {}\n", corners.join(" "));
+        let model = read(&text, "");
+        assert_eq!((area(&model), model.parts[0].mesh.triangles.len()), (4.0, 4), "{first}");
+    }
+    let bow = read("v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 3 0\nf 1 2 3 4\n", "");
+    assert_eq!(bow.warnings, ["faces whose sides cross one another, cut into a fan: `unnamed_object`"]);
+}
+
+/// Expected: byte order marks, ISO 8859-1, carriage returns and continued lines change nothing; UTF-16 is refused.
+#[test]
+fn text_of_other_programs_is_read() {
+    let with_mark = [b"\xef\xbb\xbf", SQUARE.as_bytes()].concat();
+    let latin = [b"# gr\xfcn\n", SQUARE.as_bytes()].concat();
+    let windows = SQUARE.replace('\n', "\r\n").into_bytes();
+    let old = SQUARE.replace('\n', "\r").into_bytes();
+    let continued = SQUARE.replace("f 1/1 2/2", "f 1/1 \\\n 2/2").into_bytes();
+    for obj in [with_mark, latin, windows, old, continued] {
+        let model = load(&obj, &[b"\xef\xbb\xbf", GREEN.as_bytes()].concat()).unwrap();
+        assert_eq!((model.surfaces[0].color, area(&model)), ([0.1, 0.5, 0.1], 1.0));
+    }
+    // A name in ISO 8859-1 in both files is the same name.
+    let name = |text: &str| text.replace("green", "gr\u{fc}n").chars().map(|c| c as u32 as u8).collect::<Vec<u8>>();
+    assert_eq!(load(&name(SQUARE), &name(GREEN)).unwrap().warnings, Vec::<String>::new());
+    assert!(load(b"\xff\xfev\0", b"").unwrap_err().to_string().contains("UTF-16"));
+}
+
+#[test]
+fn missing_materials_and_coordinates_are_told() {
+    let white = read(&SQUARE.replace("usemtl green", "usemtl blue"), GREEN);
+    assert_eq!(white.warnings, ["materials that its MTL files lack, replaced by white: `blue`"]);
+    let pictured = format!("{GREEN}map_Kd a picture.png\n");
+    assert!(read(SQUARE, &pictured).surfaces[0].mask.is_some());
+    let bare = read(&SQUARE.replace("f 1/1 2/2 3/3 4/4", "f 1 2 3 4"), &pictured);
+    assert_eq!(bare.warnings, ["no texture coordinates, so the pictures of its material are passed over: `leaf`"]);
+    let surface = &bare.surfaces[bare.parts[0].surface];
+    assert!(surface.mask.is_none() && surface.picture.is_none() && surface.color == [0.1, 0.5, 0.1]);
+}
+
+#[test]
+fn faint_materials_are_left_out_with_a_warning() {
+    let both = SQUARE.to_owned() + "usemtl stem\nf 1 2 3\n";
+    for opacity in ["d 0.498", "Tr 0.6", "d 0.4\nTr 0.1"] {
+        let mtl = format!("{GREEN}{opacity}\nnewmtl stem\nd 0.9\n");
+        let model = read(&both, &mtl);
+        assert_eq!(area(&model), 0.5, "{opacity}");
+        assert_eq!(model.warnings, ["left out: materials whose opacity `d` is below ½: `green`"]);
+    }
+    assert!(refused(SQUARE, &format!("{GREEN}d 0.2\n")).contains("no triangles; left out: materials"));
+    assert_eq!(read(SQUARE, &format!("{GREEN}Tr 0.1\nd 1\n")).warnings, Vec::<String>::new());
+}
+
+/// Expected: u′ = 2u + 0.25, v′ = 3v + 0.5 with v upwards; a clamped picture; other options give a warning or an error.
+#[test]
+fn options_of_pictures_are_read() {
+    let with = |options: &str| format!("{GREEN}map_Kd {options} a picture.png\n");
+    let opaque = format!("{GREEN}map_Ks a picture.png\nbump -bm 0.2 a picture.png\n");
+    assert_eq!(read(SQUARE, &opaque).warnings, ["passed over: `bump` of the MTL file: `green`"]);
+    let laid = read(SQUARE, &with("-s 0.5 0.5 1 -o 0.25 0.5 -blendu on"));
+    let mesh = &laid.parts[0].mesh;
+    let at = |uv| mesh.uvs.iter().position(|t| *t == uv).map(|k| mesh.positions[k]);
+    assert_eq!(at(vec2(0.25, 0.5)), Some(vec3(0.0, 0.0, 0.0)));
+    assert_eq!(at(vec2(0.75, 0.0)), Some(vec3(1.0, 1.0, 0.0)));
+    let told = read(SQUARE, &with("-mm 0 0.5 -imfchan l -clamp on"));
+    assert_eq!(told.warnings.len(), 2, "{:?}", told.warnings);
+    assert!(refused(SQUARE, &with("-huge 2")).contains("line 3: the option -huge of a picture is unknown"));
+    assert!(refused(SQUARE, &format!("{GREEN}map_Kd -s 1 1 1\n")).contains("a file `1`"));
+    let grey = read(SQUARE, "newmtl green\nKd 0.25\nPr 0.5\n");
+    assert_eq!((grey.surfaces[0].color, grey.surfaces[0].roughness), ([0.25; 3], Some(0.25)));
+}
+
+/// Expected: two faces that meet at a right angle share a normal in one smoothing group, and not without.
+#[test]
+fn smoothing_groups_average_normals() {
+    let fold = |group: &str| {
+        let text = format!("v 0 0 0\nv 0 1 0\nv -1 0 0\nv 0 0 -1\ns {group}\nf 1 2 3\nf 2 1 4\n");
+        read(&text, "").parts[0].mesh.normals.clone()
+    };
+    let flat = fold("off");
+    assert!(flat.iter().all(|n| n.abs().max_element() > 0.999), "{flat:?}");
+    let smooth = fold("1");
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let shared = smooth.iter().filter(|n| (n.abs() - vec3(half, 0.0, half)).length() < 1e-6).count();
+    assert_eq!((shared, smooth.len()), (2, 4), "{smooth:?}");
+}
+
+/// Rationale: coordinates of a national grid lose their shape in single precision before anything is computed.
+#[test]
+fn large_coordinates_keep_their_shape() {
+    let text: String = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2)]
+        .iter()
+        .map(|(x, y)| format!("v {:.3} {:.3} 312.125\n", 612_345.25 + x, 5_412_345.5 + y))
+        .collect();
+    let model = read(&(text + "f -4 -3 -2 -1\n"), "");
+    let (lo, hi) = model.parts[0].mesh.bounds().unwrap();
+    assert!((lo - vec3(-0.15, -0.1, 0.0)).length() < 1e-6 && (hi - vec3(0.15, 0.1, 0.0)).length() < 1e-6, "{lo} {hi}");
+    assert!(model.warnings[0].contains("far from the origin"), "{:?}", model.warnings);
+}
+
+#[test]
+fn what_is_passed_over_or_broken_is_named() {
+    let more = "v 2 2 2 1 0 0\nl 1 2\nf 1 2\ncstype bezier\ncurv 0 1\n";
+    assert_eq!(
+        read(&(SQUARE.to_owned() + more), GREEN).warnings,
+        [
+            "passed over: colours of vertices",
+            "passed over: points and lines",
+            "passed over: faces with fewer than three corners: `leaf`",
+            "passed over: statements of the OBJ file: `cstype`, `curv`",
+        ]
+    );
+    for (text, words) in [
+        ("v 0 0\n", "line 1: `v` has 2 of 3 numbers"),
+        ("v 0 0 x\n", "line 1: `x` is not a number"),
+        ("v 0 0 0\nf 1 1 -2\n", "line 2: the corner `-2` refers to a missing element"),
+        ("v 0 0 0\nf 1 1 0\n", "line 2: the corner `0` refers to a missing element"),
+        ("v 0 0 0\nf 1 1 2\n", "line 2: a corner of the face refers to a missing element"),
+        ("v 0 0 0\nf 1 1 a/1\n", "line 2: the corner `a/1` is not"),
+        ("v 0 0 0\nf 1/4 1/4 1/4\n", "line 2: a corner of the face refers to a missing element"),
+    ] {
+        let shown = refused(text, "");
+        assert!(shown.contains(words), "{shown}");
+    }
+    assert!(
+        refused(SQUARE, "newmtl green\nKd 0.1 0.2\n").contains("its materials m.mtl: line 2: `Kd` has 2 of 3 numbers")
+    );
+}
