@@ -4,7 +4,7 @@
 //! be valid poses. Sources: the formats of TUM RGB-D (Sturm et al. 2012) and of EuRoC MAV (Burri et al. 2016).
 
 use furrow_base::math::{Mat3, Quat, vec3};
-use furrow_base::{Error, Result};
+use furrow_base::{Error, Result, input};
 use furrow_optics::sensor::Pose;
 use std::borrow::Cow;
 
@@ -47,6 +47,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<(f64, Pose)>> {
             }
             continue;
         }
+        if text.contains(';') {
+            return Err(Error::input(format!("line {line} has a semicolon"))
+                .help("separate columns by blanks or commas, and write decimals with a point"));
+        }
         // The first line of a table names its columns.
         if !std::mem::replace(&mut begun, true) && words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_err()) {
             let names = names(text);
@@ -84,14 +88,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<(f64, Pose)>> {
     Ok(all)
 }
 
-/// Returns the text of the file without the byte order mark that some programs write.
+/// Returns the text of the file without the byte order mark that some programs write. Comments may be in any encoding.
 fn text(bytes: &[u8]) -> Result<Cow<'_, str>> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    // In UTF-16, every digit has a zero byte.
-    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") || bytes.contains(&0) {
+    if input::wide(bytes).is_some() || bytes.contains(&0) {
         return Err(Error::input("this is not UTF-8 text").help("save the file as UTF-8; some programs write UTF-16"));
     }
-    Ok(String::from_utf8_lossy(bytes))
+    Ok(String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)))
 }
 
 /// Splits a line at blanks and commas.
@@ -309,6 +311,8 @@ mod tests {
         for (text, words) in [
             ("0 0 0 1 1 0 0 0\nx", "line 2 contains a word"),
             ("0 0 0 1", "line 1 has 4 numbers"),
+            ("0;0,1;0;1;1;0;0;0", "line 1 has a semicolon"),
+            ("time;x;y\n0;0;0", "write decimals with a point"),
             ("0 0 0 1 1 0 0 0 0", "line 1 has more than 8 numbers"),
             ("0 0 0 1 0 0 0 0", "no quaternion"),
             ("1 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0", "line 2 is not later"),

@@ -6,9 +6,11 @@
 mod guard;
 mod scope;
 pub mod shipped;
+mod text;
 
 pub use guard::{caught, guarded};
 pub use scope::{Outside, Scope, tidy};
+pub use text::{read_text, utf8, wide};
 
 use crate::{Error, Result};
 use std::fmt;

@@ -55,6 +55,9 @@ impl RonFile {
             }
             Err(other) => return Err(other.into_error(path)),
         };
+        if let Some(encoding) = input::wide(&bytes) {
+            return refuse(&format!("this is {encoding} text, not UTF-8"), "save the file as UTF-8");
+        }
         // Some editors write a byte order mark at the start of a file.
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         if bytes.contains(&0) {

@@ -169,6 +169,12 @@ fn cells(start: usize, line: &str) -> Vec<Cell<'_>> {
 fn head(page: &RonFile, cells: &[Cell<'_>]) -> Result<Vec<(&'static str, &'static str)>> {
     let names: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let mut heads: Vec<(&'static str, &'static str)> = Vec::new();
+    if let [only] = cells
+        && only.text.contains([';', '\t'])
+    {
+        let help = "save the table as CSV with commas between cells and points in decimals";
+        return Err(page.about_bytes(only.at.clone(), "this table separates its cells by semicolons or tabs", help));
+    }
     for cell in cells {
         let Some(column) = COLUMNS.iter().find(|(name, _)| *name == cell.text) else {
             let message = format!("no column is called `{}`", cell.text);
@@ -191,7 +197,12 @@ fn row<'t>(page: &RonFile, heads: &[(&'static str, &'static str)], cells: &[Cell
     let line = cells.first().map_or(0, |c| c.at.start)..cells.last().map_or(0, |c| c.at.end);
     if cells.len() != heads.len() {
         let message = format!("{} cells, but the first line names {} columns", cells.len(), heads.len());
-        return Err(page.about_bytes(line, message, "separate all cells by commas, empty ones too"));
+        let help = if cells.len() < heads.len() {
+            "separate all cells by commas, empty ones too"
+        } else {
+            "a comma ends a cell; decimals are written with a point: 5.5"
+        };
+        return Err(page.about_bytes(line, message, help));
     }
     let named = |name: &str| heads.iter().zip(cells).find(|((head, _), _)| *head == name).map(|(_, cell)| cell);
     let whole = |name: &str, what: &str| {
@@ -292,6 +303,8 @@ mod tests {
             (format!("{HEAD}{first}1,12,,,6..,7,1,\n"), 3, 8, "`6..` is not a valid blade_mm"),
             (format!("{HEAD}{first}1,13,,,6,7,1,\n"), 3, 3, "no stage of BBCH 13"),
             (format!("{HEAD}{first}1,12,,,6,7,1\n"), 3, 1, "7 cells"),
+            (format!("{HEAD}{first}1,12,,,6,5,7,1,\n"), 3, 1, "9 cells"),
+            ("leaf;stage;kind\n1;10;a\n".to_owned(), 1, 1, "semicolons or tabs"),
             (format!("{HEAD}{first}2,12,leaf,,,7,1,50\n"), 3, 1, "leaf 2 has no blade_mm yet"),
             (format!("{HEAD}{first}{first}"), 3, 1, "is also in line 2"),
             (format!("{HEAD}2,10,seed,2,5,3,1,70\n1,12,leaf,1,5,3,1,70\n"), 3, 1, "comes later than leaf 2"),
