@@ -395,7 +395,7 @@ fn what_cannot_be_compared_is_refused_and_nothing_is_written() {
         (&["many", "empty"], "there is no PNG or JPEG in this folder"),
         (&["twice", "many"], "are both called x"),
         (&["large.png", "cut.png"], "cut.png"),
-        (&["large.png", "text.png"], "this image cannot be read"),
+        (&["large.png", "text.png"], "this is not an image"),
         (&["render", "render", "--labels", "seven.png"], "no class has the number 7"),
         (&["render", "render", "--labels", "small.png"], "it has 2 × 2 pixels, its image 64 × 48"),
         (&["render", "render", "--labels", "large.png"], "it has 80 × 48 pixels"),

@@ -514,8 +514,8 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     refuse(&at("none"), &[&photos], &[], &["there is no trained network in this folder", "train fit --out DIR"]);
     refuse(&RGB, &[&at("nothing.png")], &[], &["nothing.png: there is no such image", "DIR@PICK"]);
     refuse(&RGB, &[&at("empty")], &[], &["empty: there is no image in this folder"]);
-    refuse(&RGB, &[&at("cut.png")], &[], &["cut.png: this image cannot be read"]);
-    refuse(&RGB, &[&at("words.png")], &[], &["words.png: this image cannot be read"]);
+    refuse(&RGB, &[&at("cut.png")], &[], &["cut.png: the image ends too early"]);
+    refuse(&RGB, &[&at("words.png")], &[], &["words.png: this is not an image"]);
     refuse(&RGB, &[&at("gray.png")], &[], &["gray.png: this picture is gray", "red, green and blue"]);
     refuse(&RGB, &[&photos, &at("more")], &[], &["photos/small.png and", "more/small.png would both become small.png"]);
     refuse(&RGB, &[&photos], &["--band", "nir=x"], &["the network does not see the band `nir`", "red, green, blue"]);

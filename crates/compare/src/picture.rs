@@ -71,5 +71,10 @@ pub(super) fn same_size(path: &Path, (w, h): (u32, u32), (width, height): (u32, 
     if (w, h) == (width, height) {
         return Ok(());
     }
-    Err(Error::input(format!("it has {w} × {h} pixels, its image {width} × {height}")).in_file(path))
+    let help = if (w, h) == (height, width) {
+        "width and height are exchanged: an image is turned by its EXIF orientation, a label map is not; turn this file"
+    } else {
+        ""
+    };
+    Err(Error::input(format!("it has {w} × {h} pixels, its image {width} × {height}")).help(help).in_file(path))
 }

@@ -35,8 +35,8 @@ pub use furrow_base::atomic_file::{
 };
 pub use lock::Lock;
 pub use photo::{
-    ENDINGS, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, photo_size, read_color_photo,
-    read_gray_photo, read_photo, resize_gray, shrink, shrunk,
+    ENDINGS, Photo, decode_gray_jpeg, decode_jpeg, encode_gray_jpeg, encode_jpeg, open_gray_photo, open_photo,
+    photo_size, read_color_photo, read_gray_photo, read_photo, resize_gray, shrink, shrunk,
 };
 
 /// Samples per pixel of an image.

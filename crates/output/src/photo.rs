@@ -2,92 +2,76 @@
 
 use furrow_base::input;
 use furrow_base::{Error, Result};
+use furrow_optics::texture::picture::{self, CUT_SHORT, Picture, is_cut_short, over_white};
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
-use image::{
-    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult, RgbImage, imageops,
-};
-use std::fs::File;
-use std::io::{BufReader, Cursor, ErrorKind};
+use image::{DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageResult, RgbImage, imageops};
+use std::io::Cursor;
 use std::path::Path;
 
 /// File name extensions of the images that are written.
 pub const ENDINGS: [&str; 2] = ["png", "jpg"];
 
-/// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB: width, height, pixels.
-pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-    let photo = decode(path)?.into_rgb8();
-    let (w, h) = photo.dimensions();
-    Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
+/// A photograph as viewers show it: turned by its EXIF orientation, over white where it is transparent.
+#[derive(Clone, Debug)]
+pub struct Photo<T> {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Its pixels, row by row.
+    pub pixels: Vec<T>,
+    /// EXIF orientation, 1 to 8; 1 if the file is stored as it is shown.
+    pub orientation: u8,
+    /// Width and height as stored.
+    pub stored_size: (u32, u32),
+    /// Number of pixels that are transparent in the file.
+    pub transparent: u64,
 }
 
-/// Like [`read_photo`]. Returns an error for a grey image, in which colours cannot be distinguished, and for a
-/// truncated JPEG, which decoders fill with grey.
+/// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB.
+pub fn open_photo(path: &Path) -> Result<Photo<[u8; 3]>> {
+    let rgb = |pixels: DynamicImage| pixels.into_rgb8().into_raw().as_chunks::<3>().0.to_vec();
+    Ok(photo_of(picture::read(path, u32::MAX)?, rgb))
+}
+
+/// Reads a PNG or JPEG photograph of any depth as 8-bit gray.
+pub fn open_gray_photo(path: &Path) -> Result<Photo<u8>> {
+    Ok(photo_of(picture::read(path, u32::MAX)?, |pixels| pixels.into_luma8().into_raw()))
+}
+
+fn photo_of<T>(picture: Picture, values: impl FnOnce(DynamicImage) -> Vec<T>) -> Photo<T> {
+    let (orientation, stored_size) = (picture.orientation, picture.stored_size());
+    let (flat, transparent) = over_white(picture.pixels);
+    let size = (flat.width(), flat.height());
+    Photo { size, pixels: values(flat), orientation, stored_size, transparent }
+}
+
+/// Reads a photograph like [`open_photo`]: width, height, pixels.
+pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
+    let photo = open_photo(path)?;
+    Ok((photo.size.0, photo.size.1, photo.pixels))
+}
+
+/// Like [`read_photo`]. Returns an error for a grey image, in which colours cannot be distinguished.
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-    // Rejects pipes, on which reading would block forever.
-    let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
-    if is_cut_short(&bytes) {
-        return Err(Error::input(CUT_SHORT).help("copy it from the camera again").in_file(path));
-    }
-    let photo = decode(path)?;
-    if !photo.color().has_color() {
+    let picture = picture::read(path, u32::MAX)?;
+    if !picture.pixels.color().has_color() {
         return Err(Error::input("this picture is gray, but colour is required")
             .help("give photographs in red, green and blue")
             .in_file(path));
     }
-    let photo = photo.into_rgba8();
+    let photo = over_white(picture.pixels).0.into_rgb8();
     let (w, h) = photo.dimensions();
-    // The hidden colour of a transparent pixel is not part of the image: the image is composited over white.
-    let over_white = |[r, g, b, a]: &[u8; 4]| {
-        [r, g, b].map(|c| ((u32::from(*c) * u32::from(*a) + 255 * (255 - u32::from(*a)) + 127) / 255) as u8)
-    };
-    Ok((w, h, photo.as_raw().as_chunks::<4>().0.iter().map(over_white).collect()))
+    Ok((w, h, photo.into_raw().as_chunks::<3>().0.to_vec()))
 }
 
-const CUT_SHORT: &str = "this JPEG is cut short: its end is missing";
-
-/// Returns `true` for a JPEG without an end marker after the header of its first scan. Earlier segments are skipped;
-/// they may contain a thumbnail with an end marker of its own. Source: ITU-T T.81, annex B.
-fn is_cut_short(bytes: &[u8]) -> bool {
-    const SCAN: u8 = 0xda;
-    if !bytes.starts_with(&[0xff, 0xd8]) {
-        return false;
-    }
-    let mut at = 2;
-    while let Some([0xff, marker, high, low]) = bytes.get(at..at + 4) {
-        at += 2 + usize::from(u16::from_be_bytes([*high, *low]));
-        if *marker == SCAN {
-            return !bytes.get(at..).is_some_and(|scan| scan.windows(2).any(|pair| pair == [0xff, 0xd9]));
-        }
-    }
-    true
-}
-
-/// Returns width and height of a PNG or JPEG photograph, from its header.
+/// Returns width and height of a PNG or JPEG photograph as it is shown, from its header.
 pub fn photo_size(path: &Path) -> Result<(u32, u32)> {
-    open(path)?.into_dimensions().map_err(|e| unreadable(path, e))
+    picture::size(path)
 }
 
-/// Reads a photograph as 8-bit gray: width, height, values.
+/// Reads a photograph like [`open_gray_photo`]: width, height, values.
 pub fn read_gray_photo(path: &Path) -> Result<(u32, u32, Vec<u8>)> {
-    let photo = decode(path)?.into_luma8();
-    let (w, h) = photo.dimensions();
-    Ok((w, h, photo.into_raw()))
-}
-
-fn decode(path: &Path) -> Result<DynamicImage> {
-    open(path)?.decode().map_err(|e| unreadable(path, e))
-}
-
-fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
-    let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
-    ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(Error::reading(path))
-}
-
-fn unreadable(path: &Path, error: ImageError) -> Error {
-    match error {
-        ImageError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => Error::reading(path)(source),
-        e => Error::input(format!("this image cannot be read: {e}; supported formats are PNG and JPEG")).in_file(path),
-    }
+    let photo = open_gray_photo(path)?;
+    Ok((photo.size.0, photo.size.1, photo.pixels))
 }
 
 /// Downscales an 8-bit sRGB image to at most `most` pixels in width and height, with the same aspect ratio: width,
@@ -165,6 +149,10 @@ pub fn decode_gray_jpeg(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u8>)
 const PIXELS_A_BYTE: u64 = 1024;
 
 fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
+    input::guarded(path, || plausible_jpeg(path, bytes))
+}
+
+fn plausible_jpeg(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let wrong = |what: String| Error::input(what).in_file(path);
     if is_cut_short(bytes) {
         return Err(wrong(CUT_SHORT.into()));
@@ -194,6 +182,25 @@ mod tests {
         assert!(!is_cut_short(&whole) && !is_cut_short(b"\x89PNG\r\n"));
         for length in [whole.len() - 2, whole.len() / 2, 40, 3] {
             assert!(is_cut_short(&whole[..length]), "{length}");
+        }
+    }
+
+    /// Expected: a transparent pixel is white in colour and in gray; a cut JPEG is an error that names the file.
+    #[test]
+    fn photographs_are_read_as_they_are_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let clear = image::RgbaImage::from_raw(2, 1, vec![10, 20, 30, 255, 0, 0, 0, 0]).unwrap();
+        clear.save(&path).unwrap();
+        let photo = open_photo(&path).unwrap();
+        assert_eq!((photo.pixels, photo.transparent, photo.orientation), (vec![[10, 20, 30], [255; 3]], 1, 1));
+        assert_eq!(open_gray_photo(&path).unwrap().pixels[1], 255);
+        let path = folder.path().join("b.jpg");
+        let whole = encode_jpeg(64, 48, &[[90, 140, 60]; 64 * 48], 90).unwrap();
+        std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        for error in [read_photo(&path).err(), read_gray_photo(&path).err(), read_color_photo(&path).err()] {
+            let shown = error.unwrap().to_string();
+            assert!(shown.contains("b.jpg: this JPEG is cut short"), "{shown}");
         }
     }
 

@@ -106,6 +106,10 @@ type Decoded = (u32, u32, bool, Vec<u8>);
 
 /// Decodes an image of one of these kinds; `what` names them in errors.
 fn decode_any(path: &Path, bytes: &[u8], kinds: &[(BitDepth, ColorType)], what: &str) -> Result<Decoded> {
+    input::guarded(path, || decode_kinds(path, bytes, kinds, what))
+}
+
+fn decode_kinds(path: &Path, bytes: &[u8], kinds: &[(BitDepth, ColorType)], what: &str) -> Result<Decoded> {
     let wrong = |e: &dyn std::fmt::Display| Error::input(e.to_string()).in_file(path);
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
@@ -227,6 +231,10 @@ impl Map {
 /// Reads a PNG whose numbers or colours encode labels, without conversion: width, height, pixels. A colour image that
 /// is gray everywhere is read as numbers.
 pub fn read_map(path: &Path) -> Result<(u32, u32, Map)> {
+    input::guarded(path, || map_of(path))
+}
+
+fn map_of(path: &Path) -> Result<(u32, u32, Map)> {
     let wrong = |what: String| Error::input(what).in_file(path);
     let file = input::open(path).map_err(|refusal| refusal.into_error(path))?;
     let bytes = file.metadata().map_err(Error::reading(path))?.len();

@@ -5,7 +5,8 @@
 //! height map peaks at 39 bytes per pixel, the estimate is 40. Four colour images of a model of that size take 7.4
 //! each, the estimate is 7.7.
 
-use super::{MAX_BYTES, exr_size, reader, rgbe};
+use super::picture::{MAX_BYTES, reader};
+use super::{MAX_SIZE, exr_size, rgbe};
 use furrow_base::input;
 use image::ImageDecoder;
 use std::io::{BufRead, BufReader, Cursor, Seek};
@@ -115,10 +116,13 @@ impl Header {
     }
 
     fn read(source: impl BufRead + Seek) -> Option<Self> {
-        let decoder = reader(source).ok()?.into_decoder().ok()?;
-        let (width, height) = decoder.dimensions();
-        let bytes = decoder.color_type().bytes_per_pixel();
-        (decoder.total_bytes() <= MAX_BYTES).then_some(Self { width, height, bytes })
+        let of = || {
+            let decoder = reader(source, MAX_SIZE).ok()?.into_decoder().ok()?;
+            let (width, height) = decoder.dimensions();
+            let bytes = decoder.color_type().bytes_per_pixel();
+            (decoder.total_bytes() <= MAX_BYTES).then_some(Self { width, height, bytes })
+        };
+        input::caught(of).ok().flatten()
     }
 
     /// Returns the number of pixels.
