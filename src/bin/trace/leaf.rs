@@ -14,7 +14,7 @@ pub(crate) struct Args {
     /// Output image, a PNG with alpha channel: the blade upright, its base at the bottom.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// The base is at the wider end. Default: at the narrower end, with the petiole.
+    /// The base is at the other end. Default: where the petiole is; if none is seen, at the narrower end.
     #[arg(long)]
     flip: bool,
     /// Keep the petiole. Default: it is cut off, because plants of a species file have petioles of their own.
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let grey = args.grey.map(|g| ([g.x0, g.y0, g.width(), g.height()], args.reflectance));
     let cutting = Cutting { flip: args.flip, stalk: args.stalk, holes: args.holes, height: args.height, grey };
     let leaf = cut_out(width, height, &rgb, &cutting).map_err(|e| e.in_file(&args.photo))?;
-    for doubt in doubts(width, height, &rgb) {
+    for doubt in doubts(width, height, &rgb, args.flip) {
         furrow_cli::tell!("warning: {}: {doubt}", args.photo.display());
     }
     furrow_cli::tell!("{} × {} pixels; the blade's width/length is {:.2}", leaf.width, leaf.height, aspect(&leaf));

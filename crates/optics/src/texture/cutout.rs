@@ -1,11 +1,14 @@
 //! Extraction of a leaf from a photograph on paper or soil, in any orientation.
 //!
 //! Green is separated from the background by the excess green of chromaticities, 2g − r − b (Woebbecke et al. 1995),
-//! with the threshold of Otsu 1979. The largest connected component is the leaf. The image is rotated so that its long
-//! axis, from the second moments, is upright. As species files expect, the narrower end, with the petiole, is at the
-//! bottom and the leaf's foot is in the middle column.
+//! with the threshold of Otsu 1979. The largest connected component is the leaf. The image is rotated so that the leaf is
+//! upright, with its base at the bottom and its foot in the middle column, as species files expect. The petiole shows
+//! where the base is. Without one, the narrower end is the base, on the long axis from the second moments, or on the
+//! axis of symmetry if the leaf is about as wide as long.
 
 use super::draw::Drawn;
+use super::grid::{flood, middle};
+use super::petiole::{self, Petiole};
 use super::srgb::{ColorSpace, decode};
 use furrow_base::error::{Error, Result};
 use furrow_base::math::{Vec2, vec2};
@@ -14,15 +17,18 @@ use furrow_base::math::{Vec2, vec2};
 const LEAST: f64 = 0.002;
 /// Fraction of the leaf's length at each end whose pixel counts distinguish the petiole from the tip.
 const END: f32 = 0.12;
-/// Largest width of a petiole relative to the blade.
-const STALK: f64 = 0.2;
+/// Ratio of the standard deviations along and across the long axis below which a leaf is about as wide as long.
+const ROUND: f32 = 1.2;
+/// Cosine of the angle between the long axis and the direction from the petiole to the blade's centre above which they
+/// are the same axis.
+const ALONG: f32 = 0.87;
 /// Padding around the leaf, relative to its length.
 const ROOM: f32 = 0.02;
 
 /// Options for extracting a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cutting {
-    /// Whether the base is at the wider end.
+    /// Whether the base is at the other end than the one found.
     pub flip: bool,
     /// Whether the petiole is kept. A species file generates its own petiole, so its textures show the blade alone.
     pub stalk: bool,
@@ -41,8 +47,9 @@ const ANOTHER: f64 = 0.15;
 /// Fraction of a leaf's pixels on the photograph's border above which the leaf is reported as cut off.
 const CUT: f64 = 0.002;
 
-/// Returns warnings about a photograph, one sentence each, for problems that `cut_out` does not return as errors.
-pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]]) -> Vec<String> {
+/// Returns warnings about a photograph, one sentence each, for problems that `cut_out` does not return as errors. `flip`
+/// is that of [`Cutting`].
+pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]], flip: bool) -> Vec<String> {
     let (width, height) = (width as usize, height as usize);
     let mut green = green(rgb);
     let first = largest(&green, width, height);
@@ -59,6 +66,9 @@ pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]]) -> Vec<String> {
             "the leaf reaches the photograph's border, so a part of it is missing: leave room around it".to_owned(),
         );
     }
+    if !flip && petiole::find(rgb, &first, width, height).is_none() {
+        all.push("no petiole is seen: the narrower end is taken as the base; if it is the tip, give --flip".to_owned());
+    }
     all
 }
 
@@ -74,10 +84,19 @@ pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> R
         fill(&mut leaf, width as usize, height as usize);
     }
     let gain = gain(width, height, rgb, cutting)?;
-    let mut stance = Stance::of(&leaf, width as usize, cutting.flip);
-    if !cutting.stalk {
-        stance = stance.above_stalk(&mut leaf, width as usize);
+    let petiole = petiole::find(rgb, &leaf, width as usize, height as usize);
+    for i in petiole.iter().flat_map(|petiole| &petiole.pixels) {
+        leaf[*i] = false;
     }
+    let up = upward(&leaf, width as usize, petiole.as_ref(), cutting.flip);
+    let mut foot = petiole.as_ref().map(|petiole| petiole.foot);
+    if cutting.stalk {
+        for i in petiole.iter().flat_map(|petiole| &petiole.pixels) {
+            leaf[*i] = true;
+        }
+        foot = None;
+    }
+    let stance = Stance::of(&leaf, width as usize, up, foot);
     let leaf = leaf;
     let there = |x: i64, y: i64| {
         (0..i64::from(width)).contains(&x)
@@ -212,27 +231,6 @@ fn largest(of: &[bool], width: usize, height: usize) -> Vec<bool> {
     piece.into_iter().map(|n| n == best && n > 0).collect()
 }
 
-/// Flood fill: visits the pixels accepted by `enter`, from `start` over shared sides, and returns their number.
-fn flood(start: usize, width: usize, height: usize, mut enter: impl FnMut(usize) -> bool) -> usize {
-    let mut open = Vec::new();
-    if enter(start) {
-        open.push(start);
-    }
-    let mut count = 0;
-    while let Some(i) = open.pop() {
-        count += 1;
-        let (x, y) = (i % width, i / width);
-        let beside = [
-            (x > 0, i.wrapping_sub(1)),
-            (x + 1 < width, i + 1),
-            (y > 0, i.wrapping_sub(width)),
-            (y + 1 < height, i + width),
-        ];
-        open.extend(beside.into_iter().filter(|(inside, _)| *inside).map(|(_, n)| n).filter(|n| enter(*n)));
-    }
-    count
-}
-
 /// Fills holes: everything not connected to the image border.
 fn fill(leaf: &mut [bool], width: usize, height: usize) {
     let mut outside = vec![false; leaf.len()];
@@ -259,72 +257,84 @@ struct Stance {
     reach: f32,
 }
 
-impl Stance {
-    fn of(leaf: &[bool], width: usize, flip: bool) -> Self {
-        let points = || leaf.iter().enumerate().filter(|(_, in_it)| **in_it).map(|(i, _)| middle(i, width));
-        let count = points().count().max(1) as f64;
-        let (sx, sy) = points().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p.x), y + f64::from(p.y)));
-        let centre = vec2((sx / count) as f32, (sy / count) as f32);
-        let (mut xx, mut xy, mut yy) = (0.0_f64, 0.0, 0.0);
-        for p in points() {
-            let d = p - centre;
-            xx += f64::from(d.x * d.x);
-            xy += f64::from(d.x * d.y);
-            yy += f64::from(d.y * d.y);
+/// Returns the unit vector from the base to the tip of a blade without its petiole.
+fn upward(blade: &[bool], width: usize, petiole: Option<&Petiole>, flip: bool) -> Vec2 {
+    let points = || blade.iter().enumerate().filter(|(_, in_it)| **in_it).map(|(i, _)| middle(i, width));
+    let count = points().count().max(1) as f64;
+    let (sx, sy) = points().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p.x), y + f64::from(p.y)));
+    let centre = vec2((sx / count) as f32, (sy / count) as f32);
+    let (mut xx, mut xy, mut yy) = (0.0_f64, 0.0, 0.0);
+    for p in points() {
+        let d = p - centre;
+        xx += f64::from(d.x * d.x);
+        xy += f64::from(d.x * d.y);
+        yy += f64::from(d.y * d.y);
+    }
+    let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+    let mut axis = vec2(angle.cos() as f32, angle.sin() as f32);
+    if let Some(petiole) = petiole {
+        let ahead = (centre - petiole.foot).normalize_or(axis);
+        let along = axis.dot(ahead);
+        let up = if along.abs() > ALONG { axis * along.signum() } else { ahead };
+        return if flip { -up } else { up };
+    }
+    let apart = (4.0 * xy * xy + (xx - yy) * (xx - yy)).sqrt();
+    let ratio = ((xx + yy + apart) / (xx + yy - apart).max(1.0)).sqrt() as f32;
+    if ratio < ROUND {
+        axis = symmetry(blade, width, centre);
+    }
+    let (lo, hi) = points().fold((f32::MAX, f32::MIN), |(lo, hi), p| {
+        let t = (p - centre).dot(axis);
+        (lo.min(t), hi.max(t))
+    });
+    let length = hi - lo + 1.0;
+    let (low, high) = points().fold((0_u64, 0_u64), |(low, high), p| {
+        let t = (p - centre).dot(axis);
+        (low + u64::from(t < lo + END * length), high + u64::from(t > hi - END * length))
+    });
+    if (low <= high) == flip { -axis } else { axis }
+}
+
+/// Returns the direction through `centre` about which a leaf is most nearly its own mirror image.
+fn symmetry(leaf: &[bool], width: usize, centre: Vec2) -> Vec2 {
+    const POINTS: usize = 4000;
+    const ANGLES: u32 = 90;
+    let inside: Vec<usize> = (0..leaf.len()).filter(|i| leaf[*i]).collect();
+    let some: Vec<Vec2> =
+        inside.iter().step_by(inside.len() / POINTS + 1).map(|i| middle(*i, width) - centre).collect();
+    let height = leaf.len() / width;
+    let has = |p: Vec2| {
+        p.x >= 0.0 && p.y >= 0.0 && (p.x as usize) < width && (p.y as usize) < height && {
+            leaf[p.y as usize * width + p.x as usize]
         }
-        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-        let axis = vec2(angle.cos() as f32, angle.sin() as f32);
-        let (lo, hi) = points().fold((f32::MAX, f32::MIN), |(lo, hi), p| {
-            let t = (p - centre).dot(axis);
-            (lo.min(t), hi.max(t))
-        });
-        let length = hi - lo + 1.0;
-        // The end with fewer pixels is the petiole.
-        let (low, high) = points().fold((0_u64, 0_u64), |(low, high), p| {
-            let t = (p - centre).dot(axis);
-            (low + u64::from(t < lo + END * length), high + u64::from(t > hi - END * length))
-        });
-        let up = if (low <= high) == flip { -axis } else { axis };
-        let end = points().map(|p| (p - centre).dot(up)).fold(f32::MAX, f32::min);
+    };
+    let direction = |k: u32| Vec2::from_angle(k as f32 * std::f32::consts::PI / ANGLES as f32);
+    let alike = |k: &u32| {
+        let axis = direction(*k);
+        some.iter().filter(|d| has(centre + 2.0 * d.dot(axis) * axis - **d)).count()
+    };
+    direction((0..ANGLES).max_by_key(alike).unwrap_or(0))
+}
+
+impl Stance {
+    /// Returns the stance of a leaf. `foot` is a point above or below the foot; by default it is the middle of the
+    /// lowest slice.
+    fn of(leaf: &[bool], width: usize, up: Vec2, foot: Option<Vec2>) -> Self {
+        let points = || leaf.iter().enumerate().filter(|(_, in_it)| **in_it).map(|(i, _)| middle(i, width));
+        let (end, top) = points().fold((f32::MAX, f32::MIN), |(lo, hi), p| (lo.min(p.dot(up)), hi.max(p.dot(up))));
+        let length = top - end + 1.0;
         let aside = vec2(-up.y, up.x);
-        // The foot is the middle of the lowest slice.
-        let slice = points().filter(|p| (*p - centre).dot(up) < end + (0.02 * length).max(1.5));
-        let (sum, n) = slice.fold((0.0, 0_u32), |(sum, n), p| (sum + (p - centre).dot(aside), n + 1));
-        let foot = centre + up * (end - 0.5) + aside * (sum / n.max(1) as f32);
+        let across = foot.map_or_else(
+            || {
+                let slice = points().filter(|p| p.dot(up) < end + (0.02 * length).max(1.5));
+                let (sum, n) = slice.fold((0.0, 0_u32), |(sum, n), p| (sum + p.dot(aside), n + 1));
+                sum / n.max(1) as f32
+            },
+            |foot| foot.dot(aside),
+        );
+        let foot = up * (end - 0.5) + aside * across;
         let reach = points().map(|p| (p - foot).dot(aside).abs()).fold(0.0, f32::max) + 1.0;
         Self { foot, up, length, reach }
-    }
-
-    /// Removes the petiole from `leaf` and returns the blade's position. The petiole is the part below the first row
-    /// that is wider than a fifth of the widest one.
-    fn above_stalk(self, leaf: &mut [bool], width: usize) -> Self {
-        let mut widths = vec![0_u32; self.length.ceil() as usize + 1];
-        let row = |i: usize| ((middle(i, width) - self.foot).dot(self.up).max(0.0) as usize).min(widths.len() - 1);
-        let rows: Vec<(usize, usize)> = (0..leaf.len()).filter(|i| leaf[*i]).map(|i| (i, row(i))).collect();
-        for (_, row) in &rows {
-            widths[*row] += 1;
-        }
-        let widest = widths.iter().max().copied().unwrap_or(0);
-        let cut = widths.iter().position(|w| f64::from(*w) > STALK * f64::from(widest)).unwrap_or(0);
-        // A petiole shorter than one or two rows is ignored.
-        if (cut as f32) < 0.02 * self.length {
-            return self;
-        }
-        let Self { foot, up, length, .. } = self;
-        let aside = vec2(-up.y, up.x);
-        let (mut sum, mut n, mut reach) = (0.0_f32, 0_u32, 0.0_f32);
-        for (i, row) in rows {
-            leaf[i] = row >= cut;
-            if (cut..cut + 3).contains(&row) {
-                sum += (middle(i, width) - foot).dot(aside);
-                n += 1;
-            }
-        }
-        let foot = foot + up * cut as f32 + aside * (sum / n.max(1) as f32);
-        for i in (0..leaf.len()).filter(|i| leaf[*i]) {
-            reach = reach.max((middle(i, width) - foot).dot(aside).abs() + 1.0);
-        }
-        Self { foot, up, length: length - cut as f32, reach }
     }
 
     /// Returns the point of the photograph at `across` to the right of the foot and `up` above it.
@@ -332,10 +342,6 @@ impl Stance {
         // The photograph's y axis points down, so the right-hand side of `up` is (−up.y, up.x).
         self.foot + vec2(-self.up.y, self.up.x) * across + self.up * up
     }
-}
-
-fn middle(i: usize, width: usize) -> Vec2 {
-    vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5)
 }
 
 #[cfg(test)]
@@ -385,7 +391,7 @@ mod tests {
     #[test]
     fn what_a_photograph_should_not_show_is_told() {
         let photo = photograph(0.0);
-        assert_eq!(doubts(400, 400, &photo), Vec::<String>::new());
+        assert_eq!(doubts(400, 400, &photo, false), Vec::<String>::new());
         let green = |size: usize| {
             let mut photo = photo.clone();
             for i in
@@ -393,13 +399,81 @@ mod tests {
             {
                 photo[i] = [70, 120, 50];
             }
-            doubts(400, 400, &photo)
+            doubts(400, 400, &photo, false)
         };
         assert_eq!(green(10), Vec::<String>::new());
         let told = green(80);
         assert!(told.len() == 1 && told[0].contains("more than one leaf"), "{told:?}");
-        let told = doubts(400, 250, &photo[150 * 400..]);
+        let told = doubts(400, 250, &photo[150 * 400..], false);
         assert!(told.len() == 1 && told[0].contains("border"), "{told:?}");
+    }
+
+    /// Draws an ovate, pointed leaf of length 200 and a brown petiole on paper: widest near the base, with this half width.
+    fn ovate(half: f32, turn: f32, stalk: f32) -> Vec<[u8; 3]> {
+        let (sin, cos) = turn.sin_cos();
+        (0..600 * 600)
+            .map(|i| {
+                let p = middle(i, 600) - 300.0;
+                let (along, across) = (cos * p.x + sin * p.y + 100.0, -sin * p.x + cos * p.y);
+                let t = (along / 200.0).clamp(0.0, 1.0);
+                let blade = across.abs() < half * (std::f32::consts::PI * t.powf(0.6)).sin().max(0.0).powf(0.8);
+                let is_stalk = across.abs() < 3.5 && (-stalk..2.0).contains(&along);
+                if blade {
+                    [60, 130, 40]
+                } else if is_stalk {
+                    [120, 90, 40]
+                } else {
+                    [244, 244, 244]
+                }
+            })
+            .collect()
+    }
+
+    /// Rationale: a leaf as wide as long has no long axis, and a brown petiole is not green. Method: ovate leaves,
+    /// narrow, round and wider than long, at six angles. Expected: the tip is up, the image nearly its own mirror image,
+    /// no part of the blade is lost; with `stalk` the petiole is kept, with `flip` the tip is down.
+    #[test]
+    fn the_petiole_shows_the_base_of_any_leaf() {
+        for (half, k) in [50.0, 100.0, 140.0].into_iter().flat_map(|half| (0..6).map(move |k| (half, k))) {
+            let turn = k as f32 * 1.1 - 0.4;
+            let photo = ovate(half, turn, 100.0);
+            assert_eq!(doubts(600, 600, &photo, false), Vec::<String>::new(), "{half} {turn}");
+            let blade = photo.iter().filter(|p| p[1] == 130).count() as f64;
+            let of = |cutting: Cutting| cut_out(600, 600, &photo, &cutting).unwrap();
+            let row = |leaf: &Drawn, part: f32| {
+                let (w, y) = (leaf.width as usize, (part * leaf.height as f32) as usize);
+                (0..w).filter(|x| leaf.rgba[4 * (y * w + x) + 3] > 127).count()
+            };
+            let leaf = of(Cutting::default());
+            assert!(row(&leaf, 0.08) < row(&leaf, 0.9), "{half} {turn}: the tip is up");
+            let (w, h) = (leaf.width as usize, leaf.height as usize);
+            let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
+            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
+            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count() as f64;
+            assert!((all / blade - 1.0).abs() < 0.02 && unlike / all < 0.06, "{half} {turn}: {all} {blade} {unlike}");
+            let flipped = of(Cutting { flip: true, ..Cutting::default() });
+            assert!(row(&flipped, 0.08) > row(&flipped, 0.9), "{half} {turn}: flipped");
+            let kept = of(Cutting { stalk: true, ..Cutting::default() });
+            assert!(kept.height > leaf.height + 80, "{half} {turn}: {} {}", kept.height, leaf.height);
+        }
+    }
+
+    /// Expected: without a petiole a warning, and with `flip` none; a leaf as wide as long stands on its axis of
+    /// symmetry.
+    #[test]
+    fn a_leaf_without_a_petiole_is_warned_of() {
+        for half in [50.0, 95.0] {
+            let photo = ovate(half, 0.5, 0.0);
+            let told = doubts(600, 600, &photo, false);
+            assert!(told.len() == 1 && told[0].contains("no petiole"), "{told:?}");
+            assert_eq!(doubts(600, 600, &photo, true), Vec::<String>::new());
+            let leaf = cut_out(600, 600, &photo, &Cutting { flip: true, ..Cutting::default() }).unwrap();
+            let (w, h) = (leaf.width as usize, leaf.height as usize);
+            let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
+            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
+            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count() as f64;
+            assert!(unlike / all < 0.08, "{half}: {unlike} of {all}");
+        }
     }
 
     #[test]

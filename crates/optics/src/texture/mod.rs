@@ -8,6 +8,7 @@
 mod cutout;
 pub mod draw;
 pub mod exr_size;
+mod grid;
 pub mod ground;
 mod height;
 pub mod maps;
@@ -16,6 +17,7 @@ mod need;
 pub mod noise;
 mod openexr;
 pub mod panorama;
+mod petiole;
 pub mod picture;
 mod primaries;
 mod pyramid;
