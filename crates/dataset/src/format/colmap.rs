@@ -1,8 +1,9 @@
 //! COLMAP text models, one per field: `FIELD/cameras.txt`, `FIELD/images.txt`, `FIELD/points3D.txt`; `pycolmap`, and
 //! programs for NeRFs and Gaussian splats read them.
 //!
-//! Cameras are `FULL_OPENCV`: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6, where the first pixel's centre is (0.5, 0.5) as
-//! here. Images have the rotation w x y z and the translation from the world to the camera (x right, y down, z
+//! A camera has the simplest model that holds its distortion, because some readers take `PINHOLE` alone: `PINHOLE` (fx
+//! fy cx cy) without distortion, `OPENCV` (and k1 k2 p1 p2) without k3, otherwise `FULL_OPENCV` (and k3 k4 k5 k6). The
+//! first pixel's centre is (0.5, 0.5) as here. Images have the rotation w x y z and the translation from the world to the camera (x right, y down, z
 //! forward), in metres. Their names are paths relative to the dataset's `images/`, so nothing is copied:
 //! `image_path=DATASET/images`. There are no points, since no features are matched.
 //!
@@ -13,6 +14,7 @@
 use super::Whole;
 use super::drives::{self, OfFields, Taken};
 use furrow_base::Result;
+use furrow_optics::sensor::CameraRecord;
 use crate::read::set::Set;
 use std::fmt::Write;
 
@@ -46,14 +48,19 @@ fn cameras(images: &[Taken]) -> String {
     let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
     for (number, of) in (1..).zip(drives::by_camera(images).values()) {
         let c = &of[0].camera;
-        let [f, centre] = [[c.fx_px, c.fy_px], [c.cx_px, c.cy_px]];
-        let _ = writeln!(
-            text,
-            "{number} FULL_OPENCV {} {} {} {} {} {} {} {} {} {} {} 0 0 0",
-            c.width_px, c.height_px, f[0], f[1], centre[0], centre[1], c.k1, c.k2, c.p1, c.p2, c.k3
-        );
+        let _ = writeln!(text, "{number} {}", model(c));
     }
     text
+}
+
+/// Returns the model of a camera, its size and its parameters.
+fn model(c: &CameraRecord) -> String {
+    let pinhole = format!("{} {} {} {} {} {}", c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px);
+    if [c.k1, c.k2, c.p1, c.p2, c.k3] == [0.0; 5] {
+        return format!("PINHOLE {pinhole}");
+    }
+    let opencv = format!("{pinhole} {} {} {} {}", c.k1, c.k2, c.p1, c.p2);
+    if c.k3 == 0.0 { format!("OPENCV {opencv}") } else { format!("FULL_OPENCV {opencv} {} 0 0 0", c.k3) }
 }
 
 /// Returns two rows per image: its pose, and an empty row for its points.
@@ -77,4 +84,28 @@ fn poses(set: &Set, images: &[Taken]) -> String {
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_model_is_the_simplest_that_holds_the_distortion() {
+        let camera = |distortion: serde_json::Value| -> CameraRecord {
+            let mut all = serde_json::json!({
+                "width_px": 6, "height_px": 4, "fx_px": 5.0, "fy_px": 5.5, "cx_px": 3.0, "cy_px": 2.0,
+                "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0, "k3": 0.0, "position_m": [0.0, 0.0, 1.0],
+                "world_to_camera": [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], "aperture": null,
+            });
+            for (key, value) in distortion.as_object().unwrap() {
+                all[key] = value.clone();
+            }
+            serde_json::from_value(all).unwrap()
+        };
+        assert_eq!(model(&camera(serde_json::json!({}))), "PINHOLE 6 4 5 5.5 3 2");
+        assert_eq!(model(&camera(serde_json::json!({ "p1": 0.25 }))), "OPENCV 6 4 5 5.5 3 2 0 0 0.25 0");
+        let all = serde_json::json!({ "k1": -0.5, "k3": 0.125 });
+        assert_eq!(model(&camera(all)), "FULL_OPENCV 6 4 5 5.5 3 2 -0.5 0 0 0 0.125 0 0 0");
+    }
 }

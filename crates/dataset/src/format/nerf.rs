@@ -5,7 +5,8 @@
 //! support a single camera. File paths lead to the dataset's own `images/`, so nothing is copied. `time` is in seconds;
 //! `camera` and `frame` are additional keys, which readers ignore.
 //!
-//! The format cannot represent a rolling shutter and k3; poses are those of the middle row.
+//! `k3` is written where a lens has it: nerfstudio reads it, instant-ngp ignores it. The format cannot represent a
+//! rolling shutter; poses are those of the middle row.
 //!
 //! Source: nerfstudio documentation, "Data conventions".
 
@@ -43,12 +44,15 @@ impl OfFields for Writer {
 
 fn intrinsics(image: &Taken) -> Map<String, Value> {
     let c = &image.camera;
-    let all = json!({
+    let mut all = json!({
         "camera_model": "OPENCV",
         "w": c.width_px, "h": c.height_px,
         "fl_x": c.fx_px, "fl_y": c.fy_px, "cx": c.cx_px, "cy": c.cy_px,
         "k1": c.k1, "k2": c.k2, "p1": c.p1, "p2": c.p2,
     });
+    if c.k3 != 0.0 {
+        all["k3"] = c.k3.into();
+    }
     if let Value::Object(all) = all { all } else { Map::new() }
 }
 
