@@ -1,5 +1,6 @@
 """Reads a packed dataset with webdataset and Hugging Face's datasets, and its tables with pandas, polars and DuckDB."""
 
+import io
 import json
 import sys
 import tarfile
@@ -7,7 +8,9 @@ from pathlib import Path
 
 import datasets
 import duckdb
+import numpy
 import pandas
+import PIL.Image
 import polars
 import webdataset
 
@@ -22,12 +25,23 @@ for path in archives:
                 records[key] = json.loads(archive.extractfile(name).read())
 assert len(records) == 11, len(records)
 
-samples = list(webdataset.WebDataset(archives, shardshuffle=False).decode("rgb8"))
+
+
+def as_stored(key, data):
+    return numpy.array(PIL.Image.open(io.BytesIO(data))) if key.endswith((".png", ".jpg")) else None
+
+
+samples = list(webdataset.WebDataset(archives, shardshuffle=False).decode(as_stored))
 assert sorted(sample["__key__"] for sample in samples) == sorted(records)
 for sample in samples:
     record = records[sample["__key__"]]
     assert sample["rgb.png"].shape == (record["height"], record["width"], 3)
     assert sample["record.json"] == record
+    # Label maps as the guide reads them: numbers, not colours.
+    assert sample["plants.png"].dtype == numpy.uint16 and sample["semantics.png"].dtype == numpy.uint8
+    shown = {plant["number"] for plant in record["plants"] if plant["seen"]["pixels"] > 0}
+    assert set(sample["plants.png"].flat) - {0} == shown, (sample["__key__"], shown)
+    assert set(sample["semantics.png"].flat) <= {0, 1, 2}
 
 streamed = datasets.load_dataset("webdataset", data_files={"train": str(root / "packs/train-*.tar")}, split="train", streaming=True)
 seen = {sample["__key__"]: sample for sample in streamed}
