@@ -157,10 +157,15 @@ fn masks_of_colours_and_jpeg_images_come_in() {
         write_png(&root.join(format!("masks/{k}.png")), W, H, &Picture::Rgb(&colors), "").unwrap();
     }
     let [images, masks] = ["images", "masks"].map(|name| root.join(name));
+    std::fs::write(root.join("images/11.heic"), "").unwrap();
+    write_png(&root.join("masks/left.png"), 1, 1, &Picture::Gray(&[0]), "").unwrap();
     let colors = "0,255,0=crop;255,0,0=weed;0,0,0=soil";
     let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--colors", colors];
     let words = refused(&out, &arguments);
     assert!(words.contains("masks/0.png") && words.contains("9,9,8") && words.contains("--others ignore"), "{words}");
+    for warned in ["images: 1 pictures that are neither PNG nor JPEG", "masks: 1 masks have no image"] {
+        assert!(words.contains(warned), "{words}");
+    }
     let (set, samples) = imported(&out, &[&arguments[..], &["--others", "ignore", "--split", "1,1,0"]].concat());
     assert!(samples.iter().all(|s| s.semantics == classes()));
     assert_eq!((set.names(Split::Train).len(), set.names(Split::Val).len()), (5, 5));
@@ -464,7 +469,15 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
         assert_eq!(sample.plants[at(x, y)], u32::from(crop(x, y)), "plant at {x},{y}");
         assert_eq!(sample.leaves[at(x, y)], u16::from(crop(x, y) && x >= 4), "leaf at {x},{y}");
     }
-    assert_eq!(sample.record.warnings.len(), 1, "the leaf reaches beyond its plant: {:?}", sample.record.warnings);
+    let warned = &sample.record.warnings;
+    assert!(warned.len() == 2 && warned[0].starts_with("1 crowds") && warned[1].contains("of leaves"), "{warned:?}");
+    let manifest: Value = serde_json::from_slice(&std::fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["warnings"].as_array().unwrap().len(), 2);
+    assert!(manifest["warnings"][0].as_str().unwrap().starts_with("1 image: 1 crowds"), "{}", manifest["warnings"]);
+    let plants = root.join("plants");
+    let (_, as_plants) = imported(&plants, &[&arguments[..], &["--crowds", "instances"]].concat());
+    assert_eq!(as_plants[0].plants[at(9, 0)], 2);
+    assert!(as_plants[0].record.warnings.iter().all(|words| !words.contains("crowds")));
     let another = root.join("another");
     let words = refused(&another, &["--format", "coco", "--from", text(&file)]);
     assert!(words.contains("`maize`") && words.contains("--classes"), "{words}");
@@ -485,6 +498,149 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     boxes["annotations"][0]["segmentation"] = Value::Null;
     write(boxes);
     assert!(refused(&another, &arguments).contains("annotation 1 in line 1 has no mask"));
+    for (mask, words) in [
+        (json!([]), "annotation 1 in line 1 has no mask"),
+        (json!([[]]), "annotation 1 in line 1 has no mask"),
+        (json!([[2, 2, 6, 7]]), "annotation 1 in line 1 has a polygon of 2 points"),
+        (json!([[2, 2, 6, 7, 8, 8, 9]]), "annotation 1 in line 1 has a polygon of 7 numbers"),
+        (json!("none"), "annotation 1 in line 1, `segmentation`: invalid type"),
+    ] {
+        let mut wrong = document("maize");
+        wrong["annotations"][0]["segmentation"] = mask;
+        write(wrong);
+        let said = refused(&another, &arguments);
+        assert!(said.contains(words) && said.contains("help: "), "{said}");
+    }
+    let mut turned = document("maize");
+    turned["images"][0]["width"] = (W + 1).into();
+    write(turned);
+    assert!(refused(&another, &arguments).contains("it has 13 × 9 pixels, but 14 × 9 in"));
     std::fs::write(&file, "[1, 2").unwrap();
     assert!(refused(&another, &arguments).contains("a.json"));
+}
+
+/// Rationale: a label that is lost in silence falsifies an evaluation. Expected: every annotation that labels no pixel,
+/// every image without annotations and every doubtful id is counted in a warning; the file may begin with a byte order
+/// mark.
+#[test]
+fn what_a_coco_file_lacks_is_counted() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    for name in ["x.png", "y.png"] {
+        write_png(&root.join(name), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+    }
+    let crop = |id: u32, mask: Value| json!({ "id": id, "image_id": "x", "category_id": 3, "segmentation": mask });
+    let square = json!([[2, 2, 6, 2, 6, 7, 2, 7]]);
+    let document = json!({
+        "images": [
+            { "id": "x", "file_name": "http://host/a%20b/x.png" },
+            { "id": 2.0, "file_name": "y.png", "width": 13.0, "height": 9 },
+        ],
+        "categories": [{ "id": 3, "name": "crop" }],
+        "annotations": [
+            crop(1, square.clone()), crop(1, square), crop(2, json!([[40, 2, 46, 2, 46, 7, 40, 7]])),
+            crop(3, json!([[8, 1, 11, 1, 11, 3, 8, 3], [1, 1]])),
+        ],
+    });
+    let file = root.join("a.json");
+    std::fs::write(&file, format!("\u{feff}{document}")).unwrap();
+    let arguments = ["--format", "coco", "--from", text(&file), "--split", "1,0,0"];
+    let output = import(&out, &arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    for words in [
+        "`http://host/a%20b/x.png` was found as `x.png`",
+        "1 image: 1 annotations have the id of another annotation",
+        "1 image: 1 annotations cover no pixel",
+        "1 image: 1 masks reach more than a pixel beyond the image",
+        "1 image: 1 plants are covered by other masks",
+        "1 image: 1 polygons with fewer than three points",
+        "1 image: the source has no annotations of this image",
+    ] {
+        assert!(said.contains(&format!("warning: {words}")) || said.contains(words), "{words} is not in {said}");
+    }
+    let set = Set::open(&out).unwrap();
+    let sample = native::read(&out, &Set::name(0)).unwrap();
+    assert_eq!((set.recipe.count, sample.record.classes[1].pixels), (2, 26));
+}
+
+/// Returns a JPEG with this EXIF orientation.
+fn oriented(size: (u32, u32), rgb: &[[u8; 3]], orientation: u8) -> Vec<u8> {
+    let mut bytes = encode_jpeg(size.0, size.1, rgb, 100).unwrap();
+    let exif = [&b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..], &[orientation], &[0; 6]]
+        .concat();
+    bytes.splice(2..2, exif);
+    bytes
+}
+
+/// Rationale: phones store a photograph as the sensor lies and state how to turn it; people label what viewers show.
+/// Expected: colour and near infrared are turned, also where the size does not change; a mask that fits only the stored
+/// photograph is refused, and the orientation is named. Source: EXIF orientation 3 (half a turn) and 6 (a quarter).
+#[test]
+fn photographs_are_turned_as_viewers_show_them() {
+    for orientation in [3, 6] {
+        let (kept, out) = scratch();
+        let root = kept.path();
+        let stored: Vec<[u8; 3]> =
+            (0..32 * 16).map(|i| if i % 32 < 16 { [250, 10, 10] } else { [10, 10, 250] }).collect();
+        std::fs::create_dir_all(root.join("images")).unwrap();
+        std::fs::create_dir_all(root.join("nir")).unwrap();
+        std::fs::write(root.join("images/a.jpg"), oriented((32, 16), &stored, orientation)).unwrap();
+        std::fs::write(root.join("nir/a.jpg"), oriented((32, 16), &stored, orientation)).unwrap();
+        let (w, h) = if orientation == 6 { (16, 32) } else { (32, 16) };
+        // The red half is on the right, or above.
+        let is_red = |i: u32| if orientation == 6 { i / w < 16 } else { i % w >= 16 };
+        let mask: Vec<u8> = (0..w * h).map(|i| u8::from(is_red(i))).collect();
+        write_png(&root.join("masks/a.png"), w, h, &Picture::Gray(&mask), "").unwrap();
+        let [images, masks, nir] = ["images", "masks", "nir"].map(|name| root.join(name));
+        let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--nir", text(&nir)];
+        let (_, samples) = imported(&out, &arguments);
+        assert_eq!(samples[0].size(), (w, h));
+        for i in 0..w * h {
+            let [r, _, b] = samples[0].rgb[i as usize];
+            assert_eq!(r > b, is_red(i), "{orientation}: pixel {i}");
+        }
+        let warned = &samples[0].record.warnings;
+        assert_eq!(warned, &[format!("the photograph was turned by its EXIF orientation {orientation}")]);
+        if orientation == 6 {
+            write_png(&root.join("masks/a.png"), 32, 16, &Picture::Gray(&mask), "").unwrap();
+            let words = refused(&root.join("other"), &arguments);
+            assert!(words.contains("masks/a.png") && words.contains("EXIF orientation 6"), "{words}");
+        }
+    }
+}
+
+/// Rationale: decoders fill the missing part of a JPEG with grey. Expected: every format refuses it and names the file.
+#[test]
+fn a_photograph_without_its_end_is_refused() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    let whole = encode_jpeg(W, H, &photo(3), 95).unwrap();
+    let place = |path: &str, bytes: &[u8]| {
+        let path = root.join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    };
+    let cut = &whole[..whole.len() * 6 / 10];
+    place("cut/a.jpg", cut);
+    place("whole/a.jpg", &whole);
+    place("bench/train/images/a.jpg", cut);
+    for path in ["masks/a.png", "bench/train/semantics/a.png"] {
+        write_png(&root.join(path), W, H, &Picture::Gray(&[0; N]), "").unwrap();
+    }
+    let document = json!({
+        "images": [{ "id": 5, "file_name": "a.jpg", "width": W, "height": H }], "categories": [], "annotations": [],
+    });
+    place("a.json", document.to_string().as_bytes());
+    let [broken, fine, masks, bench, file] =
+        ["cut", "whole", "masks", "bench", "a.json"].map(|name| root.join(name).to_str().unwrap().to_owned());
+    for arguments in [
+        vec!["--format", "masks", "--images", &broken, "--masks", &masks],
+        vec!["--format", "masks", "--images", &fine, "--masks", &masks, "--nir", &broken],
+        vec!["--format", "coco", "--from", &file, "--images", &broken],
+        vec!["--format", "phenobench", "--from", &bench],
+    ] {
+        let words = refused(&out, &arguments);
+        assert!(words.contains("a.jpg: this JPEG is cut short"), "{words}");
+    }
 }

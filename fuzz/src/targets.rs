@@ -3,7 +3,7 @@
 
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_dataset::import::{Source, coco::Coco, phenobench::PhenoBench};
+use furrow_dataset::import::{Source, coco::Coco, coco::Crowds, phenobench::PhenoBench};
 use furrow_dataset::make::generate;
 use furrow_dataset::model::rle::Rle;
 use furrow_dataset::read::checksum::Checksum;
@@ -140,7 +140,7 @@ fn picture() -> Vec<u8> {
 fn coco(bytes: &[u8]) {
     let folder = folder(&[("a.json", bytes), ("images/a.png", &picture())]);
     let images = folder.path().join("images");
-    if let Ok(source) = Coco::open(&folder.path().join("a.json"), Some(&images), None) {
+    if let Ok(source) = Coco::open(&folder.path().join("a.json"), Some(&images), None, Crowds::Instances) {
         for place in 0..source.images().len().min(4) {
             let _ = source.read(place);
         }

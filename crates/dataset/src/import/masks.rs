@@ -1,7 +1,7 @@
 //! Source with a folder of images and a folder of masks: numbers (grey or indexed) or colours that represent classes.
 
 use super::classes::{Colors, Names};
-use super::files::{length, listed, same_size};
+use super::files::{length, listed, photograph, same_size, unread};
 use super::{Labelled, Listed, Source};
 use crate::model::sample::IGNORE;
 use furrow_base::{Error, Result};
@@ -78,6 +78,7 @@ pub struct Masks {
     images: Vec<Listed>,
     files: Vec<Files>,
     words: String,
+    warnings: Vec<String>,
 }
 
 impl Masks {
@@ -113,7 +114,15 @@ impl Masks {
             list.push(one);
             files.push(Files { image, mask, nir });
         }
-        Ok(Self { folders, images: list, files, words })
+        let mut warnings: Vec<String> = unread(&folders.images).into_iter().collect();
+        for (left, what, folder) in
+            [(&masks, "masks", Some(&folders.masks)), (&nirs, "infrared images", folders.nir.as_ref())]
+        {
+            if let Some(folder) = folder.filter(|_| !left.is_empty()) {
+                warnings.push(format!("{}: {} {what} have no image and were left out", folder.display(), left.len()));
+            }
+        }
+        Ok(Self { folders, images: list, files, words, warnings })
     }
 }
 
@@ -144,26 +153,31 @@ impl Source for Masks {
         &self.words
     }
 
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
     fn has_nir(&self) -> bool {
         self.folders.nir.is_some()
     }
 
     fn read(&self, place: usize) -> Result<Labelled> {
         let Files { image, mask, nir } = &self.files[place];
-        let (w, h, rgb) = furrow_output::read_photo(image)?;
+        let photo = photograph(furrow_output::open_photo(image)?);
         let (x, y, map) = furrow_output::read_map(mask)?;
-        same_size(mask, (x, y), (w, h))?;
-        let semantics = self.semantics(mask, w, map)?;
+        same_size(mask, (x, y), &photo)?;
+        let semantics = self.semantics(mask, photo.size.0, map)?;
         let nir = match nir {
             Some(path) => {
-                let (x, y, gray) = furrow_output::read_gray_photo(path)?;
-                same_size(path, (x, y), (w, h))?;
-                gray
+                let gray = photograph(furrow_output::open_gray_photo(path)?);
+                same_size(path, gray.size, &photo)?;
+                gray.pixels
             }
             None => Vec::new(),
         };
         let (plants, leaves) = (vec![0; semantics.len()], vec![0; semantics.len()]);
-        Ok(Labelled { size: (w, h), rgb, nir, semantics, plants, leaves, ..Labelled::default() })
+        let (size, rgb, warnings) = (photo.size, photo.pixels, photo.warnings);
+        Ok(Labelled { size, rgb, nir, semantics, plants, leaves, warnings, ..Labelled::default() })
     }
 }
 

@@ -91,7 +91,7 @@ pub struct Labelled {
     pub leaves: Vec<u16>,
     /// Keypoints (stem, base and tip) by plant and leaf; the stem belongs to leaf 0.
     pub points: BTreeMap<(u32, u16), [Option<Keypoint>; 3]>,
-    /// Warnings about this image.
+    /// Warnings about this image, one for each kind. A warning that counts something begins with the number.
     pub warnings: Vec<String>,
 }
 

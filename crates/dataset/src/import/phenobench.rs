@@ -5,7 +5,7 @@
 //! the same number; leaves are numbered throughout the image. Visibilities are not imported: they describe the fraction
 //! of an instance within a crop of a larger image. Source: Weyler et al. 2024, and its loader, version 0.1.0.
 
-use super::files::{length, pictures, same_size};
+use super::files::{length, photograph, pictures, same_size};
 use super::instances::instances;
 use super::{Labelled, Listed, Source};
 use crate::model::sample::IGNORE;
@@ -87,30 +87,33 @@ impl Source for PhenoBench {
     fn read(&self, place: usize) -> Result<Labelled> {
         let Listed { split, name } = &self.images[place];
         let folder = self.root.join(split.unwrap_or(Split::Train).name());
-        let (w, h, rgb) = furrow_output::read_photo(&self.paths[place])?;
+        let photo = photograph(furrow_output::open_photo(&self.paths[place])?);
         let numbers = |kind: &str| -> Result<Vec<u32>> {
             if !folder.join(kind).is_dir() {
-                return Ok(vec![0; rgb.len()]);
+                return Ok(vec![0; photo.pixels.len()]);
             }
             let path = folder.join(kind).join(format!("{name}.png"));
             let (x, y, map) = furrow_output::read_map(&path)?;
-            same_size(&path, (x, y), (w, h))?;
+            same_size(&path, (x, y), &photo)?;
             match map {
                 Map::Numbers(numbers) | Map::Indexed(numbers, _) => Ok(numbers.into_iter().map(u32::from).collect()),
                 Map::Colors(_) => Err(Error::input("this is a colour image, not a map of numbers").in_file(path)),
             }
         };
         let path = folder.join(LABELS[0]).join(format!("{name}.png"));
-        let semantics: Vec<u8> =
-            numbers(LABELS[0])?.into_iter().enumerate().map(|(i, n)| class(&path, w, i, n)).collect::<Result<_>>()?;
+        let semantics: Vec<u8> = numbers(LABELS[0])?
+            .into_iter()
+            .enumerate()
+            .map(|(i, n)| class(&path, photo.size.0, i, n))
+            .collect::<Result<_>>()?;
         let found = instances(&path, &semantics, &numbers(LABELS[1])?, &numbers(LABELS[2])?)?;
         Ok(Labelled {
-            size: (w, h),
-            rgb,
+            size: photo.size,
+            rgb: photo.pixels,
             semantics,
             plants: found.plants,
             leaves: found.leaves,
-            warnings: found.warnings,
+            warnings: [photo.warnings, found.warnings].concat(),
             ..Labelled::default()
         })
     }

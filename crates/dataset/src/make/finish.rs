@@ -4,7 +4,8 @@ use crate::format::labels::LeftOut;
 use crate::make::pack::store;
 use crate::make::push;
 use crate::make::task::{Task, remaining};
-use crate::model::recipe::{FILE, MANIFEST, Recipe};
+use crate::model::recipe::{FILE, MANIFEST, Made, Recipe};
+use crate::model::warnings::Totals;
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native::{Files, is_native};
@@ -115,6 +116,18 @@ pub fn ranges(numbers: &[u64]) -> String {
     parts.iter().map(text).collect::<Vec<_>>().join(",")
 }
 
+/// Returns what the import of this dataset left out, turned or could not trust: one line for each kind of warning. Empty
+/// for a rendered dataset.
+pub fn dropped(set: &Set) -> Result<Vec<String>> {
+    let mut totals = Totals::default();
+    if matches!(set.recipe.made, Made::Imported { .. }) {
+        for record in set.all() {
+            totals.add(&record?.warnings);
+        }
+    }
+    Ok(totals.lines())
+}
+
 /// Returns the checksums of the recipe and of the scene's files, which belong to no image.
 fn own_files(folder: &Path, recipe: &Recipe) -> Result<BTreeMap<String, Checksum>> {
     let mut todo = vec![folder.join(FILE)];
@@ -152,6 +165,11 @@ fn manifest(set: &Set, files: &BTreeMap<String, Checksum>, out: &mut Stream<'_>)
     if let Some(left_out) = LeftOut::of(set)? {
         out.put(",\n\"left_out\": ")?;
         out.json(&left_out)?;
+    }
+    let dropped = dropped(set)?;
+    if !dropped.is_empty() {
+        out.put(",\n\"warnings\": ")?;
+        out.json(&dropped)?;
     }
     out.put(",\n\"files\": {")?;
     let mut first = true;

@@ -12,3 +12,4 @@ pub mod record;
 pub mod rle;
 pub mod sample;
 pub mod split;
+pub(crate) mod warnings;

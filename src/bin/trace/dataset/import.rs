@@ -7,10 +7,11 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::import::classes::{Colors, Names};
-use furrow_dataset::import::coco::Coco;
+use furrow_dataset::import::coco::{Coco, Crowds};
 use furrow_dataset::import::masks::{Coding, Folders, Masks};
 use furrow_dataset::import::phenobench::PhenoBench;
 use furrow_dataset::import::{self, ImportSettings, Source};
+use furrow_dataset::make::finish;
 use furrow_dataset::model::split::Shares;
 use furrow_render::render;
 use std::path::PathBuf;
@@ -57,6 +58,9 @@ pub(crate) struct Args {
     /// What to do with numbers and colours without a class.
     #[arg(long, value_enum, default_value_t = Others::Error)]
     others: Others,
+    /// What an annotation with `iscrowd` 1 is (coco). CVAT marks masks painted with a brush so.
+    #[arg(long, value_enum, default_value_t = CrowdMeaning::Class)]
+    crowds: CrowdMeaning,
     /// Proportions of train, val and test, for a source without splits.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
@@ -91,6 +95,15 @@ enum Others {
     Ignore,
 }
 
+/// Meaning of crowds.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CrowdMeaning {
+    /// Pixels of a class without a plant.
+    Class,
+    /// A plant.
+    Instances,
+}
+
 /// Imports the source and writes the dataset-wide files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
@@ -106,7 +119,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let pool = render::pool(args.threads)?;
     let set = pool.install(|| import::import(&args.out, source.as_ref(), &order, &done, stop))?;
     progress.finish();
-    furrow_dataset::make::finish::finish(&set, None)
+    let files = finish::finish(&set, None)?;
+    for warning in finish::dropped(&set)? {
+        furrow_cli::tell!("warning: {warning}");
+    }
+    Ok(files)
 }
 
 fn source(args: &Args) -> Result<Box<dyn Source>> {
@@ -122,6 +139,7 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
             "--masks, --nir and --colors",
         ),
         (args.from.is_some(), args.format == Format::Masks, "--from"),
+        (args.crowds != CrowdMeaning::Class, args.format != Format::Coco, "--crowds"),
         (args.images.is_some() || args.classes.is_some(), args.format == Format::Phenobench, "--images and --classes"),
     ];
     if let Some((.., options)) = useless.into_iter().find(|(given, useless, _)| *given && *useless) {
@@ -147,7 +165,12 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
         }
         Format::Phenobench => Box::new(PhenoBench::open(&needed(&args.from, "--from")?)?),
         Format::Coco => {
-            Box::new(Coco::open(&needed(&args.from, "--from")?, args.images.as_deref(), args.classes.as_ref())?)
+            let crowds = match args.crowds {
+                CrowdMeaning::Class => Crowds::Class,
+                CrowdMeaning::Instances => Crowds::Instances,
+            };
+            let (from, images) = (needed(&args.from, "--from")?, args.images.as_deref());
+            Box::new(Coco::open(&from, images, args.classes.as_ref(), crowds)?)
         }
     })
 }

@@ -2,22 +2,30 @@
 //! stem, base and tip. Leaves may be in a separate `leaves_SPLIT.json` beside `instances_SPLIT.json`.
 //!
 //! Pixels without a mask are soil. Where masks overlap, the smaller one is on top. A leaf belongs to the plant that
-//! contains most of its pixels. A crowd (`iscrowd` 1) has a class and no instance. A polygon contains the pixels whose
-//! centres are inside by the even-odd rule; the reference implementation may decide otherwise for pixels on the
-//! outline. Source: COCO data format, <https://cocodataset.org/#format-data>.
+//! contains most of its pixels. A crowd (`iscrowd` 1) has a class and no instance, unless [`Crowds`] makes it one. A
+//! polygon contains the pixels whose centres are inside by the even-odd rule; the reference implementation may decide
+//! otherwise for pixels on the outline. Source: COCO data format, <https://cocodataset.org/#format-data>.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `document` | the JSON, in the spellings of different tools |
+//! | `names` | the image files that a document names |
+//! | `spot` | the entry that an error is about |
+
+mod document;
+mod names;
+mod spot;
 
 use super::classes::{Meaning, Names};
-use super::files::{length, same_size};
+use super::files::{Shot, length, photograph};
 use super::instances::{Instances, instances};
 use super::{Labelled, Listed, Source};
 use crate::model::record::{Keypoint, PointState};
-use crate::model::rle::Rle;
 use crate::model::split::Split;
-use furrow_base::input::Scope;
+use crate::model::warnings;
+use document::{Annotation, Category, Document, Id, Segmentation};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
-use serde::Deserialize;
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -29,18 +37,35 @@ pub struct Coco {
     listed: Vec<Listed>,
     images: Vec<Annotated>,
     words: String,
+    crowds: Crowds,
+}
+
+/// Meaning of an annotation with `iscrowd` 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Crowds {
+    /// An area of several plants, as COCO defines it: it has a class, but no plant number.
+    #[default]
+    Class,
+    /// A plant. Some labelling tools, such as CVAT, mark every mask that is painted with a brush as a crowd.
+    Instances,
 }
 
 /// An image and its annotations.
 struct Annotated {
     path: PathBuf,
-    size: (u32, u32),
+    /// The annotation file.
+    document: Arc<Path>,
+    /// Width and height in the annotation file, if it states them.
+    size: Option<(u32, u32)>,
     things: Vec<Thing>,
+    warnings: Vec<String>,
 }
 
 /// An annotation: a plant, a leaf, a crowd or an unlabelled area.
 struct Thing {
-    id: u64,
+    id: Option<Id>,
+    /// Its place in the list of annotations, from 1.
+    place: usize,
     /// The file that contains the annotation.
     document: Arc<Path>,
     meaning: Meaning,
@@ -52,68 +77,25 @@ struct Thing {
     points: [Option<Keypoint>; 3],
 }
 
-#[derive(Deserialize)]
-struct Document {
-    images: Vec<Image>,
-    annotations: Vec<Annotation>,
-    categories: Vec<Category>,
-}
-
-#[derive(Deserialize)]
-struct Image {
-    id: u64,
-    file_name: String,
-    width: u32,
-    height: u32,
-}
-
-#[derive(Deserialize)]
-struct Annotation {
-    #[serde(default)]
-    id: u64,
-    image_id: u64,
-    category_id: u64,
-    segmentation: Option<Segmentation>,
-    #[serde(default)]
-    iscrowd: u8,
-    #[serde(default)]
-    keypoints: Vec<f32>,
-    #[serde(default)]
-    attributes: Value,
-}
-
-#[derive(Deserialize)]
-struct Category {
-    id: u64,
-    name: String,
-    #[serde(default)]
-    keypoints: Vec<String>,
-}
-
-/// A mask in one of COCO's encodings.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Segmentation {
-    Packed(Rle),
-    Runs { size: [u32; 2], counts: Vec<u64> },
-    Polygons(Vec<Vec<f64>>),
-}
-
 impl Coco {
     /// Opens a file of annotations, or a folder with `annotations/instances_SPLIT.json`. The images are in `images` or
     /// in its subfolder of the split; if `images` is `None`, in the folder `images` beside the annotations. `classes`
     /// gives the meanings of the categories; without it, the categories must be named soil, crop, weed or leaf.
-    pub fn open(from: &Path, images: Option<&Path>, classes: Option<&Names>) -> Result<Self> {
-        let mut all =
-            Self { listed: Vec::new(), images: Vec::new(), words: format!("{:?}\n", classes.map(Names::words)) };
+    pub fn open(from: &Path, images: Option<&Path>, classes: Option<&Names>, crowds: Crowds) -> Result<Self> {
+        let mut words = format!("{:?}\n", classes.map(Names::words));
+        if crowds != Crowds::Class {
+            let _ = writeln!(words, "crowds: {crowds:?}");
+        }
+        let mut all = Self { listed: Vec::new(), images: Vec::new(), words, crowds };
         let mut found: Vec<(Listed, Annotated)> = Vec::new();
         for (split, document) in documents(from)? {
             let folder = images.map_or_else(|| beside(from, &document), Path::to_path_buf);
             found.extend(all.document(split, &document, &folder, classes)?);
         }
         found.sort_by(|a, b| a.0.cmp(&b.0));
-        if let Some(pair) = found.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            return Err(Error::input("this image is listed twice").in_file(&pair[0].1.path));
+        let mut paths = BTreeSet::new();
+        if let Some(twice) = found.iter().find(|(one, image)| !paths.insert((one.split, &image.path))) {
+            return Err(Error::input("this image is listed twice").in_file(&twice.1.path));
         }
         if found.is_empty() {
             return Err(Error::input("it lists no images").in_file(from));
@@ -136,26 +118,28 @@ impl Coco {
     ) -> Result<Vec<(Listed, Annotated)>> {
         let instances = Read::open(path)?;
         let leaves = leaves_beside(path).map(|path| Read::open(&path)).transpose()?;
-        let mut found: BTreeMap<u64, (Listed, Annotated)> = BTreeMap::new();
-        let scope =
-            Scope::Below { folder: folder.into(), help: "name images by their paths below the folder of --images" };
-        for Image { id, file_name, width, height } in &instances.document.images {
-            let named =
-                |folder: &Path| scope.resolve(folder, file_name).map_err(|outside| Error::from(outside).in_file(path));
-            let of_split = split.map(|s| named(&folder.join(s.name()))).transpose()?.filter(|p| p.is_file());
-            let image = of_split.map_or_else(|| named(folder), Ok)?;
-            if !image.is_file() {
-                let what = format!("its image {} is missing", image.display());
-                return Err(instances.wrong(what).help("give the folder of the images with --images"));
-            }
-            let annotated = Annotated { path: image, size: (*width, *height), things: Vec::new() };
-            if found.insert(*id, (Listed { split, name: file_name.clone() }, annotated)).is_some() {
-                return Err(instances.wrong(format!("two images have the id {id}")));
+        let document: Arc<Path> = path.into();
+        let mut found: BTreeMap<Id, (Listed, Annotated)> = BTreeMap::new();
+        for image in &instances.document.images {
+            let file = names::find(path, folder, split, &image.file_name)?;
+            let annotated = Annotated {
+                path: file.path,
+                document: document.clone(),
+                size: image.size(),
+                things: Vec::new(),
+                warnings: file.warning.into_iter().collect(),
+            };
+            let listed = Listed { split, name: image.file_name.clone() };
+            if found.insert(image.id.clone(), (listed, annotated)).is_some() {
+                return Err(instances.wrong(format!("two images have the id {}", image.id.0)));
             }
         }
         for read in [Some(instances), leaves].into_iter().flatten() {
             let _ = writeln!(self.words, "{split:?} {:x?}", Sha256::digest(&read.bytes));
             read.annotate(classes, &mut found)?;
+        }
+        for (_, image) in found.values_mut().filter(|(_, image)| image.things.is_empty()) {
+            image.warnings.push("the source has no annotations of this image; all its pixels are soil".into());
         }
         Ok(found.into_values().collect())
     }
@@ -171,8 +155,7 @@ struct Read {
 impl Read {
     fn open(path: &Path) -> Result<Self> {
         let bytes = furrow_base::input::contents(path).map_err(Error::reading(path))?;
-        let document = serde_json::from_slice(&bytes)
-            .map_err(|e| Error::input(format!("this is not a COCO file of instances: {e}")).in_file(path))?;
+        let document = document::parse(path, &bytes)?;
         Ok(Self { path: path.into(), bytes, document })
     }
 
@@ -181,44 +164,88 @@ impl Read {
     }
 
     /// Adds the annotations to their images.
-    fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<u64, (Listed, Annotated)>) -> Result<()> {
+    fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<Id, (Listed, Annotated)>) -> Result<()> {
         let annotations = std::mem::take(&mut self.document.annotations);
-        let mut kinds: BTreeMap<u64, (Meaning, &[String])> = BTreeMap::new();
+        let kinds = self.kinds(classes, &annotations)?;
+        let document: Arc<Path> = self.path.as_path().into();
+        let mut ids = BTreeSet::new();
+        for (place, annotation) in (1..).zip(annotations) {
+            let Annotation { id, image_id, category_id, segmentation, iscrowd, keypoints, attributes } = annotation;
+            let name = || named(id.as_ref(), place, &self.bytes);
+            let wrong = |what: &str| self.wrong(format!("{}{what}", name())).help(document::HELP);
+            let (_, image) = found
+                .get_mut(&image_id)
+                .ok_or_else(|| wrong(&format!("is of image {}, which the file lacks", image_id.0)))?;
+            let (meaning, names) = kinds
+                .get(&category_id)
+                .ok_or_else(|| wrong(&format!("has the category {}, which the file lacks", category_id.0)))?;
+            if id.as_ref().is_some_and(|id| !ids.insert(id.clone())) {
+                image.warnings.push("1 annotations have the id of another annotation; all were read".into());
+            }
+            let segmentation = segmentation.filter(|mask| !mask.is_empty());
+            let segmentation = segmentation.ok_or_else(|| wrong(NO_MASK).help(NO_MASK_HELP))?;
+            image.warnings.extend(segmentation.check().map_err(|what| wrong(&what).help(NO_MASK_HELP))?);
+            let values = keypoints.as_deref().unwrap_or_default();
+            let points = ["stem", "base", "tip"].map(|name| point(names, name, values));
+            image.things.push(Thing {
+                id,
+                place,
+                document: document.clone(),
+                meaning: *meaning,
+                crowd: iscrowd.is_some_and(|flag| flag.0),
+                plant: attributes["plant"].as_u64().and_then(|n| u32::try_from(n).ok()),
+                segmentation,
+                points,
+            });
+        }
+        Ok(())
+    }
+
+    /// Returns the meaning and the names of the keypoints of each category.
+    fn kinds(&self, classes: Option<&Names>, annotations: &[Annotation]) -> Result<BTreeMap<Id, (Meaning, &[String])>> {
+        let mut kinds: BTreeMap<Id, (Meaning, &[String])> = BTreeMap::new();
         for Category { id, name, keypoints } in &self.document.categories {
             let known = match classes {
                 Some(names) => names.0.get(name).copied(),
                 None => Meaning::named(name),
             };
             if let Some(meaning) = known {
-                kinds.insert(*id, (meaning, keypoints));
+                let before = kinds.insert(id.clone(), (meaning, keypoints.as_deref().unwrap_or_default()));
+                if before.is_some_and(|(other, _)| other != meaning) {
+                    return Err(self.wrong(format!("two categories have the id {} and different classes", id.0)));
+                }
             } else if annotations.iter().any(|a| a.category_id == *id) {
                 let help = format!("give --classes '{name}=crop,…'; classes are soil, crop, weed, leaf, ignore");
                 return Err(self.wrong(format!("no class was given for the category `{name}`")).help(help));
             }
         }
-        let document: Arc<Path> = self.path.as_path().into();
-        for annotation in annotations {
-            let id = annotation.id;
-            let wrong = |what: &str| self.wrong(format!("{}{what}", named(id, &self.bytes)));
-            let (_, image) = found
-                .get_mut(&annotation.image_id)
-                .ok_or_else(|| wrong(&format!("is of image {}, which the file lacks", annotation.image_id)))?;
-            let (meaning, names) = kinds
-                .get(&annotation.category_id)
-                .ok_or_else(|| wrong(&format!("has the category {}, which the file lacks", annotation.category_id)))?;
-            image.things.push(Thing {
-                id,
-                document: document.clone(),
-                meaning: *meaning,
-                crowd: annotation.iscrowd != 0,
-                plant: annotation.attributes["plant"].as_u64().and_then(|n| u32::try_from(n).ok()),
-                segmentation: annotation
-                    .segmentation
-                    .ok_or_else(|| wrong("has no mask; boxes alone cannot label pixels"))?,
-                points: ["stem", "base", "tip"].map(|name| point(names, name, &annotation.keypoints)),
-            });
+        Ok(kinds)
+    }
+}
+
+const NO_MASK: &str = "has no mask; boxes alone cannot label pixels";
+const NO_MASK_HELP: &str = "draw its mask in the labelling tool, or remove the annotation";
+
+impl Segmentation {
+    /// Returns `true` for a list without polygons, which labelling tools write for a box.
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::Polygons(polygons) if polygons.iter().all(Vec::is_empty))
+    }
+
+    /// Checks the polygons. Returns a warning if some of them have no area by their number of points, an error if none
+    /// has one.
+    fn check(&self) -> Result<Option<String>, String> {
+        let Self::Polygons(polygons) = self else { return Ok(None) };
+        if let Some(odd) = polygons.iter().find(|polygon| polygon.len() % 2 == 1) {
+            return Err(format!("has a polygon of {} numbers; a polygon is a list of x and y", odd.len()));
         }
-        Ok(())
+        match polygons.iter().filter(|polygon| polygon.len() < 2 * 3).count() {
+            0 => Ok(None),
+            few if few == polygons.len() => {
+                Err(format!("has a polygon of {} points; a mask has at least three", polygons[0].len() / 2))
+            }
+            few => Ok(Some(format!("{few} polygons with fewer than three points were left out of their masks"))),
+        }
     }
 }
 
@@ -229,17 +256,11 @@ fn leaves_beside(path: &Path) -> Option<PathBuf> {
     Some(path.with_file_name(format!("leaves_{split}"))).filter(|leaves| leaves.is_file())
 }
 
-/// Returns the beginning of an error message: an annotation with its id and line. Searches only behind the key
-/// `annotations`, since images have ids too.
-fn named(id: u64, document: &[u8]) -> String {
-    let text = String::from_utf8_lossy(document);
-    let from = text.find("\"annotations\"").unwrap_or(0);
-    let key = text[from..].match_indices("\"id\"").map(|(at, key)| from + at + key.len()).find(|at| {
-        let value = text[*at..].trim_start().strip_prefix(':').map_or("", str::trim_start);
-        value.split(|c: char| !c.is_ascii_digit()).next().and_then(|digits| digits.parse().ok()) == Some(id)
-    });
-    let line = key.map(|at| format!(" in line {}", text[..at].matches('\n').count() + 1)).unwrap_or_default();
-    format!("annotation {id}{line} ")
+/// Returns the beginning of an error message: an annotation with its id and line.
+fn named(id: Option<&Id>, place: usize, document: &[u8]) -> String {
+    let Some(Id(id)) = id else { return format!("annotation at position {place} of the list ") };
+    let line = spot::line_of(&String::from_utf8_lossy(document), id);
+    format!("annotation {id}{} ", line.map(|line| format!(" in line {line}")).unwrap_or_default())
 }
 
 /// Returns the annotation files, each with the split in its name, if any.
@@ -291,27 +312,59 @@ impl Source for Coco {
 
     fn read(&self, place: usize) -> Result<Labelled> {
         let image = &self.images[place];
-        let (w, h, rgb) = furrow_output::read_photo(&image.path)?;
-        same_size(&image.path, (w, h), image.size)?;
-        let (semantics, found, points) = painted(image)?;
-        let Instances { plants, leaves, warnings, .. } = found;
-        Ok(Labelled { size: (w, h), rgb, nir: Vec::new(), semantics, plants, leaves, points, warnings })
+        let Shot { size, pixels: rgb, mut warnings, stored, orientation } =
+            photograph(furrow_output::open_photo(&image.path)?);
+        if let Some(listed) = image.size.filter(|listed| *listed != size) {
+            return Err(image.other_size(listed, size, stored, orientation));
+        }
+        warnings.extend(image.warnings.iter().cloned());
+        let (semantics, found, points) = painted(image, size, self.crowds)?;
+        warnings.extend(found.warnings);
+        Ok(Labelled {
+            size,
+            rgb,
+            nir: Vec::new(),
+            semantics,
+            plants: found.plants,
+            leaves: found.leaves,
+            points,
+            warnings: warnings::summed(&warnings),
+        })
+    }
+}
+
+impl Annotated {
+    /// Returns the error about a picture whose size is not the one in the annotation file.
+    fn other_size(&self, listed: (u32, u32), size: (u32, u32), stored: (u32, u32), orientation: u8) -> Error {
+        let ((w, h), (x, y)) = (size, listed);
+        let document = self.document.display();
+        let error = if listed == stored {
+            Error::input(format!(
+                "its EXIF orientation {orientation} turns it to {w} × {h} pixels; {document} was drawn on the picture \
+                 as stored, {x} × {y}"
+            ))
+            .help("remove the orientation from the picture, or draw the labels on the picture as viewers show it")
+        } else {
+            Error::input(format!("it has {w} × {h} pixels, but {x} × {y} in {document}"))
+                .help("give the pictures that were labelled, at their size")
+        };
+        error.in_file(&self.path)
     }
 }
 
 type Points = BTreeMap<(u32, u16), [Option<Keypoint>; 3]>;
 
 /// Rasterizes the annotations of an image. Returns the classes, the plants and leaves, and their keypoints.
-fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
-    let (w, h) = image.size;
+fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec<u8>, Instances, Points)> {
     let n = w as usize * h as usize;
     let (mut semantics, mut plants, mut leaves) = (vec![Class::Soil as u8; n], vec![0_u32; n], vec![0_u32; n]);
     let mut masks: Vec<(usize, Vec<u32>)> = Vec::new();
     for (k, thing) in image.things.iter().enumerate() {
-        masks.push((k, pixels(image, thing)?));
+        masks.push((k, pixels((w, h), thing)?));
     }
+    let mut dropped = doubts(image, (w, h), &masks, crowds);
     masks.sort_by_key(|(k, pixels)| (std::cmp::Reverse(pixels.len()), *k));
-    let numbers = plant_numbers(&image.things);
+    let numbers = plant_numbers(&image.things, crowds);
     for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning != Meaning::Leaf) {
         for i in pixels {
             semantics[*i as usize] = image.things[*k].meaning.number();
@@ -340,8 +393,16 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
     }
     let mut found = instances(&image.path, &semantics, &plants, &leaves)?;
     if beyond > 0 {
-        found.warnings.push(format!("{beyond} pixels of leaves are outside their plants and were removed"));
+        dropped.push(format!("{beyond} pixels of leaves are outside their plants and were removed"));
     }
+    let seen: BTreeSet<u32> = plants.iter().copied().collect();
+    let hidden =
+        masks.iter().filter(|(k, pixels)| !pixels.is_empty() && numbers[*k] > 0 && !seen.contains(&numbers[*k]));
+    match hidden.count() {
+        0 => {}
+        n => dropped.push(format!("{n} plants are covered by other masks and have no pixel")),
+    }
+    found.warnings.splice(0..0, dropped);
     let mut points = Points::new();
     for (k, thing) in image.things.iter().enumerate() {
         let leaf = thing.meaning == Meaning::Leaf;
@@ -353,10 +414,37 @@ fn painted(image: &Annotated) -> Result<(Vec<u8>, Instances, Points)> {
     Ok((semantics, found, points))
 }
 
+/// Returns warnings about masks that label no pixel or not all that they seem to.
+fn doubts(image: &Annotated, (w, h): (u32, u32), masks: &[(usize, Vec<u32>)], crowds: Crowds) -> Vec<String> {
+    let empty = masks.iter().filter(|(_, pixels)| pixels.is_empty()).count();
+    let beyond = image.things.iter().filter(|thing| thing.segmentation.reaches_beyond(w, h)).count();
+    let is_crowd = |thing: &&Thing| thing.crowd && matches!(thing.meaning, Meaning::Class(Class::Crop | Class::Weed));
+    let alone = if crowds == Crowds::Class { image.things.iter().filter(is_crowd).count() } else { 0 };
+    let told = [
+        (empty, "annotations cover no pixel and were left out"),
+        (beyond, "masks reach more than a pixel beyond the image and were cut at its border"),
+        (
+            alone,
+            "crowds (`iscrowd` 1) have a class and no plant number; if a tool marks painted plants so, give --crowds \
+             instances",
+        ),
+    ];
+    told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")).collect()
+}
+
+impl Segmentation {
+    fn reaches_beyond(&self, w: u32, h: u32) -> bool {
+        let Self::Polygons(polygons) = self else { return false };
+        let outside = |[x, y]: &[f64; 2]| *x < -1.0 || *y < -1.0 || *x > f64::from(w) + 1.0 || *y > f64::from(h) + 1.0;
+        polygons.iter().any(|polygon| polygon.as_chunks::<2>().0.iter().any(outside))
+    }
+}
+
 /// Returns the plant number of each annotation, 0 for other annotations. Uses the numbers in the attributes if all
 /// plants have different ones, otherwise counts from 1.
-fn plant_numbers(things: &[Thing]) -> Vec<u32> {
-    let is_plant = |t: &Thing| !t.crowd && matches!(t.meaning, Meaning::Class(Class::Crop | Class::Weed));
+fn plant_numbers(things: &[Thing], crowds: Crowds) -> Vec<u32> {
+    let is_one = |t: &Thing| !t.crowd || crowds == Crowds::Instances;
+    let is_plant = |t: &Thing| is_one(t) && matches!(t.meaning, Meaning::Class(Class::Crop | Class::Weed));
     let told: Vec<u32> = things.iter().filter(|t| is_plant(t)).filter_map(|t| t.plant).collect();
     let distinct: BTreeSet<u32> = told.iter().copied().filter(|n| *n > 0).collect();
     let own = distinct.len() == things.iter().filter(|t| is_plant(t)).count();
@@ -372,16 +460,15 @@ fn plant_numbers(things: &[Thing]) -> Vec<u32> {
 }
 
 /// Returns the pixels of a mask, as indices into the image row by row.
-fn pixels(image: &Annotated, thing: &Thing) -> Result<Vec<u32>> {
-    let (w, h) = image.size;
+fn pixels((w, h): (u32, u32), thing: &Thing) -> Result<Vec<u32>> {
     let wrong = |what: String| {
         let document = furrow_base::input::contents(&thing.document).unwrap_or_default();
-        Error::input(format!("{}has a wrong mask: {what}", named(thing.id, &document))).in_file(thing.document.as_ref())
+        let name = named(thing.id.as_ref(), thing.place, &document);
+        Error::input(format!("{name}has a wrong mask: {what}")).help(document::HELP).in_file(thing.document.as_ref())
     };
     let rle = match &thing.segmentation {
         Segmentation::Polygons(polygons) => return Ok(inside(w, h, polygons)),
-        Segmentation::Packed(rle) => rle.clone(),
-        Segmentation::Runs { size, counts } => Rle::of_runs(*size, counts),
+        Segmentation::Runs(rle) => rle,
     };
     if rle.size != [h, w] {
         return Err(wrong(format!("it is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
@@ -456,14 +543,6 @@ mod tests {
         let triangle = vec![0.0, 0.0, 4.0, 0.0, 0.0, 4.0];
         assert_eq!(inside(4, 4, &[triangle]).len(), 6);
         assert_eq!(inside(4, 4, &[vec![]]), Vec::<u32>::new());
-    }
-
-    #[test]
-    fn an_annotation_is_named_with_its_line() {
-        let text = b"{\"images\": [\n{\"id\": 7}],\n\"annotations\": [{\"id\" : 71},\n {\"image_id\": 7, \"id\": 7}]}";
-        assert_eq!(named(7, text), "annotation 7 in line 4 ");
-        assert_eq!(named(71, text), "annotation 71 in line 3 ");
-        assert_eq!(named(8, text), "annotation 8 ");
     }
 
     /// Reference implementation that tests every edge in every row.
