@@ -84,6 +84,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("half", "train/weights.rs"),
     // Checksums as text.
     ("hex", "field/library.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs report/page.rs"),
+    // Heads of requests to a local web page.
+    ("httparse", "bin/trace/watch/http.rs"),
     ("humantime", "bin/ cli/mod.rs"),
     ("hw_skymodel", "light/hosek.rs"),
     // Photographs (input), and thumbnails for HTML pages (output).
@@ -158,8 +160,6 @@ const ALLOWED: &[(&str, &str)] = &[
     ),
     // An external image viewer.
     ("tev_client", "bin/trace/watch/tev.rs"),
-    // A local web page.
-    ("tiny_http", "bin/trace/watch/answer.rs bin/trace/watch/server.rs"),
     // GPUs.
     ("wgpu", "raster/"),
 ];

@@ -361,7 +361,10 @@ fn whoever_does_not_know_the_address_is_refused() {
     for path in ["/", "/state", "/00000000000000000000000000000000/", "/00000000000000000000000000000000/state"] {
         assert_eq!(status(path, &own), 403, "{path}");
     }
-    for headers in ["", "Host: evil.example\r\n", "Host: 192.0.2.1\r\n"] {
+    for host in ["evil.example", "192.0.2.1", "[::1].evil", "localhost.evil", "127.0.0.1:80.evil"] {
+        assert_eq!(status(&watched.base, &format!("Host: {host}\r\n")), 403, "{host}");
+    }
+    for headers in ["", "Origin: http://localhost\r\n"] {
         assert_eq!(status(&watched.base, headers), 403, "{headers}");
     }
     for origin in ["http://evil.example", "null"] {
@@ -384,6 +387,34 @@ fn whoever_does_not_know_the_address_is_refused() {
     }
     assert_eq!(watched.ask("DELETE", &watched.base, &own, "").0, 405);
     assert_eq!((watched.text(), watched.end("TERM").0), (before, Some(75)));
+}
+
+/// Rationale: a client decides how much it sends and when. Expected: with seventy requests whose bodies never come, the
+/// page still answers, and Ctrl-C ends the program; a head without an end is refused, also without the token.
+#[test]
+fn slow_and_endless_requests_stop_nothing() {
+    let watched = Watched::start(&[]);
+    watched.events().done();
+    let open = |head: &str| {
+        let mut stream = TcpStream::connect(&watched.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(stream, "{head}").unwrap();
+        stream
+    };
+    let mut endless = open("GET / HTTP/1.1\r\nX: ");
+    endless.write_all(&[b'x'; 100_000]).unwrap();
+    let mut answer = [0; 12];
+    endless.read_exact(&mut answer).unwrap();
+    assert_eq!(&answer, b"HTTP/1.1 431");
+    let head = format!("POST {}wish HTTP/1.1\r\nHost: {}\r\nContent-Length: 100\r\n\r\n{{", watched.base, watched.host);
+    let slow: Vec<TcpStream> = (0..70).map(|_| open(&head)).collect();
+    assert_eq!(watched.get("state").0, 200);
+    let begin = Instant::now();
+    let (code, said) = watched.end("INT");
+    assert_eq!(code, Some(75), "{said}");
+    // Half a second is enough; the machine may be busy.
+    assert!(begin.elapsed() < Duration::from_secs(3), "{:?}", begin.elapsed());
+    drop(slow);
 }
 
 #[test]

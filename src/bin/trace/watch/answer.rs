@@ -1,9 +1,8 @@
 //! HTTP responses with the headers that isolate the page.
 
 use furrow_base::{Error, Result};
-use std::io::Cursor;
+use std::fmt::Write;
 use std::path::Path;
-use tiny_http::{Header, Response};
 
 /// Content security policy: the page may load scripts, styles and images only from its own address, and may not be
 /// framed.
@@ -13,26 +12,72 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// Maximum size of a photograph, bytes.
 const LARGEST: u64 = 256 << 20;
 
+/// Headers of every response: nothing is kept, and no other page may use it.
+const HEADERS: [(&str, &str); 6] = [
+    ("Cache-Control", "no-store"),
+    ("Connection", "close"),
+    ("Content-Security-Policy", POLICY),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Referrer-Policy", "no-referrer"),
+    ("X-Content-Type-Options", "nosniff"),
+];
+
 /// An HTTP response.
-pub(super) type Answer = Response<Cursor<Vec<u8>>>;
+pub(super) struct Answer {
+    status: u16,
+    kind: &'static str,
+    body: Vec<u8>,
+}
+
+impl Answer {
+    /// Returns status line and headers, with the empty line after them.
+    pub(super) fn head(&self) -> String {
+        let Self { status, kind, body } = self;
+        let mut head = format!("HTTP/1.1 {status} {}\r\n", reason(*status));
+        let _ = write!(head, "Content-Type: {kind}\r\nContent-Length: {}\r\n", body.len());
+        for (name, value) in HEADERS {
+            let _ = write!(head, "{name}: {value}\r\n");
+        }
+        head + "\r\n"
+    }
+
+    /// Returns the body.
+    pub(super) fn body(&self) -> &[u8] {
+        &self.body
+    }
+
+    /// Returns the status.
+    #[cfg(test)]
+    pub(super) fn status(&self) -> u16 {
+        self.status
+    }
+}
+
+/// Returns the reason phrase of a status that this program sends.
+fn reason(status: u16) -> &'static str {
+    match status {
+        200 => "OK",
+        403 => "Forbidden",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        408 => "Request Timeout",
+        411 => "Length Required",
+        413 => "Content Too Large",
+        431 => "Request Header Fields Too Large",
+        500 => "Internal Server Error",
+        503 => "Service Unavailable",
+        _ => "Bad Request",
+    }
+}
 
 /// Response with bytes of a content type.
-pub(super) fn bytes(kind: &str, bytes: Vec<u8>) -> Answer {
-    let headers = [
-        ("Content-Type", kind),
-        ("Cache-Control", "no-store"),
-        ("Content-Security-Policy", POLICY),
-        ("Cross-Origin-Resource-Policy", "same-origin"),
-        ("Referrer-Policy", "no-referrer"),
-        ("X-Content-Type-Options", "nosniff"),
-    ];
-    let known = headers.into_iter().filter_map(|(name, value)| Header::from_bytes(name, value).ok());
-    known.fold(Response::from_data(bytes), Response::with_header)
+pub(super) fn bytes(kind: &'static str, body: Vec<u8>) -> Answer {
+    Answer { status: 200, kind, body }
 }
 
 /// Plain text response.
 pub(super) fn text(status: u16, words: impl Into<String>) -> Answer {
-    bytes("text/plain; charset=utf-8", words.into().into_bytes()).with_status_code(status)
+    Answer { status, kind: "text/plain; charset=utf-8", body: words.into().into_bytes() }
 }
 
 /// JSON response.

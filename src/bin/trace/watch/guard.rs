@@ -5,7 +5,7 @@
 use furrow_base::{Error, Result};
 use std::fmt::Write;
 use std::io::Read;
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv6Addr};
 
 /// Number of random bytes of a token.
 const BYTES: usize = 16;
@@ -48,8 +48,9 @@ impl Guard {
         let Some(host) = host else { return false };
         // Any port is allowed: `ssh -L` may forward from another one.
         let own = match name(host) {
-            "localhost" => true,
-            name => name.parse::<IpAddr>().is_ok_and(|ip| {
+            None => false,
+            Some("localhost") => true,
+            Some(name) => name.parse::<IpAddr>().is_ok_and(|ip| {
                 // A server that listens on all addresses accepts any IP address, but no host name, which could be
                 // anybody's.
                 ip.is_loopback() || ip == self.host || self.host.is_unspecified()
@@ -59,12 +60,14 @@ impl Guard {
     }
 }
 
-/// Returns a `Host` header without port and without the brackets of an IPv6 address.
-fn name(host: &str) -> &str {
-    match host.strip_prefix('[') {
-        Some(rest) => rest.split(']').next().unwrap_or_default(),
-        None => host.split(':').next().unwrap_or_default(),
-    }
+/// Returns a `Host` header without port and without the brackets of an IPv6 address; `None` if anything else follows.
+fn name(host: &str) -> Option<&str> {
+    let (name, rest) = match host.strip_prefix('[') {
+        Some(rest) => rest.split_once(']').filter(|(name, _)| name.parse::<Ipv6Addr>().is_ok())?,
+        None => host.split_at(host.find(':').unwrap_or(host.len())),
+    };
+    let port = |rest: &str| rest.strip_prefix(':').is_some_and(|port| port.bytes().all(|b| b.is_ascii_digit()));
+    (rest.is_empty() || port(rest)).then_some(name)
 }
 
 #[cfg(test)]
@@ -94,6 +97,12 @@ mod tests {
         assert!(!local.admits(None, None));
         assert!(!local.admits(Some("evil.example:8000"), None));
         assert!(!local.admits(Some("192.168.1.5:8000"), None));
+        for host in ["[::1].evil", "[::1].evil:80", "[::1]evil", "[127.0.0.1]", "[::1", "[]", "::1"] {
+            assert!(!local.admits(Some(host), None), "{host}");
+        }
+        for host in ["localhost.evil", "localhost:9.evil", "localhost:9:9", "127.0.0.1:.evil", "127.0.0.1.evil", ""] {
+            assert!(!local.admits(Some(host), None), "{host}");
+        }
         for origin in ["http://evil.example", "null", "http://127.0.0.1:9", "https://127.0.0.1:8000"] {
             assert!(!local.admits(Some("127.0.0.1:8000"), Some(origin)), "{origin}");
         }

@@ -10,12 +10,14 @@
 //! | `picture` | images of the four views, and inspection of single pixels |
 //! | `guard` | access control: token, `Host` and `Origin` |
 //! | `server`, `answer` | requests and responses |
+//! | `http` | parsing of requests, with limits on size and time |
 //! | `tev` | display of the image in another program |
 //! | `page.html`, `page.css`, `page.js` | the page |
 
 mod answer;
 mod files;
 mod guard;
+mod http;
 mod picture;
 mod server;
 mod session;
@@ -86,7 +88,7 @@ enum Display {
 }
 
 /// How long to wait for a rendering at the end.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Serves the page until a signal arrives.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
@@ -98,14 +100,14 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let session = Arc::new(Session::new(args.scene.clone(), wish, args.spp));
     session.show(|shown| shown.photo = photo.is_some());
     let guard = Guard::new(args.host)?;
-    let mut server = Server::open(args.host, args.port, guard, session.clone(), photo)?;
+    let server = Server::open(args.host, args.port, guard, session.clone(), photo)?;
     server.tell();
     let files = files::watch(session.clone())?;
     let tev = args.display.map(|Display::Tev| tev::Tev::default());
     let worker = Worker::new(session.clone(), files, (&threads, args.memory.bytes), tev)?;
     let thread =
         std::thread::Builder::new().name("render".into()).spawn(move || worker.run()).map_err(Error::no_thread)?;
-    server.serve(stop);
+    server.serve(stop)?;
     session.end();
     // It may be building a field. There is no need to wait for that, because nothing is written.
     let begin = Instant::now();

@@ -1,7 +1,9 @@
 //! HTTP server of the page. Each request is answered in its own thread, so that a slow client does not block others.
+//! Nobody waits for these threads at the end.
 
 use super::answer::{self, Answer, Photo};
 use super::guard::Guard;
+use super::http::{Connection, Head, Refusal};
 use super::session::Session;
 use super::sliders;
 use furrow_base::{Error, Result};
@@ -9,22 +11,17 @@ use furrow_job::Renderer;
 use furrow_render::settings::{Quality, RenderOptions};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::io::{Read, Write};
-use std::net::{IpAddr, SocketAddr, TcpListener};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use tiny_http::{Method, Request};
 
-/// Maximum number of concurrent requests; browsers open six connections per page.
-const MOST: usize = 64;
-/// Maximum body size of a request, bytes.
-const LARGEST: u64 = 64 << 10;
-/// Keep-alive interval of an idle event stream, and polling interval for new requests and the stop flag.
+/// Maximum number of concurrent connections; browsers open six per page.
+const MOST: usize = 256;
+/// Keep-alive interval of an idle event stream, and minimum interval between warnings about too many connections.
 const BEAT: Duration = Duration::from_secs(10);
+/// Polling interval of the stop flag, and pause after a connection could not be accepted.
 const GLANCE: Duration = Duration::from_millis(50);
-/// Interval of the check that the server still accepts connections.
-const LOOK: Duration = Duration::from_secs(1);
 /// Samples per pixel for the description of a pixel.
 const EXPLAINED: u32 = 64;
 
@@ -86,7 +83,7 @@ struct Desk {
 
 /// The HTTP server.
 pub(super) struct Server {
-    http: tiny_http::Server,
+    listener: TcpListener,
     address: SocketAddr,
     desk: Arc<Desk>,
 }
@@ -101,13 +98,13 @@ impl Server {
         photo: Option<Photo>,
     ) -> Result<Self> {
         let wanted = SocketAddr::new(host, port);
-        let http = tiny_http::Server::http(wanted).map_err(|e| {
+        let listener = TcpListener::bind(wanted).map_err(|e| {
             Error::failed(format!("cannot listen on {wanted}: {e}")).help("omit --port to use a free one")
         })?;
-        let address = http.server_addr().to_ip().unwrap_or(wanted);
+        let address = listener.local_addr().unwrap_or(wanted);
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(EXPLAINED)))?;
         let desk = Desk { guard, session, photo, renderer, busy: AtomicUsize::new(0), writing: Mutex::new(()) };
-        Ok(Self { http, address, desk: Arc::new(desk) })
+        Ok(Self { listener, address, desk: Arc::new(desk) })
     }
 
     /// Prints the address of the page, for this machine and for others.
@@ -130,95 +127,91 @@ impl Server {
         furrow_cli::tell!("press Ctrl-C to stop");
     }
 
-    /// Serves requests until `stop` is set.
-    pub(super) fn serve(&mut self, stop: &AtomicBool) {
-        let mut looked = Instant::now();
+    /// Serves requests until `stop` is set. The thread that accepts connections ends with the program.
+    pub(super) fn serve(self, stop: &AtomicBool) -> Result<()> {
+        let accept = move || self.accept();
+        std::thread::Builder::new().name("accept".into()).spawn(accept).map_err(Error::no_thread)?;
         while !stop.load(Ordering::Relaxed) {
-            let request = match self.http.recv_timeout(GLANCE) {
-                Ok(Some(request)) => request,
-                Ok(None) if looked.elapsed() < LOOK => continue,
-                Ok(None) | Err(_) => {
-                    looked = Instant::now();
-                    self.listen_again();
-                    continue;
+            std::thread::sleep(GLANCE);
+        }
+        Ok(())
+    }
+
+    /// Accepts connections; each is served in its own thread.
+    fn accept(&self) {
+        let mut warned: Option<Instant> = None;
+        loop {
+            let admitted = match self.listener.accept() {
+                Ok((stream, _)) => self.admit(stream),
+                // No more files can be opened, or the client has gone. Connections that end may help.
+                Err(_) => {
+                    std::thread::sleep(GLANCE);
+                    false
                 }
             };
-            let desk = self.desk.clone();
-            let Some(request) = bearable(request) else { continue };
-            if desk.busy.fetch_add(1, Ordering::SeqCst) >= MOST {
-                desk.busy.fetch_sub(1, Ordering::SeqCst);
-                let _ = request.respond(answer::text(503, "too many requests at once"));
-                continue;
-            }
-            let work = move || {
-                let _busy = Busy(&desk.busy);
-                desk.receive(request);
-            };
-            // If no thread can be started, the request is dropped, which sends status 500.
-            if std::thread::Builder::new().name("answer".into()).spawn(work).is_err() {
-                self.desk.busy.fetch_sub(1, Ordering::SeqCst);
+            if !admitted && warned.is_none_or(|at| at.elapsed() > BEAT) {
+                warned = Some(Instant::now());
+                furrow_cli::tell!("warning: there are too many connections at once; some are refused");
             }
         }
     }
-}
 
-impl Server {
-    /// Listens again at the same address if nothing does any more: the thread that accepts connections ends, with an
-    /// error or a panic, when no more files can be opened.
-    fn listen_again(&mut self) {
-        let Ok(listener) = TcpListener::bind(self.address) else { return };
-        if let Ok(http) = tiny_http::Server::from_listener(listener, None) {
-            furrow_cli::tell!("warning: there were too many connections at once; listening again");
-            self.http = http;
+    /// Serves a connection in a new thread. Returns `false` if there are too many connections or threads.
+    fn admit(&self, stream: TcpStream) -> bool {
+        let Ok(connection) = Connection::new(stream) else { return true };
+        let busy = Busy::new(&self.desk);
+        if busy.0.busy.load(Ordering::SeqCst) > MOST {
+            connection.refuse(&answer::text(503, "too many connections at once"));
+            return false;
         }
+        let work = move || busy.0.receive(connection);
+        std::thread::Builder::new().name("answer".into()).spawn(work).is_ok()
     }
 }
 
-/// Maximum size in bytes of an unread body, because dropping its request reserves memory for it.
-const BEARABLE: usize = 1 << 24;
+/// Counts one connection until it is dropped, also by a panic.
+struct Busy(Arc<Desk>);
 
-/// Counts one answering thread until it is dropped, also by a panic.
-struct Busy<'a>(&'a AtomicUsize);
+impl Busy {
+    fn new(desk: &Arc<Desk>) -> Self {
+        desk.busy.fetch_add(1, Ordering::SeqCst);
+        Self(desk.clone())
+    }
+}
 
-impl Drop for Busy<'_> {
+impl Drop for Busy {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
+        self.0.busy.fetch_sub(1, Ordering::SeqCst);
     }
-}
-
-/// Returns a request whose body size is acceptable, and answers any other. The server library reserves memory for the
-/// stated length of an unread body when its request is dropped, so an oversized request is leaked together with its
-/// connection.
-fn bearable(request: Request) -> Option<Request> {
-    if request.body_length().is_none_or(|length| length <= BEARABLE) {
-        return Some(request);
-    }
-    let rest = request.upgrade("close", answer::text(413, "this body is too large"));
-    std::mem::forget(rest);
-    None
 }
 
 impl Desk {
-    fn receive(&self, mut request: Request) {
-        let url = request.url().to_owned();
-        let (path, query) = url.split_once('?').unwrap_or((&url, ""));
-        let header = |name: &'static str| {
-            request.headers().iter().find(|h| h.field.equiv(name)).map(|h| h.value.as_str().to_owned())
+    /// Reads a request and answers it.
+    fn receive(&self, mut connection: Connection) {
+        let answer = match connection.head().and_then(|head| self.answer(&mut connection, head)) {
+            Ok(Some(answer)) | Err(Refusal::Answer(answer)) => answer,
+            Ok(None) => return self.stream(connection),
+            Err(Refusal::Gone) => return,
         };
-        let admitted = self.guard.admits(header("Host").as_deref(), header("Origin").as_deref());
-        let answer = match self.guard.within(path).filter(|_| admitted) {
-            None => answer::text(403, "forbidden: use the address that the program has printed"),
-            Some("events") if *request.method() == Method::Get => return self.stream(request),
-            Some(name) => match request.method().clone() {
-                Method::Get => self.get(name, query).unwrap_or_else(|e| answer::error(&e)),
-                Method::Post => match body(&mut request) {
-                    Ok(body) => self.post(name, &body).unwrap_or_else(|e| answer::error(&e)),
-                    Err(refusal) => refusal,
-                },
-                _ => answer::text(405, "only GET and POST"),
-            },
-        };
-        let _ = request.respond(answer);
+        connection.respond(&answer);
+    }
+
+    /// Returns the response to a request; `None` for the event stream.
+    fn answer(&self, connection: &mut Connection, head: Head) -> std::result::Result<Option<Answer>, Refusal> {
+        let target = head.target.clone();
+        let (path, query) = target.split_once('?').unwrap_or((&target, ""));
+        let admitted = self.guard.admits(head.only("Host")?, head.only("Origin")?);
+        Ok(Some(match (self.guard.within(path).filter(|_| admitted), head.method.as_str()) {
+            // The body of a request that is refused is not read.
+            (None, _) => answer::text(403, "forbidden: use the address that the program has printed"),
+            (Some("events"), "GET") => return Ok(None),
+            (Some(name), "GET") => self.get(name, query).unwrap_or_else(|e| answer::error(&e)),
+            (Some(name), "POST") => {
+                let body = connection.body(head)?;
+                self.post(name, &body).unwrap_or_else(|e| answer::error(&e))
+            }
+            _ => answer::text(405, "only GET and POST"),
+        }))
     }
 
     fn get(&self, name: &str, query: &str) -> Result<Answer> {
@@ -281,11 +274,10 @@ impl Desk {
     }
 
     /// Server-sent events: the current state, and again whenever it changes.
-    fn stream(&self, request: Request) {
-        let mut out = request.into_writer();
+    fn stream(&self, mut connection: Connection) {
         let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
                     X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n";
-        let mut send = |words: &str| out.write_all(words.as_bytes()).and_then(|()| out.flush());
+        let mut send = |words: &str| connection.write(words.as_bytes());
         let mut seen = 0;
         let mut gone = send(head).is_err();
         while !gone {
@@ -297,19 +289,6 @@ impl Desk {
             };
             seen = version;
         }
-    }
-}
-
-/// Reads the body of a request; returns an error response if it is too large.
-fn body(request: &mut Request) -> std::result::Result<Vec<u8>, Answer> {
-    let mut bytes = Vec::new();
-    if request.body_length().is_some_and(|length| length as u64 > LARGEST) {
-        return Err(answer::text(413, "this body is too large"));
-    }
-    match request.as_reader().take(LARGEST + 1).read_to_end(&mut bytes) {
-        Ok(_) if bytes.len() as u64 > LARGEST => Err(answer::text(413, "this body is too large")),
-        Ok(_) => Ok(bytes),
-        Err(_) => Err(answer::text(400, "this body cannot be read")),
     }
 }
 
