@@ -17,8 +17,12 @@ pub fn choose(what: &str, expected: &[&str], found: &str) -> String {
 pub fn nearest<'a, S: AsRef<str>>(known: &'a [S], found: &str) -> Option<&'a str> {
     // Among equally close names prefer one with the same initial: `weeds`, not `seed`, for `weed`.
     let unlike = |known: &str| known.chars().next() != found.chars().next();
-    let near = known.iter().map(AsRef::as_ref).map(|k| (strsim::levenshtein(k, found), unlike(k), k)).min();
-    near.filter(|(d, _, k)| *d <= 1 + k.len() / 4).map(|(_, _, k)| k)
+    let most = |known: &str| 1 + known.len() / 4;
+    // The distance is at least the difference in length, and takes time proportional to the product of the lengths.
+    let letters = found.chars().count();
+    let comparable = known.iter().map(AsRef::as_ref).filter(|k| letters.abs_diff(k.chars().count()) <= most(k));
+    let near = comparable.map(|k| (strsim::levenshtein(k, found), unlike(k), k)).min();
+    near.filter(|(d, _, k)| *d <= most(k)).map(|(_, _, k)| k)
 }
 
 #[cfg(test)]
@@ -32,5 +36,14 @@ mod tests {
         assert_eq!(nearest(&["seed", "weeds"], "weed"), Some("weeds"));
         assert_eq!(choose("sizes", &["small", "large"], "smal"), "did you mean `small`? sizes are small, large");
         assert_eq!(choose("sizes", &[], "smal"), "there are no sizes");
+    }
+
+    /// Expected: a text of the size of a file is compared in no time; the full distances would take minutes.
+    #[test]
+    fn a_long_name_is_not_compared() {
+        let known: Vec<String> = (0..1000).map(|i| format!("name_of_a_field_{i}")).collect();
+        let begin = std::time::Instant::now();
+        assert_eq!(nearest(&known, &"x".repeat(1_000_000)), None);
+        assert!(begin.elapsed() < std::time::Duration::from_secs(10), "{:?}", begin.elapsed());
     }
 }
