@@ -68,7 +68,7 @@ impl Estimate {
 }
 
 /// Formats a number of bytes in GiB.
-pub(super) fn gib(bytes: f64) -> String {
+pub fn gib(bytes: f64) -> String {
     let gib = bytes / (1_u64 << 30) as f64;
     if gib < 1e4 { format!("{gib:.1} GiB") } else { format!("{gib:.0e} GiB") }
 }

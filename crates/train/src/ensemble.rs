@@ -54,14 +54,16 @@ impl Ensemble {
         self.members.len()
     }
 
-    /// Returns the models, loaded on the device `place`.
+    /// Returns the models, loaded on the device `place`. If all images are stretched to one size, that size is checked against the memory.
     #[cfg(feature = "torch")]
     pub fn models(&self, place: Where) -> Result<Vec<Model>> {
-        let ModelCard { network, input, classes, .. } = &self.card;
-        self.members
-            .iter()
-            .map(|values| Model::with(*network, input.bands.len(), classes.len(), values, place))
-            .collect()
+        let ModelCard { network, input, classes, resize, .. } = &self.card;
+        let model = |values| Model::with(*network, input.bands.len(), classes.len(), values, place);
+        let models = self.members.iter().map(|values| model(values)).collect::<Result<Vec<_>>>()?;
+        if let (Some(model), true) = (models.first(), resize.is_stretch()) {
+            model.check_inference(1, (input.width, input.height))?;
+        }
+        Ok(models)
     }
 }
 

@@ -12,7 +12,7 @@ use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, fitting, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
-use super::torch::{Model, Precision, Where, device, multiscale};
+use super::torch::{Model, Precision, Where, device, guarded, multiscale};
 use super::weights::{self, Array};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::split::Split;
@@ -80,6 +80,17 @@ fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
 
 /// Like [`fit`], and for a self-training also takes the photographs without labels.
 pub(super) fn train(
+    plan: &Plan,
+    begin: Option<&Path>,
+    photos: Option<Photos>,
+    machine: &Machine,
+    folder: &Path,
+    callbacks: &Callbacks<'_>,
+) -> Result<Results> {
+    guarded(|| train_here(plan, begin, photos, machine, folder, callbacks))
+}
+
+fn train_here(
     plan: &Plan,
     begin: Option<&Path>,
     photos: Option<Photos>,
@@ -193,17 +204,19 @@ pub fn calibrated(
     threads: usize,
     machine: &Machine,
 ) -> Result<TrainedModel> {
-    let card = &trained.card;
-    let place = machine.place(precision)?;
-    device::set_threads(threads);
-    let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
-    let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
-    if store.is_empty() {
-        return Err(Error::misuse("there is no image to calibrate on").help("name other images, such as DIR@all"));
-    }
-    let values = calibrate(&model, &store, &card.normalization, images)?;
-    let card = ModelCard { weights_sha256: weights::hash(&values), ..card.clone() };
-    Ok(TrainedModel { card, values })
+    guarded(|| {
+        let card = &trained.card;
+        let place = machine.place(precision)?;
+        device::set_threads(threads);
+        let model = Model::with(card.network, card.input.bands.len(), card.classes.len(), &trained.values, place)?;
+        let store = Store::open(on, Pick::Split(Split::Train), 0, &card.classes, &card.input, false, 0)?;
+        if store.is_empty() {
+            return Err(Error::misuse("there is no image to calibrate on").help("name other images, such as DIR@all"));
+        }
+        let values = calibrate(&model, &store, &card.normalization, images)?;
+        let card = ModelCard { weights_sha256: weights::hash(&values), ..card.clone() };
+        Ok(TrainedModel { card, values })
+    })
 }
 
 /// Image and its prediction, as [`evaluate`] passes them to its callback.
@@ -221,6 +234,18 @@ pub struct Predicted<'a> {
 /// Evaluates a trained model or ensemble on the images of a dataset, one after the other. Each image and its prediction are
 /// passed to `seen`. If `stop` is set, the evaluation ends with an error.
 pub fn evaluate(
+    trained: &Ensemble,
+    on: &Selection,
+    precision: &str,
+    threads: usize,
+    machine: &Machine,
+    stop: &AtomicBool,
+    seen: &mut dyn FnMut(&Predicted<'_>) -> Result<()>,
+) -> Result<Report> {
+    guarded(|| evaluate_here(trained, on, precision, threads, machine, stop, seen))
+}
+
+fn evaluate_here(
     trained: &Ensemble,
     on: &Selection,
     precision: &str,

@@ -12,7 +12,7 @@ use crate::refine::{Appearance, Refine};
 use crate::run::ModelCard;
 use crate::session::Machine;
 use crate::torch::multiscale::{self, Scores};
-use crate::torch::{Model, device};
+use crate::torch::{Model, device, guarded};
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_output::Picture as Png;
@@ -73,6 +73,16 @@ const AHEAD: usize = 2;
 /// Predicts the classes of images. Writes two PNG files per image into `out`, both at the image's original size: the class map (indexed
 /// colours) and its overlay on the image. Fails if it would overwrite files that are not predictions of the same images.
 pub fn predict(
+    trained: &Ensemble,
+    pictures: &[Picture],
+    out: &Path,
+    machine: &Machine,
+    options: &Options<'_>,
+) -> Result<Predictions> {
+    guarded(|| predict_here(trained, pictures, out, machine, options))
+}
+
+fn predict_here(
     trained: &Ensemble,
     pictures: &[Picture],
     out: &Path,

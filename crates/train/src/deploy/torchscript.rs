@@ -9,7 +9,7 @@ use super::Facts;
 use crate::data::Normalization;
 use crate::data::normalise::LEAST;
 use crate::run::{TrainedModel, write_json};
-use crate::torch::{Model, Pass, Precision, Where, failed};
+use crate::torch::{Model, Pass, Precision, Where, failed, guarded};
 use furrow_base::{Error, Result};
 use furrow_output::place_atomically;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,11 @@ pub fn facts_path(path: &Path) -> PathBuf {
 
 /// Traces the network for images of this width and height in pixels and writes it atomically, together with its metadata file. Fails if the
 /// images are smaller than the network allows.
-pub fn write(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -> Result<()> {
+pub fn write(trained: &TrainedModel, size: (u32, u32), path: &Path) -> Result<()> {
+    guarded(|| trace(trained, size, path))
+}
+
+fn trace(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -> Result<()> {
     let card = &trained.card;
     let bands = card.input.bands.len();
     let least = card.network.least_side();
@@ -36,6 +40,7 @@ pub fn write(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -
     }
     let place = Where { device: Device::Cpu, precision: Precision::Single };
     let mut model = Model::with(card.network, bands, card.classes.len(), &trained.values, place)?;
+    model.check_inference(1, (width, height))?;
     model.freeze();
     let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
     let taken_out = TakenOut::of(&card.normalization);

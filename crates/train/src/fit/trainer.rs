@@ -106,6 +106,7 @@ pub fn train(
     } else if !begin.is_empty() {
         model.load(begin)?;
     }
+    model.check_training(hyper.batch, plan.crop_size())?;
     let mut optimiser = Optimiser::new(hyper.optimiser, hyper.decay, at.step, &at.memory, &model);
     let mut ema = if hyper.ema > 0.0 { Some(Ema::new(hyper.ema, &at.average, &model)?) } else { None };
     let rarities = class_weights::rarities(&data.train, classes)?;
@@ -297,6 +298,7 @@ fn validate(
         let example = val.get(place)?;
         let mut pixels = augment::interleave(&example, 1);
         normalization.apply(&mut pixels, shape.bands.len());
+        model.check_inference(1, size)?;
         let scores = tch::no_grad(|| model.forward(&model.images(&pixels, size), Pass::Inference));
         if example.labels.iter().any(|label| *label != IGNORE) {
             let truth = labels(model, &example.labels, 1, size);

@@ -2,11 +2,12 @@
 //!
 //! Implementations of the trait give the definition its meaning: [`parameters()`] lists the parameters, `torch` computes the network
 //! with libtorch, and the exporters write its graph. So parameter counts, forward passes and exported graphs always agree. This
-//! module does not need libtorch.
+//! module does not need libtorch. [`Footprint`] follows the sizes of values, for an estimate of the memory.
 //!
 //! To add a network, add one file and one line in the table below.
 
 mod basic_segnet;
+mod footprint;
 mod lite_unet;
 mod parameters;
 mod pretrained;
@@ -15,6 +16,7 @@ mod tiny_unet;
 mod unet;
 mod vit_unet;
 
+pub use footprint::{Footprint, MULTIPLIED_OUT};
 pub use parameters::{Parameter, Role, fitting, is_encoder, parameters};
 pub use pretrained::Pretrained;
 

@@ -1,13 +1,9 @@
 //! Implementation of [`Operations`] that computes a network with libtorch.
 
 use super::device::Precision;
-use crate::net::{Conv, Norm, Operations, is_encoder};
+use crate::net::{Conv, MULTIPLIED_OUT, Norm, Operations, is_encoder};
 use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
-
-/// Largest number of tokens for which attention is computed with explicit matrices: an image of 560 × 350 pixels in patches of 14, and
-/// the class token.
-const MULTIPLIED_OUT: i64 = 1 + 1000;
 
 /// Kind of forward pass: which statistics batch norms use, and whether it updates the running statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +137,7 @@ impl Operations for Compute<'_> {
         let (channels, heads, count) = (channels as i64, heads as i64, x.size()[3]);
         let split = x.reshape([-1, 3, heads, channels / heads, count]).transpose(3, 4);
         let [query, key, value] = [0, 1, 2].map(|part| split.select(1, part));
-        let y = if count > MULTIPLIED_OUT {
+        let y = if count > MULTIPLIED_OUT as i64 {
             Tensor::scaled_dot_product_attention(&query, &key, &value, None::<&Tensor>, 0.0, false, None, false)
         } else {
             let products = query.matmul(&key.transpose(2, 3)) * (heads as f64 / channels as f64).sqrt();

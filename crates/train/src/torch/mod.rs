@@ -4,6 +4,8 @@
 
 mod compute;
 pub mod device;
+mod guard;
+mod memory;
 pub mod multiscale;
 
 use super::net::{Network, Parameter, fitting, parameters};
@@ -18,6 +20,7 @@ use tch::{Device, Kind, Tensor};
 
 pub use compute::Pass;
 pub use device::{Precision, Where};
+pub use guard::guarded;
 
 /// Number of times the finer encoder features are halved: cells of 8 pixels.
 const FINE: usize = 3;
@@ -99,19 +102,21 @@ impl Model {
 
     /// Predicts the class of each pixel of one or more images, stored as images × height × width × bands.
     pub fn predict(&self, pixels: &[f32], (width, height): (u32, u32)) -> Result<Vec<u8>> {
-        let x = self.images(pixels, (width, height));
+        let x = self.input(pixels, (width, height))?;
         classes(&tch::no_grad(|| self.forward(&x, Pass::Inference)))
     }
 
     /// Returns the logits as images × classes × height × width. Images are stored as in [`Self::predict`].
     pub fn scores(&self, pixels: &[f32], size: (u32, u32)) -> Result<Vec<f32>> {
-        values(&tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference)))
+        let x = self.input(pixels, size)?;
+        values(&tch::no_grad(|| self.forward(&x, Pass::Inference)))
     }
 
     /// Returns the class probabilities of one image, resized bilinearly to the size `to`; sample points are pixel centres.
     pub fn probabilities(&self, pixels: &[f32], size: (u32, u32), to: (u32, u32)) -> Result<Vec<f32>> {
+        let x = self.input(pixels, size)?;
         values(&tch::no_grad(|| {
-            let found = self.forward(&self.images(pixels, size), Pass::Inference).softmax(1, Kind::Float);
+            let found = self.forward(&x, Pass::Inference).softmax(1, Kind::Float);
             if size == to {
                 return found;
             }
@@ -124,7 +129,7 @@ impl Model {
         let features = Some(BTreeMap::new());
         let mut compute =
             Compute { tensors: &self.tensors, precision: self.place.precision, pass: Pass::Inference, features };
-        let x = self.images(pixels, size);
+        let x = self.input(pixels, size)?;
         let scores = tch::no_grad(|| self.network.walk(&mut compute, &x, self.bands, self.classes));
         let features = compute.features.unwrap_or_default();
         let (Some(fine), Some(coarse)) = (features.get(&FINE), features.get(&(FINE + 1))) else {
@@ -138,7 +143,8 @@ impl Model {
 
     /// Predicts the class of each pixel like [`Self::predict`], and returns its probability as well.
     pub fn predict_with_probability(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Vec<u8>, Vec<f32>)> {
-        let scores = tch::no_grad(|| self.forward(&self.images(pixels, size), Pass::Inference));
+        let x = self.input(pixels, size)?;
+        let scores = tch::no_grad(|| self.forward(&x, Pass::Inference));
         let (highest, _) = scores.softmax(1, Kind::Float).max_dim(1, false);
         Ok((classes(&scores)?, values(&highest)?))
     }
@@ -148,6 +154,13 @@ impl Model {
         for tensor in self.tensors.values_mut() {
             *tensor = tensor.detach();
         }
+    }
+
+    /// Returns images like [`Self::images`], or an error if the network would take more memory for them than the machine has.
+    fn input(&self, pixels: &[f32], size: (u32, u32)) -> Result<Tensor> {
+        let images = pixels.len() / (self.bands * size.0 as usize * size.1 as usize).max(1);
+        self.check_inference(images, size)?;
+        Ok(self.images(pixels, size))
     }
 
     /// Returns images (stored as in [`Self::predict`]) as a tensor of images × bands × height × width on the device.
