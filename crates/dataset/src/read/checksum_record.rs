@@ -59,7 +59,9 @@ impl ChecksumRecord {
         let bytes = furrow_base::input::contents(&Self::path(folder, index)).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
         let own = written.checksums.hash().ok()?;
-        (own == written.seal_sha256 && written.checksums.index == index).then_some(written.checksums)
+        // The hash covers the values; the bytes could have other spaces, or fields that are not read.
+        let whole = own == written.seal_sha256 && compact(&written).is_ok_and(|own| own == bytes);
+        (whole && written.checksums.index == index).then_some(written.checksums)
     }
 
     /// Writes the record, which must happen after all files listed in it are written.

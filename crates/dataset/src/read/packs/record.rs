@@ -5,9 +5,10 @@
 
 use super::Id;
 use crate::model::recipe::compact;
-use crate::read::archive::entry_name;
+use crate::read::archive::{BLOCK, entry_name};
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
+use crate::read::native;
 use furrow_base::Result;
 use furrow_base::input;
 use furrow_output::write_atomically;
@@ -51,7 +52,28 @@ impl PackRecord {
         let bytes = input::contents(&folder.join(id.seal())).ok()?;
         let written: Written = serde_json::from_slice(&bytes).ok()?;
         let own = written.record.hash().ok()?;
-        (own == written.seal_sha256 && written.record.pack == id.name()).then_some(written.record)
+        // The hash covers the values; the bytes could have other spaces, or fields that are not read.
+        let whole = own == written.seal_sha256 && compact(&written).is_ok_and(|own| own == bytes);
+        (whole && written.record.pack == id.name() && written.record.is_consistent()).then_some(written.record)
+    }
+
+    /// Returns whether the archive can have these files at these positions: the native files of each image, in the
+    /// order of the images, with the lengths in their checksums.
+    fn is_consistent(&self) -> bool {
+        let mut end = 0;
+        let mut files = 0;
+        for image in &self.images {
+            for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
+                let Some((offset, length)) = self.members.get(&entry_name(path)) else { return false };
+                if *length != image.files[path].bytes || *offset < end + BLOCK {
+                    return false;
+                }
+                end = offset.saturating_add(*length);
+                files += 1;
+            }
+        }
+        let ascending = self.images.is_sorted_by(|a, b| a.index < b.index);
+        ascending && files == self.members.len() && end <= self.tar.bytes
     }
 
     /// Writes the record, which must happen after the archive is written.
@@ -155,6 +177,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let id = Id { split: Split::Val, number: 3 };
         let sum = Checksum::of(b"x");
+        let tar = Checksum { bytes: 4 * BLOCK, ..sum.clone() };
         let image = ChecksumRecord {
             index: 7,
             recipe: "ab".into(),
@@ -162,14 +185,37 @@ mod tests {
             files: [("images/000007/rgb.png".to_owned(), sum.clone())].into(),
         };
         let members = [("000007.rgb.png".to_owned(), (512, 1))].into();
-        let record = PackRecord { pack: id.name(), tar: sum, members, images: vec![image] };
+        let record = PackRecord { pack: id.name(), tar, members, images: vec![image.clone()] };
         record.write(folder.path(), id).unwrap();
         assert_eq!(PackRecord::read(folder.path(), id).as_ref(), Some(&record));
         assert!(record.image(7).is_some() && record.image(8).is_none());
         let path = folder.path().join(id.seal());
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replace("512", "513")).unwrap();
-        assert_eq!(PackRecord::read(folder.path(), id), None);
+        let spaced = format!(" {text}");
+        let unread = text.replacen('{', "{\"other\":1,", 1);
+        for changed in [text.replace("512", "513"), spaced, unread] {
+            std::fs::write(&path, &changed).unwrap();
+            assert_eq!(PackRecord::read(folder.path(), id), None, "{changed}");
+        }
+        // Records with the right hash that no archive can have.
+        let with = |change: &dyn Fn(&mut PackRecord)| {
+            let mut other = record.clone();
+            change(&mut other);
+            other.write(folder.path(), id).unwrap();
+            PackRecord::read(folder.path(), id)
+        };
+        assert!(with(&|_| ()).is_some());
+        for change in [
+            &(|r: &mut PackRecord| r.members.clear()) as &dyn Fn(&mut PackRecord),
+            &|r| _ = r.members.insert("x".into(), (0, 1)),
+            &|r| _ = r.members.insert("000007.rgb.png".into(), (512, 2)),
+            &|r| _ = r.members.insert("000007.rgb.png".into(), (0, 1)),
+            &|r| r.tar.bytes = 512,
+            &|r| r.images.clear(),
+            &|r| r.images.push(image.clone()),
+        ] {
+            assert_eq!(with(change), None);
+        }
     }
 
     /// Packs of three splits are read alternately. Expected: a pack in use stays in the cache, regardless of the number
