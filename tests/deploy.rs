@@ -563,11 +563,17 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     std::fs::write(broken.join("weights.safetensors"), &bytes).unwrap();
-    refuse(&broken, &[&photos], &[], &["weights.safetensors: this is not a weights file of `train`, or it is damaged"]);
-    let said = fail(train(&["export", path(&broken)]), 2);
-    assert!(said.contains("it is damaged"), "{said}");
+    for arguments in [
+        ["predict", path(&broken), path(&photos), "--out", path(&at("refused"))].as_slice(),
+        &["export", path(&broken)],
+    ] {
+        let said = fail(train(arguments), 1);
+        let words = "weights.safetensors: this is not a weights file of `train`, or it is damaged";
+        assert!(said.contains(words), "{said}");
+    }
     std::fs::copy(RGBN.join("weights.safetensors"), broken.join("weights.safetensors")).unwrap();
-    refuse(&broken, &[&photos], &[], &["these are not the weights that model.json in this folder describes"]);
+    let said = fail(train(&["predict", path(&broken), path(&photos), "--out", path(&at("refused"))]), 1);
+    assert!(said.contains("these are not the weights that model.json in this folder describes"), "{said}");
     assert_eq!(names(&broken), ["model.json", "weights.safetensors"]);
 }
 

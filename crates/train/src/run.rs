@@ -251,9 +251,8 @@ impl TrainedModel {
         let path = below(folder, &card.weights)?;
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
-            return Err(
-                Error::input(format!("these are not the weights that {MODEL} in this folder describes")).in_file(path)
-            );
+            let what = format!("these are not the weights that {MODEL} in this folder describes");
+            return Err(Error::damaged(what).in_file(path));
         }
         if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
             let what = format!("`{}` contains values that are not finite", array.name);

@@ -93,7 +93,7 @@ pub fn encode(path: &Path, arrays: &[Array], text: &str, stored: Stored) -> Resu
 /// If the file is damaged or was written by another program.
 pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let damaged = |e: &dyn std::fmt::Display| {
-        unusable(path, &format!("this is not a weights file of `train`, or it is damaged: {e}"))
+        Error::damaged(format!("this is not a weights file of `train`, or it is damaged: {e}")).in_file(path)
     };
     let bytes = furrow_base::input::contents(path).map_err(Error::reading(path))?;
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;
@@ -238,7 +238,7 @@ mod tests {
             let mut broken = bytes.clone();
             broken[at] ^= 4;
             std::fs::write(&path, &broken).unwrap();
-            assert_eq!(read(&path).unwrap_err().kind(), Kind::Input, "byte {at}");
+            assert_eq!(read(&path).unwrap_err().kind(), Kind::Damaged, "byte {at}");
         }
         std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
         assert!(read(&path).is_err());

@@ -1,6 +1,6 @@
 //! A dataset in a folder: its recipe, its images by name, and the files that belong to all images.
 
-use crate::model::recipe::Recipe;
+use crate::model::recipe::{FILE, Recipe};
 use crate::model::record::Record;
 use crate::model::sample::Sample;
 use crate::model::split::Split;
@@ -12,6 +12,7 @@ use crate::read::native::{self, Files};
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::packs::record::Packs;
+use furrow_base::error::Kind;
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
 use furrow_output::stream_atomically;
@@ -45,6 +46,19 @@ impl Set {
         let recipe = Recipe::read(folder)?;
         links::refuse(folder, &recipe)?;
         Ok(Self::new(folder, recipe))
+    }
+
+    /// Returns the error of work on this dataset. If its recipe has disappeared since it was opened, that is the cause of
+    /// missing files, and the same command may succeed later.
+    #[must_use]
+    pub fn blame(&self, error: Error) -> Error {
+        let wrong = matches!(error.kind(), Kind::Input | Kind::Misuse);
+        if !wrong || self.folder.join(FILE).is_file() {
+            return error;
+        }
+        Error::failed(format!("{FILE} has disappeared from this folder during the work: {}", error.message()))
+            .help("if the folder was moved or its disk was unmounted, bring it back and run the same command again")
+            .in_file(&self.folder)
     }
 
     /// Returns the name of an image: its number in six digits or more.
@@ -257,5 +271,25 @@ impl Write for Stream<'_> {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: exit code 1, which a scheduler retries, if the recipe has disappeared; other errors are unchanged.
+    #[test]
+    fn a_dataset_that_disappears_is_a_failure() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = Set::new(folder.path(), Recipe::of_species(Vec::new()));
+        let missing = || Error::input("there is no file `beet.ron`").help("looked in scene");
+        std::fs::write(folder.path().join(FILE), "{}").unwrap();
+        assert_eq!(set.blame(missing()).exit_code(), 2);
+        std::fs::remove_file(folder.path().join(FILE)).unwrap();
+        let error = set.blame(missing());
+        assert_eq!(error.exit_code(), 1);
+        assert!(error.message().contains("has disappeared") && error.message().contains("beet.ron"), "{error}");
+        assert_eq!(set.blame(Error::interrupted()).exit_code(), 75);
     }
 }

@@ -122,15 +122,15 @@ impl Checkpoint {
         if !path.exists() {
             return Ok(None);
         }
-        let unusable =
-            |what: &str| Error::input(what).help("delete the file to restart this training").in_file(path.clone());
+        let restart = |error: Error| error.help("delete the file to restart this training").in_file(path.clone());
         let (arrays, text) = match weights::read(&path) {
-            Err(e) if e.kind() == Kind::Input => return Err(unusable(e.message())),
+            Err(e) if e.kind() == Kind::Damaged => return Err(restart(e)),
             other => other?,
         };
-        let words: Words = serde_json::from_str(&text).map_err(|e| unusable(&format!("not a checkpoint: {e}")))?;
+        let words: Words =
+            serde_json::from_str(&text).map_err(|e| restart(Error::damaged(format!("not a checkpoint: {e}"))))?;
         if words.plan != plan {
-            return Err(unusable("it belongs to another training"));
+            return Err(restart(Error::input("it belongs to another training")));
         }
         let of = |prefix: &str| -> Vec<Array> {
             let strip =

@@ -163,5 +163,5 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
         let rate = if images > 0 { format!(": {rate:.0} images per hour") } else { String::new() };
         furrow_cli::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
     }
-    made
+    made.map_err(|error| set.blame(error))
 }
