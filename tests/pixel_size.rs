@@ -17,7 +17,8 @@ use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
 use furrow_output::Picture;
 use furrow_train::data::{
-    Augment, AugmentScale, Band, Batch, Crop, Ground, Loader, Normalization, Order, Pick, Selection, Shape, Store,
+    Augment, AugmentScale, Band, Batch, BatchSettings, Crop, Ground, Loader, Normalization, Pick, Selection, Shape,
+    Store,
 };
 use furrow_train::deploy::pictures::Prediction;
 use furrow_train::fit::hyper::NormalizationMode;
@@ -128,8 +129,15 @@ fn crops_are_scaled_by_the_pixels_of_their_own_image() {
     let pixels = AugmentScale::PixelMm(range_mm.0, range_mm.1).of(|| Ok(sizes.clone())).unwrap();
     let augment = Augment { scale: true, ..Augment::NONE };
     let normalization = Normalization::Image;
-    let order =
-        Order { seed: 3, batch: 4, crop_size: size, rare: 0.0, augment, pixels, normalization: normalization.clone() };
+    let order = BatchSettings {
+        seed: 3,
+        batch: 4,
+        crop_size: size,
+        rare: 0.0,
+        augment,
+        pixels,
+        normalization: normalization.clone(),
+    };
     let batches: Vec<Batch> = Loader::start(&store, &order, 0, 2, 1).unwrap().collect::<Result<_, _>>().unwrap();
     let mut seen: Vec<usize> = Vec::new();
     for (place, found) in batches.iter().flat_map(|batch| batch.pixels.chunks_exact(32 * 32 * 3)).enumerate() {

@@ -251,7 +251,7 @@ impl Portable for EnvironmentMap {
 mod tests {
     use super::*;
     use furrow_base::math::direction;
-    use furrow_base::sampling::rng::Purpose;
+    use furrow_base::sampling::{Purpose, Stream};
 
     fn picture(width: usize, color: impl Fn(usize, usize) -> [f32; 3]) -> Panorama {
         let height = width / 2;

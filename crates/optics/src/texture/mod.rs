@@ -71,7 +71,7 @@ impl Texture {
 
     /// Decodes the bytes of a PNG or JPEG file without its alpha channel. The error is a message.
     pub fn decode_opaque(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
-        let mut pixels = read(Cursor::new(bytes)).map_err(Fault::words)?.into_rgba8();
+        let mut pixels = picture::decode_as_stored(bytes, MAX_SIZE).map_err(picture::Fault::words)?.into_rgba8();
         pixels.pixels_mut().for_each(|pixel| pixel.0[3] = u8::MAX);
         let (width, height) = pixels.dimensions();
         Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
