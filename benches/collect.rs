@@ -65,8 +65,8 @@ fn row(count: u64, place: &str, name: &str, arguments: &[&str]) -> String {
     let output = child.wait_with_output().expect("an end");
     assert!(output.status.success(), "{arguments:?}");
     let seconds = begin.elapsed().as_secs_f64();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let core: f64 = said.lines().last().unwrap_or_default().split_whitespace().map(time).sum();
+    let message = String::from_utf8_lossy(&output.stdout).into_owned();
+    let core: f64 = message.lines().last().unwrap_or_default().split_whitespace().map(time).sum();
     let peak = watch.join().expect("a thread") as f64 / 1e6;
     format!("| {count} | {place} | {name} | {seconds:.1} | {core:.1} | {peak:.0} |")
 }

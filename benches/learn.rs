@@ -11,7 +11,7 @@ use furrow_train::fit::{Callbacks, Hyperparameters, Plan};
 use furrow_train::net::Network;
 use furrow_train::session::{self, Machine};
 use furrow_train::torch::tch::Device;
-use furrow_train::torch::{Model, Precision, Where};
+use furrow_train::torch::{Model, Placement, Precision};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -80,7 +80,7 @@ fn main() {
         session::fit(&plan, None, &machine, folder.path(), &callbacks).expect("a training");
         let times = times.into_inner();
         let learning = asked.batch as f64 / median(times.windows(2).map(|t| (t[1] - t[0]).as_secs_f64()).collect());
-        let model = Model::new(*network, 3, 3, 1, Where { device: Device::Cpu, precision });
+        let model = Model::new(*network, 3, 3, 1, Placement { device: Device::Cpu, precision });
         let pixels = vec![0.5; 3 * width as usize * height as usize];
         let answer = || {
             let begun = Instant::now();

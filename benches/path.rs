@@ -11,7 +11,7 @@ use furrow_base::sampling::Points;
 use furrow_field::assemble;
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::integrator::{PathTracer, World};
-use furrow_render::render::{self, Settings, Watch};
+use furrow_render::render::{self, RenderMonitor, Settings};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Mutex;
@@ -131,7 +131,7 @@ fn main() {
         let window = Window::full(scene.camera.width(), scene.camera.height());
         let settings = Settings { spp: SPP, seed: field.sample_seed(), window, points: Points::Sobol };
         let (stop, integrator) = (AtomicBool::new(false), PathTracer::default());
-        let watch = Watch { done: &|_| (), stop: &stop };
+        let watch = RenderMonitor { done: &|_| (), stop: &stop };
         let render = |geometry: &dyn Intersect| {
             let world = World { scene, geometry };
             pool.install(|| render::render(&world, &integrator, &settings, &watch)).expect("a film")

@@ -17,7 +17,7 @@ use furrow_field::assemble;
 use furrow_field::traits::Traits;
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::integrator::{PathTracer, World};
-use furrow_render::render::{self, Settings, Watch};
+use furrow_render::render::{self, RenderMonitor, Settings};
 use furrow_report::chart::{Chart, Curve};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
@@ -138,7 +138,7 @@ fn run(row: &Row) -> Cost {
         let window = Window::full(camera.width(), camera.height());
         let settings = Settings { spp: row.spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let (stop, world) = (AtomicBool::new(false), World { scene: &field.scene, geometry: &accel });
-        let watch = Watch { done: &|_| (), stop: &stop };
+        let watch = RenderMonitor { done: &|_| (), stop: &stop };
         pool.install(|| render::render(&world, &PathTracer::default(), &settings, &watch)).expect("a film");
         lap(&mut cost.seconds[2]);
         pool.install(|| {

@@ -22,7 +22,7 @@ use furrow_render::accel::EmbreeAccel;
 use furrow_render::film::Film;
 use furrow_render::integrator::{PathTracer, World};
 use furrow_render::material::Material;
-use furrow_render::render::{self, LabelMap, Settings, Watch};
+use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
 use furrow_render::scene::Part;
 use furrow_render::settings::{Engine, Quality, RenderOptions};
 use std::collections::{BTreeMap, BTreeSet};
@@ -46,13 +46,13 @@ fn grow(edit: &Edit) -> Field {
 }
 
 /// Rendered outputs of a field.
-struct Shot {
+struct Rendered {
     film: Film,
     photograph: Photograph,
     labels: LabelMap,
 }
 
-fn shoot(edit: &Edit, field: &Field, threads: usize) -> Shot {
+fn shoot(edit: &Edit, field: &Field, threads: usize) -> Rendered {
     let scene = &field.scene;
     let RenderOptions { quality, techniques, .. } = edit.options(options());
     let (spp, max_depth) = (quality.spp, techniques.max_depth);
@@ -62,11 +62,11 @@ fn shoot(edit: &Edit, field: &Field, threads: usize) -> Shot {
         let geometry = EmbreeAccel::build(&scene.surfaces(), threads as u32).unwrap();
         let window = Window::full(scene.camera.width(), scene.camera.height());
         let settings = Settings { spp, seed: field.sample_seed(), window, points: Points::Sobol };
-        let watch = Watch { done: &|_| (), stop: &AtomicBool::new(false) };
+        let watch = RenderMonitor { done: &|_| (), stop: &AtomicBool::new(false) };
         let film = render::render(&World { scene, geometry: &geometry }, &tracer, &settings, &watch).unwrap();
         let labels = render::label(&geometry, &scene.parts, &scene.camera, window);
         let labels = edit.labels(labels, &film, &scene.tags());
-        Shot { photograph: edit.photograph(field, &film), film, labels }
+        Rendered { photograph: edit.photograph(field, &film), film, labels }
     })
 }
 
@@ -97,14 +97,14 @@ fn surfaces(field: &Field) -> Vec<String> {
 
 /// Kind of each light, and the irradiance that it gives level ground.
 fn lights(field: &Field) -> Vec<String> {
-    let told = |light: &Light| match light {
+    let recorded = |light: &Light| match light {
         Light::Sun(sun) => format!("{sun:?}"),
         Light::Sky(sky) => format!("sky {:?}", sky.horizontal_irradiance()),
         Light::Constant(environment) => format!("{environment:?}"),
         Light::EnvironmentMap(map) => format!("environment map {:?}", map.horizontal_irradiance()),
         Light::Lamp(lamp) => format!("{lamp:?}"),
     };
-    field.scene.lights.iter().map(told).collect()
+    field.scene.lights.iter().map(recorded).collect()
 }
 
 #[test]
@@ -117,9 +117,9 @@ fn names_are_words_that_find_their_edits() {
         assert!(edit.about.len() > 10 && !edit.about.ends_with('.'), "{}", edit.name);
         assert_eq!(Edit::named(edit.name).unwrap().name, edit.name);
     }
-    let said = Edit::named("no-skye").unwrap_err().to_string();
-    assert!(said.contains("no edit `no-skye`") && said.contains("did you mean `no-sky`?"), "{said}");
-    assert!(EDITS.iter().all(|e| said.contains(e.name)), "{said}");
+    let message = Edit::named("no-skye").unwrap_err().to_string();
+    assert!(message.contains("no edit `no-skye`") && message.contains("did you mean `no-sky`?"), "{message}");
+    assert!(EDITS.iter().all(|e| message.contains(e.name)), "{message}");
 }
 
 #[test]
@@ -327,8 +327,8 @@ fn a_dataset_of_each_edit_has_the_same_files_and_labels() {
         path(&alone),
     ]));
     same(&tree(&alone), &tree(&out.join("low-poly")));
-    let said = succeed(verb("verify", &alone, &["--rerender", "1"])).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("1 rendered again and the same; 0 faults"));
+    let message = succeed(verb("verify", &alone, &["--rerender", "1"])).stderr;
+    assert!(String::from_utf8_lossy(&message).contains("1 rendered again and the same; 0 faults"));
     let picture = std::fs::read(alone.join("images/000000/semantics.png")).unwrap();
     assert!(picture.windows(14).any(|bytes| bytes == b"edit: low-poly"));
 }
@@ -364,8 +364,8 @@ fn shards_make_the_bytes_of_one_run() {
     let (_keep, parts) = scratch();
     let only = |more: &[&'static str]| [&["--only", "direct-light"], more].concat();
     succeed(ablate(&whole, &only(&[])));
-    let said = fail(ablate(&parts, &only(&["--shard", "0/2"])), 2);
-    assert!(said.contains("--plan"), "{said}");
+    let message = fail(ablate(&parts, &only(&["--shard", "0/2"])), 2);
+    assert!(message.contains("--plan"), "{message}");
     succeed(ablate(&parts, &only(&["--plan"])));
     assert!(made(&parts.join("full")).is_empty());
     for shard in ["1/2", "0/2"] {
@@ -378,7 +378,7 @@ fn shards_make_the_bytes_of_one_run() {
 }
 
 #[test]
-fn what_cannot_be_is_told_before_anything_is_written() {
+fn impossible_requests_are_reported_before_anything_is_written() {
     let (_keep, out) = scratch();
     for (more, words) in [
         (&["--only", "no-sky,no-skye"][..], "did you mean `no-sky`?"),
@@ -388,32 +388,35 @@ fn what_cannot_be_is_told_before_anything_is_written() {
     ] {
         let mut command = trace(&["ablate", "--scene", SMALL, "--count", "2", "--out", path(&out)]);
         command.args(more);
-        let said = fail(command, 2);
-        assert!(said.contains(words), "{said}");
+        let message = fail(command, 2);
+        assert!(message.contains(words), "{message}");
         assert!(!out.exists());
     }
     let page = ["--scene", SMALL, "--width", "64", "--out", path(&out)];
-    let said = fail(trace(&[&page[..], &["--edit", "x"]].concat()), 2);
-    assert!(said.contains("there is no edit `x`") && said.contains("edits are raster, direct-light"), "{said}");
+    let message = fail(trace(&[&page[..], &["--edit", "x"]].concat()), 2);
+    assert!(
+        message.contains("there is no edit `x`") && message.contains("edits are raster, direct-light"),
+        "{message}"
+    );
     // A dataset with one edit cannot be continued with another edit.
     let dataset =
         |more: &[&'static str]| trace(&[&["dataset", "plan", "--count", "2", "--spp", "2"], &page[..], more].concat());
     succeed(dataset(&["--edit", "no-sky"]));
     for more in [&[][..], &["--edit", "no-coat"]] {
-        let said = fail(dataset(more), 2);
-        assert!(said.contains("edit \"no-sky\" there"), "{said}");
+        let message = fail(dataset(more), 2);
+        assert!(message.contains("edit \"no-sky\" there"), "{message}");
     }
     succeed(dataset(&["--edit", "no-sky"]));
 }
 
 #[test]
-fn edits_are_listed_and_one_picture_tells_its_edit() {
+fn edits_are_listed_and_an_image_names_its_edit() {
     let listed = String::from_utf8(succeed(trace(&["ablate", "--list"])).stdout).unwrap();
     assert_eq!(listed.lines().count(), EDITS.len() + 1);
     assert!(EDITS.iter().all(|edit| listed.contains(edit.name) && listed.contains(edit.about)), "{listed}");
     let done = succeed(trace(&["--scene", SMALL, "--width", "64", "--edit", "direct-light", "--pixel", "30,20"]));
-    let said = String::from_utf8(done.stdout).unwrap();
-    assert!(said.contains("edit: direct-light") && said.contains("(64 samples)"), "{said}");
+    let message = String::from_utf8(done.stdout).unwrap();
+    assert!(message.contains("edit: direct-light") && message.contains("(64 samples)"), "{message}");
     let (_keep, out) = scratch();
     succeed(trace(&["--scene", SMALL, "--width", "64", "--edit", "spp-4", "--quiet", "--out", path(&out)]));
     let picture = std::fs::read(out.join("rgb.png")).unwrap();

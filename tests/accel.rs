@@ -12,7 +12,7 @@ use crate::common::scenes::{point, sphere, square, unit};
 use furrow_base::geometry::{AlphaMask, Hit, Interaction, Intersect, Mesh, PACKET, Ray};
 use furrow_base::math::{Mat3, Vec3, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_render::accel::{Brute, EmbreeAccel, Surface};
+use furrow_render::accel::{BruteForce, EmbreeAccel, Surface};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -82,7 +82,7 @@ fn surfaces(of: &[(Mesh, Option<Arc<AlphaMask>>)]) -> Vec<Surface<'_>> {
 
 /// Returns whether a deviating hit is excusable: the oracle finds it for a ray moved sideways by `by` metres, the
 /// largest error of single precision.
-fn on_the_edge(brute: &Brute<'_>, ray: &Ray, part: Option<u32>, by: f32) -> bool {
+fn on_the_edge(brute: &BruteForce<'_>, ray: &Ray, part: Option<u32>, by: f32) -> bool {
     let frame = furrow_base::math::Frame::about(ray.direction);
     [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7)].iter().any(
         |(x, y)| {
@@ -97,7 +97,7 @@ fn embree_meets_what_trying_every_triangle_meets() {
     let thicket = thicket();
     let surfaces = surfaces(&thicket);
     let embree = EmbreeAccel::build(&surfaces, 1).unwrap();
-    let brute = Brute::new(&surfaces);
+    let brute = BruteForce::new(&surfaces);
     let mut s = stream(1);
     let (mut met, mut masked, mut close) = (0, 0, 0);
     for i in 0..100_000 {
@@ -207,7 +207,7 @@ fn no_ray_through_a_shared_edge_is_lost() {
 }
 
 #[test]
-fn a_ray_ends_where_it_is_told() {
+fn a_ray_ends_at_its_maximum_distance() {
     let thicket = thicket();
     let surfaces = surfaces(&thicket);
     let embree = EmbreeAccel::build(&surfaces, 1).unwrap();

@@ -9,7 +9,7 @@
 //! `train adapt --help`.
 
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use furrow_train::measure::Report;
 use furrow_train::run::{self, Results};
 use std::fs;
@@ -41,9 +41,9 @@ fn set(folder: &Path, colors: [[u8; 3]; 3], first: u64, labelled: bool) -> PathB
         let mut noise = |v: u8| (f32::from(v) + stream.range32(-12.0, 12.0)) as u8;
         let rgb: Vec<[u8; 3]> = labels.iter().map(|c| colors[usize::from(*c)].map(&mut noise)).collect();
         let name = format!("{k:03}.png");
-        write_png(&photos.join(&name), w, h, &Picture::Rgb(&rgb), "").unwrap();
+        write_png(&photos.join(&name), w, h, &ImageData::Rgb(&rgb), "").unwrap();
         let labels = if labelled { labels } else { vec![255; labels.len()] };
-        write_png(&masks.join(&name), w, h, &Picture::Gray(&labels), "").unwrap();
+        write_png(&masks.join(&name), w, h, &ImageData::Gray(&labels), "").unwrap();
     }
     let import = ["dataset", "import", "--format", "masks"].map(Into::into);
     let named = [("--images", &photos), ("--masks", &masks), ("--out", &out)];
@@ -149,7 +149,7 @@ fn refuse(arguments: &str) -> String {
 }
 
 #[test]
-fn what_cannot_be_adapted_is_told() {
+fn what_cannot_be_adapted_is_reported() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let run = TRAINED.as_path();
@@ -166,8 +166,8 @@ fn what_cannot_be_adapted_is_told() {
         (format!("--images {}/none", folder.display()), "none"),
         (format!("--images {}", run.display()), "no image"),
     ] {
-        let said = adapt(&more);
-        assert!(said.contains(words), "{more}: {said}");
+        let message = adapt(&more);
+        assert!(message.contains(words), "{more}: {message}");
         assert!(!out.exists(), "{more} has left a folder");
     }
     // Weights without a plan: the user must name the training set.
@@ -176,8 +176,8 @@ fn what_cannot_be_adapted_is_told() {
     for file in [run::WEIGHTS, run::MODEL] {
         fs::copy(run.join(file), alone.join(file)).unwrap();
     }
-    let said = refuse(&format!("adapt {} --images {images} --out {}", alone.display(), out.display()));
-    assert!(said.contains("--set DIR"), "{said}");
+    let message = refuse(&format!("adapt {} --images {images} --out {}", alone.display(), out.display()));
+    assert!(message.contains("--set DIR"), "{message}");
     let set = day.join("set");
     let (alone, set, out) = (alone.display(), set.display(), out.display());
     succeed(&format!("adapt {alone} --images {images} --set {set}@all --out {out} --steps 2"));

@@ -122,7 +122,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Only outer loops run in parallel: images, plants, soil maps, sensor pixels.
     (
         "rayon",
-        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ field/assemble/bank.rs field/assemble/estimate.rs field/assemble/ground.rs field/assemble/stand.rs field/shipped.rs field/traits.rs soil/bake.rs soil/crumb.rs soil/ground.rs soil/in_view.rs soil/openness.rs material/ground.rs raster/sheets.rs",
+        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ field/assemble/bank.rs field/assemble/estimate.rs field/assemble/ground.rs field/assemble/stand.rs field/shipped.rs field/traits.rs soil/bake.rs soil/crumb.rs soil/ground.rs soil/in_view.rs soil/openness.rs material/ground.rs raster/textures.rs",
     ),
     // One reader for all RON files, which reports faults inside a value at their position.
     ("ron", "ron_file/"),
@@ -156,7 +156,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Files are written completely or not at all. Temporary folders serve the denoiser, a scene copied into a dataset or a stream, and the small dataset that a cost estimate renders.
     (
         "tempfile",
-        "atomic_file.rs cli/mod.rs dataset/make/bill.rs dataset/make/plan.rs dataset/make/push.rs dataset/deliver/stream.rs output/denoise/program.rs",
+        "atomic_file.rs cli/mod.rs dataset/make/cost_estimate.rs dataset/make/plan.rs dataset/make/push.rs dataset/deliver/stream.rs output/denoise/program.rs",
     ),
     // An external image viewer.
     ("tev_client", "bin/trace/watch/tev.rs"),

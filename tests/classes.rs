@@ -146,8 +146,8 @@ fn classes_of_species_organs_and_none_mean_the_same_in_every_format() {
             assert!(rows.lines().all(|row| row.starts_with("0 ")), "{rows}");
         }
     }
-    let said = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("; 0 faults"), "{}", String::from_utf8_lossy(&said));
+    let message = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
+    assert!(String::from_utf8_lossy(&message).contains("; 0 faults"), "{}", String::from_utf8_lossy(&message));
 }
 
 #[test]
@@ -162,15 +162,15 @@ fn classes_and_limits_may_be_asked_for_later_and_are_counted() {
     let all = expected(&set, &samples, |code| Some(if code == "BEAVX" { 1 } else { 2 }));
     assert_eq!(instances(&late), all);
 
-    let told = succeed(verb("finish", &late, &labels)).stderr;
-    let told = String::from_utf8_lossy(&told).into_owned();
+    let warnings = succeed(verb("finish", &late, &labels)).stderr;
+    let warnings = String::from_utf8_lossy(&warnings).into_owned();
     let listed = instances(&late);
     let kept = |p: &Plant| p.seen.pixels >= 60 && p.seen.shown_fraction() >= 0.5;
     let left = samples.iter().flat_map(|s| s.record.seen()).filter(|p| !kept(p)).count();
     assert!(left > 0 && listed.len() > 1, "the limits must exclude some plants and keep others");
     assert_eq!(listed.len(), all.len() - left);
     assert!(listed.iter().all(|row| all.contains(row) && row.2 >= 60));
-    assert!(told.contains(&format!("{left} plants and ")), "{told}");
+    assert!(warnings.contains(&format!("{left} plants and ")), "{warnings}");
     let counted = &json(&late.join("manifest.json"))["left_out"];
     assert_eq!((counted["plants"].as_u64(), counted["ignored_plants"].as_u64()), (Some(left as u64), Some(0)));
 
@@ -258,8 +258,8 @@ fn maps_are_kept_as_asked() {
     let all = ["--keep", "nir,coverage,depth32,normals16"];
     succeed(make(&oldest, "2", &all));
     for folder in [&usual, &normals, &bare, &depth, &oldest] {
-        let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
-        assert!(String::from_utf8_lossy(&said).contains("2 rendered again and the same; 0 faults"));
+        let message = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
+        assert!(String::from_utf8_lossy(&message).contains("2 rendered again and the same; 0 faults"));
     }
 
     // The same field, within the precision of the format.
@@ -360,6 +360,6 @@ fn a_robot_in_view_is_ignored() {
             "{number} must not be a plant"
         );
     }
-    let said = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("; 0 faults"), "{}", String::from_utf8_lossy(&said));
+    let message = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
+    assert!(String::from_utf8_lossy(&message).contains("; 0 faults"), "{}", String::from_utf8_lossy(&message));
 }

@@ -57,7 +57,7 @@ fn help_teaches() {
 /// Rationale: a script or scheduler sees only the exit code. Expected: 2 if the command, a file or the machine must
 /// change, 1 if the disk failed or a dataset is damaged; `tests/signals.rs` covers 75.
 #[test]
-fn the_exit_code_tells_the_kind_of_failure() {
+fn the_exit_code_follows_the_kind_of_failure() {
     let small = ["--width", "16", "--spp", "1", "--quiet"];
     let of = |what: &str, folder: &Path, args: &[&str], code: i32, words: &str| {
         let done = Command::new(env!("CARGO_BIN_EXE_trace"))
@@ -67,9 +67,9 @@ fn the_exit_code_tells_the_kind_of_failure() {
             .args(small)
             .output()
             .unwrap();
-        let said = text(&done.stderr);
-        assert_eq!(done.status.code(), Some(code), "{what}: {said}");
-        assert!(said.contains(words), "{what}: {said}");
+        let message = text(&done.stderr);
+        assert_eq!(done.status.code(), Some(code), "{what}: {message}");
+        assert!(message.contains(words), "{what}: {message}");
     };
     let folder = folder();
     let at = folder.path();
@@ -90,12 +90,12 @@ fn the_exit_code_tells_the_kind_of_failure() {
 
 #[test]
 fn without_arguments_the_help_is_shown() {
-    let said = refused(&[]);
-    assert!(said.contains("Usage: trace") && said.contains("Examples:"), "{said}");
+    let message = refused(&[]);
+    assert!(message.contains("Usage: trace") && message.contains("Examples:"), "{message}");
 }
 
 #[test]
-fn the_version_is_told() {
+fn the_version_is_printed() {
     let done = run(folder().path(), &["--version"]);
     let kernels = furrow_render::accel::version().unwrap();
     assert_eq!(text(&done.stdout), format!("trace {} ({kernels})\n", env!("CARGO_PKG_VERSION")));
@@ -198,9 +198,9 @@ fn misuse_is_answered_with_a_way_out() {
         (&["texture", "page.ron"], "Leaf, Soil"),
         (&["textures", "page.ron"], "texture"),
     ] {
-        let said = refused(args);
-        assert!(said.starts_with("error: "), "{args:?}: {said}");
-        assert!(said.contains(words), "{args:?}: no `{words}` in\n{said}");
+        let message = refused(args);
+        assert!(message.starts_with("error: "), "{args:?}: {message}");
+        assert!(message.contains(words), "{args:?}: no `{words}` in\n{message}");
     }
 }
 
@@ -272,7 +272,7 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
 /// Rationale: an unusable output folder must not be discovered after hours of work. Expected: paths that are not
 /// folders or not writable are reported before the scene is built.
 #[test]
-fn a_folder_that_cannot_be_is_told_first() {
+fn an_impossible_folder_is_reported_first() {
     let folder = folder();
     let at = folder.path();
     std::os::unix::fs::symlink("loop", at.join("loop")).unwrap();
@@ -291,14 +291,14 @@ fn a_folder_that_cannot_be_is_told_first() {
     let long = format!("{}.png", "a".repeat(252));
     for verb in [&["preview", "page.ron", "--spp", "65536"][..], &["leaf", "page.ron"]] {
         let done = run(at, &[verb, &["--out", long.as_str()]].concat());
-        let said = text(&done.stderr);
-        assert!(done.status.code() == Some(2) && said.contains("this name is too long"), "{verb:?}: {said}");
+        let message = text(&done.stderr);
+        assert!(done.status.code() == Some(2) && message.contains("this name is too long"), "{verb:?}: {message}");
     }
     std::os::unix::fs::symlink("other.ron", at.join("one.ron")).unwrap();
     std::os::unix::fs::symlink("one.ron", at.join("other.ron")).unwrap();
     let done = run(at, &["--scene", "one.ron", "--out", "out"]);
-    let said = text(&done.stderr);
-    assert!(done.status.code() == Some(2) && said.contains("a symbolic link that leads to no file"), "{said}");
+    let message = text(&done.stderr);
+    assert!(done.status.code() == Some(2) && message.contains("a symbolic link that leads to no file"), "{message}");
     let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", "/proc/x"]);
     assert_eq!(done.status.code(), Some(1), "{}", text(&done.stderr));
 }
@@ -311,13 +311,13 @@ fn full() -> Stdio {
 fn its_answer_is_not_lost_unseen(program: &str, folder: &Path, args: &[&str]) {
     let command = |out: Stdio| Command::new(program).current_dir(folder).args(args).stdout(out).output().unwrap();
     let lost = command(full());
-    let said = text(&lost.stderr);
-    assert!(lost.status.code() == Some(1) && said.contains("cannot write to stdout"), "{args:?}: {said}");
+    let message = text(&lost.stderr);
+    assert!(lost.status.code() == Some(1) && message.contains("cannot write to stdout"), "{args:?}: {message}");
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let unread = command(writer.into());
-    let said = text(&unread.stderr);
-    assert!(unread.status.code() == Some(0) && !said.contains("stdout"), "{args:?}: {said}");
+    let message = text(&unread.stderr);
+    assert!(unread.status.code() == Some(0) && !message.contains("stdout"), "{args:?}: {message}");
 }
 
 /// Rationale: log disks fill up, and readers of pipes exit. Expected: messages that cannot be written neither end a run
@@ -335,8 +335,11 @@ fn full_and_closed_streams_end_no_work() {
     assert_eq!(command(&["--out", "a"]).stderr(full()).output().unwrap().status.code(), Some(0));
     assert_eq!(command(&["--crop", "0,0,99,99"]).stderr(full()).output().unwrap().status.code(), Some(2));
     let lost = command(&["--out", "b"]).stdout(full()).output().unwrap();
-    let said = text(&lost.stderr);
-    assert!(lost.status.code() == Some(1) && said.contains("their paths are lost: cannot write to stdout"), "{said}");
+    let message = text(&lost.stderr);
+    assert!(
+        lost.status.code() == Some(1) && message.contains("their paths are lost: cannot write to stdout"),
+        "{message}"
+    );
     assert_eq!((files("a"), files("b")), (7, 7));
     let mut closed = command(&["--out", "c"]).stdout(Stdio::piped()).spawn().unwrap();
     drop(closed.stdout.take());
@@ -372,7 +375,7 @@ fn full_and_closed_streams_end_no_work() {
 
 /// Returns the terminal output of a command that must succeed; `None` if the program `script` is not available.
 #[cfg(target_os = "linux")]
-fn said_on_a_terminal(command: &str) -> Option<String> {
+fn terminal_output(command: &str) -> Option<String> {
     let program = format!("{} {command}", env!("CARGO_BIN_EXE_trace"));
     let mut script = Command::new("script");
     script.current_dir(env!("CARGO_MANIFEST_DIR")).args(["-qec", &program, "/dev/null"]).stdin(Stdio::null());
@@ -380,9 +383,9 @@ fn said_on_a_terminal(command: &str) -> Option<String> {
         eprintln!("skipped: no `script` makes a terminal here");
         return None;
     };
-    let said = String::from_utf8_lossy(&done.stdout).into_owned();
-    assert_eq!(done.status.code(), Some(0), "{command}: {said}");
-    Some(said)
+    let message = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(done.status.code(), Some(0), "{command}: {message}");
+    Some(message)
 }
 
 /// Rationale: building a large field takes a minute, and a program that prints nothing seems to hang. Expected: a
@@ -400,10 +403,10 @@ fn a_terminal_shows_what_grows() {
     // In the second dataset run all images already exist.
     let commands = [(&image, true, false), (&quiet, false, false), (&dataset, true, true), (&dataset, true, false)];
     for (command, shown, counted) in commands {
-        let Some(said) = said_on_a_terminal(command) else { return };
-        assert_eq!(said.contains("growing: "), shown, "{command}: {said}");
-        assert_eq!(said.contains("of 1 images"), counted, "{command}: {said}");
-        assert!(!said.contains("of 0 images"), "{command}: {said}");
+        let Some(message) = terminal_output(command) else { return };
+        assert_eq!(message.contains("growing: "), shown, "{command}: {message}");
+        assert_eq!(message.contains("of 1 images"), counted, "{command}: {message}");
+        assert!(!message.contains("of 0 images"), "{command}: {message}");
     }
 }
 
@@ -411,7 +414,7 @@ fn a_terminal_shows_what_grows() {
 /// line names the image being rendered, and is erased before the table is printed.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_terminal_shows_what_grows_for_a_bill() {
+fn a_terminal_shows_the_progress_of_a_cost_estimate() {
     let folder = folder();
     let out = folder.path().join("out").display().to_string();
     let order = |verb: &str, estimate: &str| {
@@ -426,10 +429,14 @@ fn a_terminal_shows_what_grows_for_a_bill() {
         (order("dataset", "--dry-run --quiet"), false),
     ];
     for (command, shown) in commands {
-        let Some(said) = said_on_a_terminal(&command) else { return };
-        assert_eq!(said.contains("growing: ") && said.contains("rendering images, 1 of 1"), shown, "{command}: {said}");
-        let table = said.rsplit_once("\u{1b}[2K").map_or(said.as_str(), |(_, after)| after);
-        assert!(table.contains("core hours") && !table.contains(" elapsed"), "{command}: {said:?}");
+        let Some(message) = terminal_output(&command) else { return };
+        assert_eq!(
+            message.contains("growing: ") && message.contains("rendering images, 1 of 1"),
+            shown,
+            "{command}: {message}"
+        );
+        let table = message.rsplit_once("\u{1b}[2K").map_or(message.as_str(), |(_, after)| after);
+        assert!(table.contains("core hours") && !table.contains(" elapsed"), "{command}: {message:?}");
     }
 }
 
@@ -441,7 +448,7 @@ fn no_window_system_is_no_error() {
     let folder = folder();
     let engines: &[&str] = if cfg!(feature = "raster") { &["trace", "raster"] } else { &["trace"] };
     for &engine in engines {
-        let said = [None, Some("/tmp")].map(|place| {
+        let message = [None, Some("/tmp")].map(|place| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_trace"));
             command.current_dir(folder.path()).env_remove("XDG_RUNTIME_DIR");
             command.envs(place.map(|place| ("XDG_RUNTIME_DIR", place)));
@@ -450,7 +457,7 @@ fn no_window_system_is_no_error() {
             assert_eq!(done.status.code(), Some(0), "{engine}: {}", text(&done.stderr));
             text(&done.stderr)
         });
-        assert_eq!(said[0], said[1], "{engine}");
-        assert!(!said[0].contains("error") && !said[0].contains("XDG_RUNTIME_DIR"), "{engine}: {}", said[0]);
+        assert_eq!(message[0], message[1], "{engine}");
+        assert!(!message[0].contains("error") && !message[0].contains("XDG_RUNTIME_DIR"), "{engine}: {}", message[0]);
     }
 }

@@ -142,12 +142,12 @@ fn the_same_field_has_the_same_points_and_too_many_are_refused() {
     let file = std::fs::read(folder.join("points.ply")).unwrap();
     assert!(file.starts_with(b"ply\nformat binary_little_endian"));
     // The last line of the output gives the number of points, the number on the soil, and the file size.
-    let said = String::from_utf8_lossy(&done.stderr);
-    let told = said.lines().last().unwrap().split_whitespace();
-    let numbers: Vec<f64> = told.filter_map(|word| word.parse().ok()).collect();
-    let [points, of_soil, megabytes] = numbers[..] else { panic!("{said}") };
+    let message = String::from_utf8_lossy(&done.stderr);
+    let fields = message.lines().last().unwrap().split_whitespace();
+    let numbers: Vec<f64> = fields.filter_map(|word| word.parse().ok()).collect();
+    let [points, of_soil, megabytes] = numbers[..] else { panic!("{message}") };
     let head = format!("element vertex {points}\n");
-    assert!(file.windows(head.len()).any(|text| text == head.as_bytes()), "{said}");
-    assert!(0.5 * points < of_soil && of_soil < points, "{said}");
-    assert!((megabytes - file.len() as f64 * 1e-6).abs() < 0.051, "{said}");
+    assert!(file.windows(head.len()).any(|text| text == head.as_bytes()), "{message}");
+    assert!(0.5 * points < of_soil && of_soil < points, "{message}");
+    assert!((megabytes - file.len() as f64 * 1e-6).abs() < 0.051, "{message}");
 }

@@ -152,9 +152,9 @@ fn a_folder_named_as_a_place_of_the_template_stays_a_name() {
             let lines =
                 text.lines().filter(|l| l.starts_with("trace=") || l.starts_with("dir=") || l.starts_with("shards="));
             let script = lines.collect::<Vec<_>>().join("\n") + "\nprintf '%s\\n' \"$trace\" \"$dir\" \"$shards\"";
-            let said = Command::new("bash").args(["-c", &script]).output().unwrap();
-            let said = String::from_utf8(said.stdout).unwrap();
-            assert_eq!(said, format!("/a b/@DIR@/trace\n{}\n2\n", path(&folder)));
+            let message = Command::new("bash").args(["-c", &script]).output().unwrap();
+            let message = String::from_utf8(message.stdout).unwrap();
+            assert_eq!(message, format!("/a b/@DIR@/trace\n{}\n2\n", path(&folder)));
         }
     }
 }
@@ -170,8 +170,8 @@ fn edited_job_files_are_never_overwritten() {
     let edited = std::fs::read_to_string(&file).unwrap().replace("##SBATCH --partition=…", "#SBATCH --partition=night");
     std::fs::write(&file, &edited).unwrap();
     let before = tree(&folder);
-    let said = fail(verb("emit", &folder, &["--scheduler", "slurm", "--shards", "3"]), 2);
-    assert!(said.contains("edited") && said.contains("--out"), "{said}");
+    let message = fail(verb("emit", &folder, &["--scheduler", "slurm", "--shards", "3"]), 2);
+    assert!(message.contains("edited") && message.contains("--out"), "{message}");
     same(&tree(&folder), &before);
     let elsewhere = jobs.join("other");
     emit(&folder, "slurm", 3, &["--out", path(&elsewhere)]);
@@ -195,12 +195,12 @@ fn orders_that_make_no_sense_are_refused() {
         ),
         (&["--scheduler", "kubernetes", "--shards", "2", "--image", "a b"], "not a container image name"),
     ] {
-        let said = fail(verb("emit", &folder, more), 2);
-        assert!(said.contains(words), "{more:?}: no `{words}` in\n{said}");
+        let message = fail(verb("emit", &folder, more), 2);
+        assert!(message.contains(words), "{more:?}: no `{words}` in\n{message}");
     }
     assert!(!folder.join("jobs").exists());
-    let said = fail(verb("emit", folder.parent().unwrap(), &["--scheduler", "slurm", "--shards", "2"]), 2);
-    assert!(said.contains("dataset.json"), "{said}");
+    let message = fail(verb("emit", folder.parent().unwrap(), &["--scheduler", "slurm", "--shards", "2"]), 2);
+    assert!(message.contains("dataset.json"), "{message}");
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn task(jobs: &Path, number: u64) -> Command {
 }
 
 #[test]
-fn a_slurm_task_tells_its_scheduler_what_to_do() {
+fn a_slurm_task_exits_as_its_scheduler_expects() {
     let (_keep, folder) = scratch();
     plan(&folder, 40);
     let jobs = emit(&folder, "slurm", 2, &[]);
@@ -309,19 +309,19 @@ fn the_job_that_finishes_says_which_shards_lack_images() {
         command
     };
     assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(0));
-    let said = fail(finish(), 1);
-    assert!(said.contains("4 of 6 images are missing: 0,2-3,5") && said.contains("--array=0,2"), "{said}");
+    let message = fail(finish(), 1);
+    assert!(message.contains("4 of 6 images are missing: 0,2-3,5") && message.contains("--array=0,2"), "{message}");
     for number in [0, 2] {
         assert_eq!(task(&jobs, number).status().unwrap().code(), Some(0));
     }
     let done = succeed(finish());
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(said.contains("6 of 6 images checked, 1 rendered again and the same; 0 faults"), "{said}");
+    let message = String::from_utf8_lossy(&done.stderr);
+    assert!(message.contains("6 of 6 images checked, 1 rendered again and the same; 0 faults"), "{message}");
     same(&files(&folder), &whole(6));
 }
 
 #[test]
-fn the_kubernetes_script_finishes_when_the_shards_have_ended_and_tells_how() {
+fn the_kubernetes_script_finishes_when_the_shards_have_ended_and_reports_how() {
     let (_keep, folder) = scratch();
     plan(&folder, 4);
     let jobs = emit(&folder, "kubernetes", 2, &[]);
@@ -433,9 +433,9 @@ fn slurm_makes_the_same_dataset_although_a_node_loses_power_and_a_task_its_time(
     // the task has ended, and then reports that there is none.
     let lost = slurm.script("node-kill", &["node2"]);
     assert!(lost.status.success(), "{}", String::from_utf8_lossy(&lost.stderr));
-    let mut told = slurm.command("scancel", &["--signal=USR1", "--batch", &hasty]).spawn().unwrap();
+    let mut canceller = slurm.command("scancel", &["--signal=USR1", "--batch", &hasty]).spawn().unwrap();
     slurm.idle();
-    told.wait().unwrap();
+    canceller.wait().unwrap();
     let logs = logs(&jobs) + &String::from_utf8_lossy(&lost.stdout);
     assert!(logs.contains("ended with 75"), "no task was interrupted:\n{logs}");
     assert!(logs.matches("start 2").count() >= 2, "two tasks must have been restarted:\n{logs}");

@@ -8,9 +8,9 @@
 use crate::common::browser::{browser, probe};
 use crate::common::program::{names, trace};
 use furrow_compare::{
-    Band, FILES, Figures, Options, PIXELS_PER_DEGREE, Pairs, Picture, Region, ciede2000, folders, maps, pair,
+    Band, FILES, Figures, Options, PIXELS_PER_DEGREE, Pairs, RasterImage, Region, ciede2000, folders, maps, pair,
 };
-use furrow_output::{Picture as Png, encode_jpeg, write_png};
+use furrow_output::{ImageData as Png, encode_jpeg, write_png};
 use proptest::prelude::*;
 use serde_json::Value;
 use std::path::Path;
@@ -20,7 +20,7 @@ use std::process::Output;
 const SIZE: (u32, u32) = (64, 48);
 
 /// Builds the images of `tests/compare/reference.py`: the first without, the second with `error`.
-fn made_up(error: bool) -> Picture {
+fn made_up(error: bool) -> RasterImage {
     let (width, height) = SIZE;
     let value = |x: u32, y: u32, c: u32| {
         let plain = ((x * 5 + y * 3 + c * 40 + x * y % 17 * 4) % 256) as i32;
@@ -28,7 +28,7 @@ fn made_up(error: bool) -> Picture {
         (plain + if error { wrong } else { 0 }).clamp(0, 255) as u8
     };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| [0, 1, 2].map(|c| value(x, y, c))));
-    Picture { width, height, rgb: pixels.collect(), nir: Vec::new() }
+    RasterImage { width, height, rgb: pixels.collect(), nir: Vec::new() }
 }
 
 /// Labels of the images: classes in blocks, with an unlabelled first column.
@@ -37,20 +37,20 @@ fn blocks() -> Vec<u8> {
     (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| label(x, y))).collect()
 }
 
-fn flat(width: u32, height: u32, color: [u8; 3]) -> Picture {
-    Picture { width, height, rgb: vec![color; (width * height) as usize], nir: Vec::new() }
+fn flat(width: u32, height: u32, color: [u8; 3]) -> RasterImage {
+    RasterImage { width, height, rgb: vec![color; (width * height) as usize], nir: Vec::new() }
 }
 
-fn measured(a: &Picture, b: &Picture) -> Figures {
+fn measured(a: &RasterImage, b: &RasterImage) -> Figures {
     pair(a, b, None, PIXELS_PER_DEGREE).unwrap()
 }
 
-fn save(path: &Path, picture: &Picture) {
+fn save(path: &Path, picture: &RasterImage) {
     write_png(path, picture.width, picture.height, &Png::Rgb(&picture.rgb), "").unwrap();
 }
 
 /// Writes a folder like an output folder of `trace`: colour, near infrared (the green channel), labels.
-fn rendered(folder: &Path, picture: &Picture) {
+fn rendered(folder: &Path, picture: &RasterImage) {
     let (w, h) = (picture.width, picture.height);
     save(&folder.join("rgb.png"), picture);
     let green: Vec<u8> = picture.rgb.iter().map(|p| p[1]).collect();
@@ -65,15 +65,15 @@ fn compare(folder: &Path, arguments: &[&str]) -> Output {
     trace(&["compare", "--out", "out"]).current_dir(folder).args(arguments).output().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn done(folder: &Path, arguments: &[&str]) -> (String, Value) {
     let output = compare(folder, arguments);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", message(&output));
     let json = std::fs::read(folder.join("out/compare.json")).unwrap();
-    (said(&output), serde_json::from_slice(&json).unwrap())
+    (message(&output), serde_json::from_slice(&json).unwrap())
 }
 
 fn near(what: &str, found: f64, expected: f64, within: f64) {
@@ -81,7 +81,7 @@ fn near(what: &str, found: f64, expected: f64, within: f64) {
 }
 
 #[test]
-fn equal_pictures_differ_in_nothing() {
+fn equal_images_differ_in_nothing() {
     let mut picture = made_up(false);
     picture.nir = picture.rgb.iter().map(|p| p[0]).collect();
     let figures = pair(&picture, &picture, Some(&blocks()), PIXELS_PER_DEGREE).unwrap();
@@ -231,7 +231,7 @@ proptest! {
             (Just(w), Just(h), pixels)
         })
     ) {
-        let picture = |k: usize| Picture { width: w, height: h, rgb: rgb.iter().map(|p| p[k]).collect(), nir: Vec::new() };
+        let picture = |k: usize| RasterImage { width: w, height: h, rgb: rgb.iter().map(|p| p[k]).collect(), nir: Vec::new() };
         let (a, b) = (picture(0), picture(1));
         let (forth, back) = (*measured(&a, &b).all(), *measured(&b, &a).all());
         prop_assert_eq!((forth.mse, forth.ssim), (back.mse, back.ssim));
@@ -253,7 +253,7 @@ fn a_render_is_measured_by_class_and_in_near_infrared() {
     let output = compare(at, &["fine", "noisy"]);
     let paths = String::from_utf8(output.stdout.clone()).unwrap();
     assert_eq!(paths.lines().collect::<Vec<_>>(), FILES.map(|name| format!("out/{name}")));
-    assert!(said(&output).contains("| vegetation, near infrared |"), "{}", said(&output));
+    assert!(message(&output).contains("| vegetation, near infrared |"), "{}", message(&output));
 
     let json: Value = serde_json::from_slice(&std::fs::read(at.join("out/compare.json")).unwrap()).unwrap();
     assert_eq!((json["reference"].as_str(), json["test"].as_str()), (Some("fine"), Some("noisy")));
@@ -292,7 +292,7 @@ fn a_render_is_measured_by_class_and_in_near_infrared() {
 }
 
 #[test]
-fn equal_pictures_are_told_as_such() {
+fn equal_images_are_reported_as_equal() {
     let kept = tempfile::tempdir().unwrap();
     save(&kept.path().join("a.png"), &made_up(false));
     let (words, json) = done(kept.path(), &["a.png", "a.png"]);
@@ -364,7 +364,7 @@ fn datasets_and_real_sets_are_paired_with_their_labels() {
     let options = Options { shown: 0, ..Options::default() };
     let comparison = folders(&at.join("a"), &at.join("b"), &options).unwrap();
     assert_eq!(comparison.pairs.len(), 2);
-    assert!(comparison.shots.is_empty());
+    assert!(comparison.display_pairs.is_empty());
     assert_eq!(json["means"][0]["flip"]["mean"].as_f64(), comparison.means[0].flip.map(|m| m.mean));
     let pairs = Pairs::find(&at.join("real/images/000000.png"), &at.join("a/images/000000"), None).unwrap();
     assert_eq!(pairs.pairs[0].labels.as_deref(), Some(at.join("real/labels/000000.png").as_path()));
@@ -405,9 +405,9 @@ fn what_cannot_be_compared_is_refused_and_nothing_is_written() {
     ];
     for (arguments, words) in cases {
         let output = compare(at, arguments);
-        let told = said(&output);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
-        assert!(told.contains(words) && told.matches("error: ").count() == 1, "{arguments:?}: {told}");
+        let stated = message(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stated}");
+        assert!(stated.contains(words) && stated.matches("error: ").count() == 1, "{arguments:?}: {stated}");
         assert!(output.stdout.is_empty());
         assert_eq!(names(at), before, "{arguments:?}");
     }

@@ -18,7 +18,7 @@ use furrow_grow::plant::condition::Bearer;
 use furrow_grow::plant::{Condition, ConditionDesc, OrganKind};
 use furrow_optics::optics::soil::LOESS;
 use furrow_optics::texture::marks::Marks;
-use furrow_render::accel::{Brute, EmbreeAccel};
+use furrow_render::accel::{BruteForce, EmbreeAccel};
 use furrow_render::material::{ConditionOptics, Damage, LeafDesc, LeafMaterial, Material, Tones};
 use furrow_render::render::label;
 use furrow_render::render::label::NONE;
@@ -99,7 +99,7 @@ fn labels_lose_what_is_eaten_and_nothing_else() {
     let surfaces = eaten.scene.surfaces();
     let unmasked: Vec<furrow_render::accel::Surface<'_>> =
         surfaces.iter().map(|s| furrow_render::accel::Surface { mask: None, ..*s }).collect();
-    let brute = Brute::new(&unmasked);
+    let brute = BruteForce::new(&unmasked);
     for y in 0..camera.height() {
         for x in 0..camera.width() {
             let i = (y * camera.width() + x) as usize;
@@ -140,7 +140,7 @@ fn embree_and_brute_force_agree_on_eaten_leaves() {
     let window = Window::full(scene.camera.width(), scene.camera.height());
     let surfaces = scene.surfaces();
     let fast = label(&EmbreeAccel::build(&surfaces, 1).expect("an accelerator"), &scene.parts, &scene.camera, window);
-    let brute = Brute::new(&surfaces);
+    let brute = BruteForce::new(&surfaces);
     let slow = label(&brute as &dyn Intersect, &scene.parts, &scene.camera, window);
     let differ = fast.parts.iter().zip(&slow.parts).filter(|(a, b)| a != b).count();
     assert!(differ <= 1, "{differ} pixels");

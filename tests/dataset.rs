@@ -46,9 +46,9 @@ fn shards_threads_and_order_make_the_same_bytes() {
     }
     succeed(verb("finish", &parts, &[]));
     same(&tree(&parts), &tree(&whole));
-    let said = succeed(verb("verify", &parts, &["--rerender", "2"])).stderr;
-    let said = String::from_utf8_lossy(&said).into_owned();
-    assert!(said.contains("5 of 5 images checked, 2 rendered again and the same; 0 faults"), "{said}");
+    let printed = succeed(verb("verify", &parts, &["--rerender", "2"])).stderr;
+    let printed = String::from_utf8_lossy(&printed).into_owned();
+    assert!(printed.contains("5 of 5 images checked, 2 rendered again and the same; 0 faults"), "{printed}");
 }
 
 #[test]
@@ -70,8 +70,8 @@ fn a_longer_dataset_with_more_formats_begins_with_the_shorter_one() {
     // dataset.
     let page = ["dataset", "plan", "--scene", SMALL, "--count", "4", "--out", path(&grown)];
     succeed(trace(&[&page[..], &crate::common::dataset::SIZE[..4], &["--format", "coco"]].concat()));
-    let said = fail(verb("finish", &grown, &[]), 1);
-    assert!(said.contains("4 of 4 images are missing: 0-3"), "{said}");
+    let printed = fail(verb("finish", &grown, &[]), 1);
+    assert!(printed.contains("4 of 4 images are missing: 0-3"), "{printed}");
     succeed(verb("render", &grown, &["--quiet"]));
     succeed(verb("finish", &grown, &[]));
     succeed(verb("finish", &fresh, &["--format", "coco", "--quiet"]));
@@ -98,7 +98,7 @@ fn what_is_damaged_is_found_and_made_again_and_nothing_else() {
     flip("seals/000003.json");
     flip("imagefolder/train/masks/000004.png");
     fs::write(at("images/000005/.furrow-left"), b"half").unwrap();
-    let said = fail(verb("verify", &data, &["--shards", "3"]), 1);
+    let printed = fail(verb("verify", &data, &["--shards", "3"]), 1);
     for name in [
         "images/000000/rgb.png was changed",
         "images/000001/plants.png is missing",
@@ -107,7 +107,7 @@ fn what_is_damaged_is_found_and_made_again_and_nothing_else() {
         "5 of 6 images are missing: 0-4\n",
         "--array=0-2",
     ] {
-        assert!(said.contains(name), "{name}: {said}");
+        assert!(printed.contains(name), "{name}: {printed}");
     }
     let before = made(&data).len();
     succeed(make(&data, 6, &[]));
@@ -129,33 +129,36 @@ fn what_is_of_all_images_is_checked_though_one_is_missing() {
     fs::remove_dir_all(data.join("images/000001")).unwrap();
     fs::remove_file(data.join("seals/000001.json")).unwrap();
     fs::remove_file(data.join("imagefolder/train/masks/000001.png")).unwrap();
-    let told = || fail(verb("verify", &data, &[]), 1);
-    let said = told();
-    assert!(said.contains("2 of 3 images checked") && said.contains("; 0 faults"), "{said}");
-    assert!(said.contains("1 of 3 images are missing: 1"), "{said}");
-    assert!(said.contains("not checked: whether missing images are in two splits\n"), "{said}");
+    let message = || fail(verb("verify", &data, &[]), 1);
+    let printed = message();
+    assert!(printed.contains("2 of 3 images checked") && printed.contains("; 0 faults"), "{printed}");
+    assert!(printed.contains("1 of 3 images are missing: 1"), "{printed}");
+    assert!(printed.contains("not checked: whether missing images are in two splits\n"), "{printed}");
     let of_all = ["scene/tests/ref/small.ron", "plants.parquet"];
     for name in of_all {
         fs::write(data.join(name), [&whole[name][..], b"\n"].concat()).unwrap();
     }
-    let said = told();
+    let printed = message();
     for name in of_all {
         let length = whole[name].len();
-        assert!(said.contains(&format!("{name} has {} bytes instead of {length}", length + 1)), "{said}");
+        assert!(printed.contains(&format!("{name} has {} bytes instead of {length}", length + 1)), "{printed}");
         fs::write(data.join(name), &whole[name]).unwrap();
     }
-    assert!(said.contains("; 2 faults"), "{said}");
+    assert!(printed.contains("; 2 faults"), "{printed}");
     // A dataset that was extended: the manifest is older.
     let page = ["dataset", "plan", "--scene", SMALL, "--out", path(&data), "--count", "4"];
     succeed(trace(&[&page[..], &crate::common::dataset::SIZE].concat()));
-    let said = told();
-    assert!(said.contains("2 of 4 images are missing: 1,3") && said.contains("; 0 faults"), "{said}");
-    assert!(said.contains("not checked: dataset.json and images by manifest.json"), "{said}");
+    let printed = message();
+    assert!(printed.contains("2 of 4 images are missing: 1,3") && printed.contains("; 0 faults"), "{printed}");
+    assert!(printed.contains("not checked: dataset.json and images by manifest.json"), "{printed}");
     // A dataset that was never finished.
     fs::remove_file(data.join("manifest.json")).unwrap();
-    let said = told();
-    assert!(said.contains("; 0 faults") && !said.contains("manifest.json is missing"), "{said}");
-    assert!(said.contains("not checked: scene, lists and tables, because manifest.json is written when"), "{said}");
+    let printed = message();
+    assert!(printed.contains("; 0 faults") && !printed.contains("manifest.json is missing"), "{printed}");
+    assert!(
+        printed.contains("not checked: scene, lists and tables, because manifest.json is written when"),
+        "{printed}"
+    );
 }
 
 /// Rationale: tables and lists repeat the contents of records. Expected: `finish` fails and names the record in which a
@@ -170,8 +173,8 @@ fn finish_takes_no_record_that_was_changed() {
     let place = text.find("\"pixels\":").unwrap() + "\"pixels\":".len();
     let other = if &text[place..=place] == "9" { "8" } else { "9" };
     fs::write(&record, [&text[..place], other, &text[place + 1..]].concat()).unwrap();
-    let said = fail(verb("finish", &data, &[]), 1);
-    assert!(said.contains("000001/record.json") && said.contains("was changed"), "{said}");
+    let printed = fail(verb("finish", &data, &[]), 1);
+    assert!(printed.contains("000001/record.json") && printed.contains("was changed"), "{printed}");
     assert_eq!(fs::read(data.join("plants.parquet")).unwrap(), table);
     succeed(make(&data, 2, &[]));
     assert_eq!(fs::read_to_string(&record).unwrap(), text);
@@ -207,11 +210,14 @@ fn a_lying_label_is_found_though_its_hash_is_right() {
         seal.files.insert(file.path, Checksum::of(&file.bytes));
     }
     seal.write(&data).unwrap();
-    let said = fail(verb("verify", &set.folder, &[]), 1);
-    assert!(said.contains("image 000001: 1 pixels are crop or weed but no plant"), "{said}");
-    assert!(said.contains("images/000001/semantics.png differs from the file that manifest.json lists"), "{said}");
-    let said = fail(verb("verify", &set.folder, &["--rerender", "2"]), 1);
-    assert!(said.contains("rendered again, these files differ"), "{said}");
+    let printed = fail(verb("verify", &set.folder, &[]), 1);
+    assert!(printed.contains("image 000001: 1 pixels are crop or weed but no plant"), "{printed}");
+    assert!(
+        printed.contains("images/000001/semantics.png differs from the file that manifest.json lists"),
+        "{printed}"
+    );
+    let printed = fail(verb("verify", &set.folder, &["--rerender", "2"]), 1);
+    assert!(printed.contains("rendered again, these files differ"), "{printed}");
 }
 
 /// Rationale: a dataset rendered with one version of Embree is verified with another, whose hits differ in the last
@@ -235,13 +241,13 @@ fn other_kernels_are_named_and_their_difference_is_bounded() {
     seal(0, &|seal| seal.recipe.clone_from(&fingerprint));
     seal(1, &|seal| seal.recipe.clone_from(&fingerprint));
     succeed(verb("finish", &data, &[]));
-    let said = succeed(verb("verify", &data, &["--rerender", "2"])).stderr;
-    let said = String::from_utf8_lossy(&said).into_owned();
+    let printed = succeed(verb("verify", &data, &["--rerender", "2"])).stderr;
+    let printed = String::from_utf8_lossy(&printed).into_owned();
     let differ = "they differ in at most 0.000 % of the label pixels, 0.000 of 255 in mean colour; 0 faults";
     let words = format!("2 rendered again by {here} instead of Embree 9.9.9 avx2, and nearly the same: {differ}");
-    assert!(said.contains(&words), "{said}");
-    let said = fail(verb("render", &data, &[]), 2);
-    assert!(said.contains("created with the ray tracing kernels Embree 9.9.9 avx2"), "{said}");
+    assert!(printed.contains(&words), "{printed}");
+    let printed = fail(verb("render", &data, &[]), 2);
+    assert!(printed.contains("created with the ray tracing kernels Embree 9.9.9 avx2"), "{printed}");
 
     // Every value of one image is changed by one level: more than a changed hit explains.
     let mut sample = native::read(&data, "000001").unwrap();
@@ -254,11 +260,11 @@ fn other_kernels_are_named_and_their_difference_is_bounded() {
     fs::write(data.join(&file.path), &file.bytes).unwrap();
     seal(1, &|seal| drop(seal.files.insert(file.path.clone(), Checksum::of(&file.bytes))));
     succeed(verb("finish", &data, &[]));
-    let said = fail(verb("verify", &data, &["--rerender", "2"]), 1);
+    let printed = fail(verb("verify", &data, &["--rerender", "2"]), 1);
     let fault = format!(
         "image 000001: rendered again by {here}, it differs in 0.000 % of the label pixels, 0.750 of 255 in mean colour"
     );
-    assert!(said.contains(&fault) && said.contains("1 rendered again by"), "{said}");
+    assert!(printed.contains(&fault) && printed.contains("1 rendered again by"), "{printed}");
 }
 
 /// Rationale: datasets come from other people. Expected: a record, a list of checksums or a recipe with a path outside
@@ -289,17 +295,17 @@ fn a_forged_dataset_leads_nowhere_else() {
         let forged = fs::read_to_string(&record).unwrap().replacen("\"000001\"", &format!("\"{name}\""), 1);
         fs::write(&record, &forged).unwrap();
         seal("images/000001/record.json", forged.as_bytes());
-        let said = fail(verb("verify", &data, &[]), 1);
-        assert!(said.contains("record of image") && said.contains(name), "{said}");
-        let said = fail(verb("finish", &data, &["--format", "phenobench"]), 1);
-        assert!(said.contains("record of image") && said.contains("image 000001"), "{said}");
+        let printed = fail(verb("verify", &data, &[]), 1);
+        assert!(printed.contains("record of image") && printed.contains(name), "{printed}");
+        let printed = fail(verb("finish", &data, &["--format", "phenobench"]), 1);
+        assert!(printed.contains("record of image") && printed.contains("image 000001"), "{printed}");
         assert_eq!(beside(), 2, "{name}");
         restore();
     }
     // A foreign file among the checksums.
     seal("../secret.ron", b"a secret of this machine");
-    let said = fail(verb("verify", &data, &[]), 1);
-    assert!(said.contains("../secret.ron does not lie in the dataset's folder"), "{said}");
+    let printed = fail(verb("verify", &data, &[]), 1);
+    assert!(printed.contains("../secret.ron does not lie in the dataset's folder"), "{printed}");
     restore();
     // The scene file.
     let recipe = data.join("dataset.json");
@@ -319,9 +325,9 @@ fn a_forged_dataset_leads_nowhere_else() {
         }
         for what in [verb("verify", &data, &["--rerender", "1"]), verb("finish", &data, &[])] {
             let output = { what }.output().unwrap();
-            let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert!(matches!(output.status.code(), Some(1 | 2)), "{said}");
-            assert!(said.contains("does not lie in it") && !said.contains("a secret"), "{said}");
+            let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(matches!(output.status.code(), Some(1 | 2)), "{printed}");
+            assert!(printed.contains("does not lie in it") && !printed.contains("a secret"), "{printed}");
         }
     }
 }
@@ -363,9 +369,9 @@ fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
         placed("(file: \"b.obj\", class: Weed, allow_outside: true)"),
     ];
     let refused = || {
-        let said = fail(verb("verify", &data, &["--rerender", "1"]), 2);
-        assert!(said.contains("does not lie in the folder"), "{said}");
-        assert!(!said.contains("a secret") && !said.contains("there is no file"), "{said}");
+        let printed = fail(verb("verify", &data, &["--rerender", "1"]), 2);
+        assert!(printed.contains("does not lie in the folder"), "{printed}");
+        assert!(!printed.contains("a secret") && !printed.contains("there is no file"), "{printed}");
     };
     for (file, text) in forged {
         assert!(text.as_bytes() != whole[file], "{file}");
@@ -417,9 +423,9 @@ fn a_model_that_may_name_files_outside_is_taken_into_the_dataset() {
     write("elsewhere/leaf.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
     write("models/plant.obj", &format!("mtllib {}\n{square}", path(&around.join("elsewhere/leaf.mtl"))));
     let other = around.join("other");
-    let said = fail(order(&other), 2);
-    assert!(said.contains("named by an absolute path in a file that is not a RON file"), "{said}");
-    assert!(!other.exists(), "{said}");
+    let printed = fail(order(&other), 2);
+    assert!(printed.contains("named by an absolute path in a file that is not a RON file"), "{printed}");
+    assert!(!other.exists(), "{printed}");
 }
 
 /// Rationale: a file needed by every field is missing for all of them. Expected: one error, and no further image is
@@ -443,9 +449,9 @@ fn a_file_that_is_gone_ends_a_dataset_at_once() {
     ]));
     let gone: Vec<String> = tree(&data).into_keys().filter(|name| name.ends_with("sugar_beet.ron")).collect();
     fs::remove_file(data.join(&gone[0])).unwrap();
-    let said = fail(verb("render", &data, &[]), 2);
-    assert_eq!(said.matches("there is no file").count(), 1, "{said}");
-    assert!(!data.join("seals").exists(), "{said}");
+    let printed = fail(verb("render", &data, &[]), 2);
+    assert_eq!(printed.matches("there is no file").count(), 1, "{printed}");
+    assert!(!data.join("seals").exists(), "{printed}");
 }
 
 #[test]
@@ -479,7 +485,7 @@ type Break<'a> = (&'a str, Box<dyn Fn(&mut Sample) + 'a>);
 
 /// Each change could come from a bug, a disk or manual editing; each must be reported with its own message.
 #[test]
-fn every_broken_invariant_is_told() {
+fn every_broken_invariant_is_reported() {
     let (_keep, data) = scratch();
     let (set, whole) = sample(&data);
     assert_eq!(invariants::faults(&set.recipe, &whole), Vec::<String>::new());
@@ -542,7 +548,7 @@ fn every_broken_invariant_is_told() {
 fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
     let (_keep, data) = scratch();
     let (set, whole) = sample(&data);
-    let told = |sample: &Sample| invariants::faults(&set.recipe, sample).join("; ").contains("by their samples");
+    let message = |sample: &Sample| invariants::faults(&set.recipe, sample).join("; ").contains("by their samples");
     let share = |class: u8| [0, 1, 2].map(|k| if k == class { 255 } else { 0 });
     let width = whole.size().0 as usize;
     let mut feathery = whole.clone();
@@ -551,13 +557,13 @@ fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
         feathery.semantics[at] = label;
         feathery.coverage[at] = share(if at % 30 == 0 { 1 - label } else { label });
     }
-    assert!(!told(&feathery));
+    assert!(!message(&feathery));
     let mut shifted = whole.clone();
     for at in 0..whole.pixels() {
         shifted.semantics[at] = (at % width / 2 % 2) as u8;
         shifted.coverage[at] = share(((at % width).div_ceil(2) % 2) as u8);
     }
-    assert!(told(&shifted));
+    assert!(message(&shifted));
     // A shipped scene file whose leaves are much narrower than a pixel at this size.
     let coarse = path(&data).to_owned() + "-coarse";
     let mut command = trace(&["dataset", "--scene", "scenes/any-field.ron", "--count", "3", "--spp", "1", "--quiet"]);
@@ -600,31 +606,31 @@ fn bad_input_is_refused_and_changes_nothing() {
     succeed(make(&data, 2, &[]));
     let before = tree(&data);
     let other = |more: &[&str], words: &str| {
-        let said = fail(make(&data, 2, more), 2);
-        assert!(said.contains(words), "`{words}`: {said}");
+        let printed = fail(make(&data, 2, more), 2);
+        assert!(printed.contains(words), "`{words}`: {printed}");
     };
     other(&["--seed", "9"], "seed 3 there, 9 here");
     other(&["--height", "40"], "height 72 there, 40 here");
-    let said = fail(make(&data, 1, &[]), 2);
-    assert!(said.contains("it has 2 images, more than 1"), "{said}");
-    let said = fail(verb("verify", data.parent().unwrap(), &[]), 2);
-    assert!(said.contains("this is no dataset"), "{said}");
-    let said = fail(verb("render", &data, &["--shard", "3/3"]), 2);
-    assert!(said.contains("k from 0 to N - 1"), "{said}");
+    let printed = fail(make(&data, 1, &[]), 2);
+    assert!(printed.contains("it has 2 images, more than 1"), "{printed}");
+    let printed = fail(verb("verify", data.parent().unwrap(), &[]), 2);
+    assert!(printed.contains("this is no dataset"), "{printed}");
+    let printed = fail(verb("render", &data, &["--shard", "3/3"]), 2);
+    assert!(printed.contains("k from 0 to N - 1"), "{printed}");
     same(&tree(&data), &before);
     // A folder with foreign files in it.
     let (_keep, full) = scratch();
     fs::create_dir_all(&full).unwrap();
     fs::write(full.join("thesis.tex"), b"three years").unwrap();
-    let said = fail(make(&full, 1, &[]), 2);
-    assert!(said.contains("such as thesis.tex"), "{said}");
+    let printed = fail(make(&full, 1, &[]), 2);
+    assert!(printed.contains("such as thesis.tex"), "{printed}");
     assert_eq!(tree(&full).len(), 1);
     // A scene file that was changed after the dataset was started.
     let page = fs::read_to_string(data.join("scene/tests/ref/small.ron")).unwrap();
     fs::write(data.join("scene/tests/ref/small.ron"), page.replace("elevation_deg: 45", "elevation_deg: 50")).unwrap();
     fs::remove_file(data.join("images/000001/rgb.png")).unwrap();
-    let said = fail(verb("render", &data, &[]), 2);
-    assert!(said.contains("was changed since the dataset was created"), "{said}");
+    let printed = fail(verb("render", &data, &[]), 2);
+    assert!(printed.contains("was changed since the dataset was created"), "{printed}");
 }
 
 /// A file blocks the path of an image folder, a permanent fault. Expected: the run ends at once with exit code 1;
@@ -639,12 +645,12 @@ fn a_cause_that_lasts_ends_a_dataset_and_keeps_what_is_made() {
     let blocked = data.join("images/000002");
     fs::create_dir_all(data.join("images")).unwrap();
     fs::write(&blocked, "").unwrap();
-    let said = fail(verb("render", &data, &["--quiet", "--threads", "1", "--at-once", "1"]), 1);
+    let printed = fail(verb("render", &data, &["--quiet", "--threads", "1", "--at-once", "1"]), 1);
     assert!(
-        said.starts_with(&format!("error: {}", path(&blocked)))
-            && said.contains(" help: ")
-            && said.lines().count() == 2,
-        "{said}"
+        printed.starts_with(&format!("error: {}", path(&blocked)))
+            && printed.contains(" help: ")
+            && printed.lines().count() == 2,
+        "{printed}"
     );
     assert_eq!(made(&data), [0, 1]);
     fs::remove_file(&blocked).unwrap();
@@ -670,11 +676,11 @@ fn fields_that_cannot_be_do_not_keep_others_from_being() {
         trace(&plan).output().unwrap().status.success()
     });
     assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
-    let said = fail(verb("render", &data, &["--quiet"]), 2);
-    let faults = said.matches("image 0000").count();
+    let printed = fail(verb("render", &data, &["--quiet"]), 2);
+    let faults = printed.matches("image 0000").count();
     let sealed = fs::read_dir(data.join("seals")).unwrap().count();
-    assert!(faults > 0 && sealed > 0 && faults + sealed == 12, "{faults} faults, {sealed} images: {said}");
-    assert!(said.contains("below the horizon"), "{said}");
+    assert!(faults > 0 && sealed > 0 && faults + sealed == 12, "{faults} faults, {sealed} images: {printed}");
+    assert!(printed.contains("below the horizon"), "{printed}");
 }
 
 /// Rationale: users name textures and species by absolute paths, and such a dataset must also continue on other
@@ -723,9 +729,9 @@ fn absolute_paths_are_taken_into_the_dataset() {
     for gone in [&here, &there] {
         fs::remove_dir_all(gone).unwrap();
     }
-    let said = succeed(verb("verify", &moved, &["--rerender", "2"])).stderr;
-    let said = String::from_utf8_lossy(&said).into_owned();
-    assert!(said.contains("2 of 2 images checked, 2 rendered again and the same; 0 faults"), "{said}");
+    let printed = succeed(verb("verify", &moved, &["--rerender", "2"])).stderr;
+    let printed = String::from_utf8_lossy(&printed).into_owned();
+    assert!(printed.contains("2 of 2 images checked, 2 rendered again and the same; 0 faults"), "{printed}");
     for (name, bytes) in tree(&moved) {
         for machine in [&here, &there] {
             let machine = path(machine).as_bytes();

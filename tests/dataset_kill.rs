@@ -76,8 +76,8 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
         let second = start();
         for one in [first, second] {
             let output = one.wait_with_output().expect("an end");
-            let said = String::from_utf8_lossy(&output.stderr);
-            assert!(output.status.success(), "pair {pair}: {:?}: {said}", output.status);
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "pair {pair}: {:?}: {message}", output.status);
         }
         same(&tree(&data), &whole);
     }
@@ -121,13 +121,15 @@ fn a_full_disk_is_one_clear_error_and_no_half_file() {
         large = size / 1024 * 4,
     );
     let Some(output) = on_a_small_disk(&disk, (size / 2048) as u32, &script) else { return };
-    let said = String::from_utf8_lossy(&output.stderr);
-    let lines: Vec<&str> = said.lines().collect();
-    let [error, help, code] = lines[..] else { panic!("expected one error, its help and the exit code, got: {said}") };
+    let message = String::from_utf8_lossy(&output.stderr);
+    let lines: Vec<&str> = message.lines().collect();
+    let [error, help, code] = lines[..] else {
+        panic!("expected one error, its help and the exit code, got: {message}")
+    };
     assert!(error.starts_with("error: ") && error.contains("No space left on device"), "{error}");
     assert!(help.contains("make room on the disk"), "{help}");
     assert_eq!(code, "code 1");
-    assert!(output.status.success(), "{said}");
+    assert!(output.status.success(), "{message}");
     same(&tree(&copy), &tree(&whole));
     std::fs::remove_dir_all(copy).expect("the copy is removed");
 }
@@ -151,16 +153,16 @@ fn signals_stop_a_dataset_cleanly() {
         assert!(Command::new("kill").args([signal, &id]).status().expect("kill").success());
         let status = child.wait().expect("an end");
         assert_eq!(status.code(), Some(75), "{signal}");
-        let mut said = String::new();
-        child.stderr.take().expect("stderr").read_to_string(&mut said).expect("text");
+        let mut message = String::new();
+        child.stderr.take().expect("stderr").read_to_string(&mut message).expect("text");
         let files = tree(&data);
         assert!(files.keys().all(|name| !name.contains(".furrow-")), "{signal}");
         let sealed = files.keys().filter(|name| name.starts_with("seals/")).count();
         let images = files.keys().filter(|name| name.ends_with("/record.json")).count();
         assert!(sealed > 0 && sealed < 500, "{signal}: {sealed}");
-        let told =
+        let reported =
             format!("{}: stopped: {sealed} of 500 images are complete\n help: the same command continues", path(&data));
-        assert!(said.contains(&told) && !said.contains("nothing was written"), "{signal}: {said}");
+        assert!(message.contains(&reported) && !message.contains("nothing was written"), "{signal}: {message}");
         if signal == "-USR1" {
             assert_eq!(sealed, images, "images in progress must be finished");
         }

@@ -9,7 +9,7 @@ use crate::common::dataset::{fail, make, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, trace};
 use furrow_base::Result;
 use furrow_dataset::check::verify;
-use furrow_dataset::check::verify::Again;
+use furrow_dataset::check::verify::Rerender;
 use furrow_dataset::make::finish;
 use furrow_dataset::make::generate::generate;
 use furrow_dataset::{Callbacks, Set, Work};
@@ -66,9 +66,9 @@ impl<'a> Linked<'a> {
 }
 
 fn refused(command: Command, name: &str) {
-    let said = fail(command, 2);
-    assert!(said.contains("symbolic link") && said.contains(&format!("/{name}: ")), "{said}");
-    assert!(said.contains("replace it with the folder"), "{said}");
+    let message = fail(command, 2);
+    assert!(message.contains("symbolic link") && message.contains(&format!("/{name}: ")), "{message}");
+    assert!(message.contains("replace it with the folder"), "{message}");
 }
 
 #[test]
@@ -134,8 +134,8 @@ fn render(set: &Set) -> Result<()> {
 }
 
 fn fails<T: std::fmt::Debug>(done: Result<T>, name: &str) {
-    let said = done.expect_err(name).to_string();
-    assert!(said.contains("symbolic link"), "{name}: {said}");
+    let message = done.expect_err(name).to_string();
+    assert!(message.contains("symbolic link"), "{name}: {message}");
 }
 
 /// Expected: a link that appears after the dataset was opened is an error if anything would be written or removed
@@ -161,7 +161,7 @@ fn a_link_that_appears_later_is_not_followed() {
     let linked = Linked::at(&data, "images/000001", &victim);
     let (threads, never) = (Threads::new(1).unwrap(), AtomicBool::new(false));
     linked.keeps(|| {
-        let found = verify::verify(&set, &Again::default(), &threads, &|_| (), &never).unwrap();
+        let found = verify::verify(&set, &Rerender::default(), &threads, &|_| (), &never).unwrap();
         assert!(found.missing == [1] && !found.faults.is_empty(), "{found:?}");
     });
     linked.undo();

@@ -147,9 +147,9 @@ fn a_library_that_fails_leaves_the_noisy_picture() {
     let mut command = denoise_into(&out);
     command.env("STAND_IN_FAILS", "out of memory");
     let (done, notes) = with_stand_in(command, keep.path());
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert_eq!(done.status.code(), Some(1), "{said}");
-    assert!(said.contains("Open Image Denoise: out of memory"), "{said}");
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{message}");
+    assert!(message.contains("Open Image Denoise: out of memory"), "{message}");
     assert_eq!(names(&out), FILES, "the noisy files must exist, without partial denoised ones");
     assert_eq!((count(&notes, "filter released"), count(&notes, "device released")), (1, 2), "{notes:#?}");
 }
@@ -161,35 +161,35 @@ fn a_library_that_fails_leaves_the_noisy_picture() {
 fn without_a_library_that_can_be_loaded_the_program_is_asked() {
     let (keep, out) = scratch();
     stand_in(keep.path(), &["-DLACKS"]);
-    let said = String::from_utf8(denoise_with(None, &out, keep.path()).stderr).unwrap();
-    assert!(said.starts_with("error: --denoise needs Open Image Denoise"), "{said}");
-    assert!(said.contains("oidnExecuteFilter") && names(&out).is_empty(), "{said}");
+    let message = String::from_utf8(denoise_with(None, &out, keep.path()).stderr).unwrap();
+    assert!(message.starts_with("error: --denoise needs Open Image Denoise"), "{message}");
+    assert!(message.contains("oidnExecuteFilter") && names(&out).is_empty(), "{message}");
     every_band_is_back(&denoise_with(Some(COPY), &out, keep.path()), &out);
 }
 
 /// Expected: an error message that names the damaged file, instead of a crash by a signal.
 #[cfg(unix)]
 #[test]
-fn a_library_that_is_none_is_told() {
+fn a_file_that_is_no_library_is_reported() {
     let (keep, out) = scratch();
     stand_in(keep.path(), &[]);
     std::fs::write(keep.path().join("lib/libOpenImageDenoise_device_cpu.so.2.5.1"), "no library").unwrap();
     let (done, notes) = with_stand_in(denoise_into(&out), keep.path());
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert_eq!(done.status.code(), Some(2), "{said}");
-    assert!(said.contains("libOpenImageDenoise_device_cpu.so.2.5.1: ") && notes.is_empty(), "{said}");
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(2), "{message}");
+    assert!(message.contains("libOpenImageDenoise_device_cpu.so.2.5.1: ") && notes.is_empty(), "{message}");
 }
 
 #[cfg(unix)]
 #[test]
-fn a_missing_denoiser_is_told_before_anything_is_rendered() {
+fn a_missing_denoiser_is_reported_before_anything_is_rendered() {
     let (keep, out) = scratch();
     let done = denoise_with(None, &out, keep.path());
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert_eq!(done.status.code(), Some(2), "{said}");
-    assert!(said.starts_with("error: --denoise needs Open Image Denoise"), "{said}");
-    assert!(said.contains("pip install") && said.contains("OIDN_DIR="), "{said}");
-    assert!(names(&out).is_empty() && !said.contains("plants"), "{said}");
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(2), "{message}");
+    assert!(message.starts_with("error: --denoise needs Open Image Denoise"), "{message}");
+    assert!(message.contains("pip install") && message.contains("OIDN_DIR="), "{message}");
+    assert!(names(&out).is_empty() && !message.contains("plants"), "{message}");
 }
 
 #[cfg(unix)]
@@ -198,9 +198,9 @@ fn a_denoiser_that_fails_leaves_the_noisy_picture() {
     for (script, words) in [("echo out of memory >&2; exit 3", "out of memory"), ("exit 0", "wrote no picture")] {
         let (keep, out) = scratch();
         let done = denoise_with(Some(script), &out, keep.path());
-        let said = String::from_utf8(done.stderr).unwrap();
-        assert_eq!(done.status.code(), Some(1), "{said}");
-        assert!(said.contains(words), "{said}");
+        let message = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(1), "{message}");
+        assert!(message.contains(words), "{message}");
         assert_eq!(names(&out), FILES, "the noisy files must exist, without partial denoised ones");
     }
 }
@@ -215,9 +215,9 @@ fn a_folder_for_temporary_files_that_is_not_there_is_named() {
     std::fs::write(&program, "").unwrap();
     let gone = keep.path().join("gone");
     let done = denoise_into(&out).env("OIDN_DIR", keep.path()).env("TMPDIR", &gone).output().unwrap();
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert_eq!(done.status.code(), Some(1), "{said}");
-    assert!(said.contains(&format!("error: {}: ", gone.display())), "{said}");
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{message}");
+    assert!(message.contains(&format!("error: {}: ", gone.display())), "{message}");
 }
 
 /// Peak signal-to-noise ratio of all bands on a display scale, decibels: each band is divided by the reference's 99th

@@ -12,15 +12,15 @@ use crate::common::dataset::{fail, path, succeed};
 use crate::common::program::{SMALL, names, trace};
 use crate::common::python::{ask, python, torch};
 use crate::common::training::{self, learn, normalised, pictures, stirred};
-use furrow_output::Picture;
-use furrow_train::deploy::pictures::Prediction;
+use furrow_output::ImageData;
+use furrow_train::deploy::input_images::Prediction;
 use furrow_train::deploy::{onnx, torchscript};
 use furrow_train::fit::hyper::NormalizationMode;
 use furrow_train::net::Network;
 use furrow_train::refine::{Refine, Seen};
 use furrow_train::run::{self, TrainedModel};
 use furrow_train::torch::tch::{CModule, Device, Kind, Tensor};
-use furrow_train::torch::{Model, Precision, Where, device};
+use furrow_train::torch::{Model, Placement, Precision, device};
 use furrow_train::weights::{self, Array};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,7 @@ fn train(arguments: &[&str]) -> Command {
 
 fn model(learnt: &TrainedModel) -> Model {
     device::set_threads(1);
-    let place = Where { device: Device::Cpu, precision: Precision::Single };
+    let place = Placement { device: Device::Cpu, precision: Precision::Single };
     let card = &learnt.card;
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
 }
@@ -150,7 +150,7 @@ fn exported_networks_compute_what_ours_do() {
 }
 
 #[test]
-fn export_writes_where_it_is_told() {
+fn export_writes_to_the_given_path() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new/robot.onnx");
     let done = succeed(train(&["export", path(&RGB), "--out", path(&out)]));
@@ -179,8 +179,8 @@ fn export_writes_where_it_is_told() {
     ] {
         let mut all = vec!["export", path(&RGB)];
         all.extend(arguments);
-        let said = fail(train(&all), 2);
-        assert!(said.contains(words), "{said}");
+        let message = fail(train(&all), 2);
+        assert!(message.contains(words), "{message}");
     }
     assert_eq!(before, names(folder.path()));
 }
@@ -193,8 +193,8 @@ fn half_precision_is_a_run_of_half_the_size() {
     let (half, photos) = (folder.path().join("half"), folder.path().join("photos"));
     succeed(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]));
     assert_eq!(names(&half), ["model.json", "weights.safetensors"]);
-    let said = fail(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]), 2);
-    assert!(said.contains("there is a trained model in this folder already"), "{said}");
+    let message = fail(train(&["export", path(&RGB), "--format", "half", "--out", path(&half)]), 2);
+    assert!(message.contains("there is a trained model in this folder already"), "{message}");
     let bytes = |run: &Path| std::fs::metadata(run.join(run::WEIGHTS)).unwrap().len() as f64;
     assert!((0.49..0.52).contains(&(bytes(&half) / bytes(&RGB))), "{} of {} bytes", bytes(&half), bytes(&RGB));
     let weights = |run: &Path| -> BTreeMap<String, Tensor> {
@@ -267,8 +267,8 @@ fn a_network_that_ships_finds_plants() {
     let mut export = train(&["export", "any-field", "--out", path(&folder.path().join("network.onnx"))]);
     export.current_dir(folder.path());
     succeed(export);
-    let said = fail(train(&["export", "any-field"]), 2);
-    assert!(said.contains("`any-field` ships with the program, and its folder is not for output"), "{said}");
+    let message = fail(train(&["export", "any-field"]), 2);
+    assert!(message.contains("`any-field` ships with the program, and its folder is not for output"), "{message}");
 }
 
 /// Writes three images of different formats and sizes, made from the waves of [`pictures`].
@@ -281,10 +281,10 @@ fn photographs(folder: &Path) -> BTreeMap<&'static str, (u32, u32)> {
             std::fs::create_dir_all(folder).unwrap();
             std::fs::write(folder.join("large.JPG"), furrow_output::encode_jpeg(w, h, rgb, 90).unwrap()).unwrap();
         } else {
-            furrow_output::write_png(&folder.join(format!("{name}.png")), w, h, &Picture::Rgb(rgb), "").unwrap();
+            furrow_output::write_png(&folder.join(format!("{name}.png")), w, h, &ImageData::Rgb(rgb), "").unwrap();
         }
         let nir = pictures(1, (w, h), 1, 50 + k as u64);
-        furrow_output::write_png(&folder.join(format!("{name}.nir.png")), w, h, &Picture::Gray(&nir), "").unwrap();
+        furrow_output::write_png(&folder.join(format!("{name}.nir.png")), w, h, &ImageData::Gray(&nir), "").unwrap();
     }
     std::fs::write(folder.join("notes.txt"), "no picture").unwrap();
     sizes.into()
@@ -300,8 +300,8 @@ fn photographs_of_any_size_get_masks_of_their_size() {
     let done = succeed(train(&arguments));
     let files = ["large", "same", "small"].iter().flat_map(|n| [format!("{n}.png"), format!("{n}.overlay.png")]);
     let files: Vec<String> = files.chain(["prediction.json".into()]).collect();
-    let told: Vec<String> = files.iter().map(|f| out.join(f).display().to_string()).collect();
-    assert_eq!(String::from_utf8(done.stdout).unwrap().lines().collect::<Vec<_>>(), told);
+    let stated: Vec<String> = files.iter().map(|f| out.join(f).display().to_string()).collect();
+    assert_eq!(String::from_utf8(done.stdout).unwrap().lines().collect::<Vec<_>>(), stated);
     let mut sorted = files.clone();
     sorted.sort();
     assert_eq!(names(&out), sorted);
@@ -354,7 +354,7 @@ fn runs_of_one_folder_answer_together() {
     let bytes = pictures(1, size, 3, 4);
     std::fs::create_dir_all(&photos).unwrap();
     let rgb: Vec<[u8; 3]> = bytes.as_chunks().0.to_vec();
-    furrow_output::write_png(&photos.join("a.png"), size.0, size.1, &Picture::Rgb(&rgb), "").unwrap();
+    furrow_output::write_png(&photos.join("a.png"), size.0, size.1, &ImageData::Rgb(&rgb), "").unwrap();
     let arguments = ["predict", path(&runs), path(&photos), "--out", path(&out)];
     succeed(train(&arguments));
 
@@ -485,18 +485,18 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let photos = at("photos");
     photographs(&photos);
     let write = |file: &Path, value: u8| {
-        furrow_output::write_png(file, 40, 40, &Picture::Rgb(&[[value, 90, 60]; 1600]), "").unwrap();
+        furrow_output::write_png(file, 40, 40, &ImageData::Rgb(&[[value, 90, 60]; 1600]), "").unwrap();
     };
     write(&at("more/small.png"), 40);
     write(&at("plain/a.png"), 40);
     std::fs::create_dir_all(at("empty")).unwrap();
     std::fs::write(at("empty/notes.txt"), "").unwrap();
-    furrow_output::write_png(&at("gray.png"), 40, 40, &Picture::Gray(&[7; 1600]), "").unwrap();
+    furrow_output::write_png(&at("gray.png"), 40, 40, &ImageData::Gray(&[7; 1600]), "").unwrap();
     let whole = std::fs::read(photos.join("small.png")).unwrap();
     std::fs::write(at("cut.png"), &whole[..whole.len() / 2]).unwrap();
     std::fs::write(at("words.png"), "no picture at all").unwrap();
-    furrow_output::write_png(&at("odd/a.png"), 40, 40, &Picture::Rgb(&[[9; 3]; 1600]), "").unwrap();
-    furrow_output::write_png(&at("odd/a.nir.png"), 20, 40, &Picture::Gray(&[9; 800]), "").unwrap();
+    furrow_output::write_png(&at("odd/a.png"), 40, 40, &ImageData::Rgb(&[[9; 3]; 1600]), "").unwrap();
+    furrow_output::write_png(&at("odd/a.nir.png"), 20, 40, &ImageData::Gray(&[9; 800]), "").unwrap();
 
     let refuse = |run: &Path, images: &[&Path], more: &[&str], words: &[&str]| {
         let out = at("refused");
@@ -504,9 +504,9 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
         arguments.extend(images.iter().map(|i| path(i)));
         arguments.extend(["--out", path(&out)]);
         arguments.extend(more);
-        let said = fail(train(&arguments), 2);
+        let message = fail(train(&arguments), 2);
         for words in words {
-            assert!(said.contains(words), "`{words}` is not in: {said}");
+            assert!(message.contains(words), "`{words}` is not in: {message}");
         }
         let left = names(&out);
         assert!(left.is_empty(), "{words:?}: {left:?}");
@@ -528,29 +528,33 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
 
     // An unreadable image does not prevent predictions for the others.
     let out = at("others");
-    let said = fail(train(&["predict", path(&RGB), path(&at("cut.png")), path(&photos), "--out", path(&out)]), 2);
+    let message = fail(train(&["predict", path(&RGB), path(&at("cut.png")), path(&photos), "--out", path(&out)]), 2);
     assert!(
-        said.contains("1 of 4 images could not be read; the others have predictions:") && said.contains("cut.png: "),
-        "{said}"
+        message.contains("1 of 4 images could not be read; the others have predictions:")
+            && message.contains("cut.png: "),
+        "{message}"
     );
     assert_eq!(names(&out).len(), 7, "{:?}", names(&out));
-    let told: Prediction = run::read_json(&out.join("prediction.json")).unwrap();
-    assert_eq!(told.pictures.keys().collect::<Vec<_>>(), ["large", "same", "small"]);
+    let stated: Prediction = run::read_json(&out.join("prediction.json")).unwrap();
+    assert_eq!(stated.pictures.keys().collect::<Vec<_>>(), ["large", "same", "small"]);
 
     // Masks written beside the photographs would overwrite them.
-    let said = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
+    let message = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
     assert!(
-        said.contains("small.png: this file is not a prediction")
-            || said.contains("same.png: this file is not a prediction"),
-        "{said}"
+        message.contains("small.png: this file is not a prediction")
+            || message.contains("same.png: this file is not a prediction"),
+        "{message}"
     );
     assert_eq!(std::fs::read(photos.join("small.png")).unwrap(), whole);
     // Predictions for other images of the same name, or by another network, are not overwritten.
     let before = std::fs::read(out.join("small.png")).unwrap();
-    let said = fail(train(&["predict", path(&RGB), path(&at("more")), "--out", path(&out)]), 2);
-    assert!(said.contains("small.png: this is the prediction of") && said.contains("photos/small.png"), "{said}");
-    let said = fail(train(&["predict", path(&RGBN), path(&photos), "--out", path(&out)]), 2);
-    assert!(said.contains("this folder holds predictions of another network"), "{said}");
+    let message = fail(train(&["predict", path(&RGB), path(&at("more")), "--out", path(&out)]), 2);
+    assert!(
+        message.contains("small.png: this is the prediction of") && message.contains("photos/small.png"),
+        "{message}"
+    );
+    let message = fail(train(&["predict", path(&RGBN), path(&photos), "--out", path(&out)]), 2);
+    assert!(message.contains("this folder holds predictions of another network"), "{message}");
     assert_eq!(std::fs::read(out.join("small.png")).unwrap(), before);
 
     // Weights that are damaged, or that do not belong to the model card.
@@ -567,13 +571,13 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
         ["predict", path(&broken), path(&photos), "--out", path(&at("refused"))].as_slice(),
         &["export", path(&broken)],
     ] {
-        let said = fail(train(arguments), 1);
+        let message = fail(train(arguments), 1);
         let words = "weights.safetensors: this is not a weights file of `train`, or it is damaged";
-        assert!(said.contains(words), "{said}");
+        assert!(message.contains(words), "{message}");
     }
     std::fs::copy(RGBN.join("weights.safetensors"), broken.join("weights.safetensors")).unwrap();
-    let said = fail(train(&["predict", path(&broken), path(&photos), "--out", path(&at("refused"))]), 1);
-    assert!(said.contains("these are not the weights that model.json in this folder describes"), "{said}");
+    let message = fail(train(&["predict", path(&broken), path(&photos), "--out", path(&at("refused"))]), 1);
+    assert!(message.contains("these are not the weights that model.json in this folder describes"), "{message}");
     assert_eq!(names(&broken), ["model.json", "weights.safetensors"]);
 }
 

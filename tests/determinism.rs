@@ -57,10 +57,10 @@ fn files_are_the_same_bytes_at_any_number_of_threads() {
     for (name, threads) in [("one", "1"), ("two", "2"), ("again", "2")] {
         let output = run(&at(name), &[&common[..], &["--threads", threads]].concat());
         assert_eq!(names(&at(name)), FILES, "unexpected files");
-        let mut told: Vec<String> = String::from_utf8(output.stdout).unwrap().lines().map(String::from).collect();
-        told.sort();
+        let mut listed: Vec<String> = String::from_utf8(output.stdout).unwrap().lines().map(String::from).collect();
+        listed.sort();
         let written: Vec<String> = FILES.iter().map(|f| at(name).join(f).display().to_string()).collect();
-        assert_eq!(told, written, "stdout must list the written files");
+        assert_eq!(listed, written, "stdout must list the written files");
     }
     let bytes = |name: &str, file: &str| std::fs::read(at(name).join(file)).unwrap();
     for file in FILES {

@@ -316,9 +316,9 @@ fn the_layers_are_those_of_the_library() {
         let layer = |row: &String| row.split('|').nth(1).is_some_and(|n| n.trim().parse::<u32>().is_ok());
         text.lines().filter_map(row).filter(layer).collect()
     };
-    let (told, held) = (rows(&page, ""), rows(&library, "//! "));
+    let (documented, held) = (rows(&page, ""), rows(&library, "//! "));
     assert!(held.len() > 10);
-    assert_eq!(told, held);
+    assert_eq!(documented, held);
 }
 
 /// Expected: CONTRIBUTING lists the pages that `tests/guide.rs` runs, and no other page writes files.

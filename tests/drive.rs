@@ -164,7 +164,7 @@ fn frames_show_the_same_ground_whatever_others_see() {
 /// Rationale: readers of pose files assume that all rows of an image are seen from one position. Expected: planning
 /// warns about this for a moving phone with a rolling shutter, and not for a global shutter.
 #[test]
-fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
+fn one_pose_for_a_rolling_shutter_is_warned_of() {
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("plane.obj"), "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0\nf 1 2 3 4\n").unwrap();
@@ -178,10 +178,10 @@ fn one_pose_for_the_rows_of_a_rolling_shutter_is_told() {
         let mut command =
             trace(&["dataset", "plan", "--scene", path(&scene), "--out", path(&out), "--width", "48", "--count", "2"]);
         let ended = command.args(["--format", "colmap,mots,nerf,tum"]).output().unwrap();
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert!(ended.status.success(), "{said}");
+        let message = String::from_utf8_lossy(&ended.stderr);
+        assert!(ended.status.success(), "{message}");
         let words = "colmap, nerf, tum cannot represent a rolling shutter: poses are those of the middle row";
-        assert_eq!(said.contains(words), rolls, "{said}");
+        assert_eq!(message.contains(words), rolls, "{message}");
     }
 }
 
@@ -394,13 +394,13 @@ fn coco_has_a_video_for_each_camera_of_each_field() {
     let mut tracks: BTreeMap<u64, BTreeSet<(u64, u64)>> = BTreeMap::new();
     for (field, split) in [(0_u64, "train"), (1, "val")] {
         for file in ["coco/annotations/instances", "coco/annotations/leaves", "panoptic/annotations/panoptic"] {
-            let told: Value = serde_json::from_slice(&before[&format!("{file}_{split}.json")]).unwrap();
-            let [images, annotations] = ["images", "annotations"].map(|key| told[key].as_array().unwrap());
+            let reported: Value = serde_json::from_slice(&before[&format!("{file}_{split}.json")]).unwrap();
+            let [images, annotations] = ["images", "annotations"].map(|key| reported[key].as_array().unwrap());
             let video = |(k, camera): (u64, &str)| {
                 assert!(before.contains_key(&format!("mots/{field:06}-{camera}.txt")));
                 json!({ "id": 2 * field + k, "name": format!("{field:06}-{camera}"), "width": 48, "height": 36 })
             };
-            assert_eq!(told["videos"], Value::from([(1, "camera"), (2, "right")].map(video).to_vec()));
+            assert_eq!(reported["videos"], Value::from([(1, "camera"), (2, "right")].map(video).to_vec()));
             for (k, camera) in [(1, "camera"), (2, "right")] {
                 let of = images.iter().filter(|image| image["video_id"] == 2 * field + k);
                 let frames: Vec<u64> = of.clone().map(|image| image["frame_id"].as_u64().unwrap()).collect();
@@ -467,11 +467,11 @@ fn the_time_that_is_left_counts_growing_once() {
         options: RenderOptions::path_traced(Quality::spp(1)),
         ..Order::new(page(&folder, "drive.ron", &|t| t), 6)
     };
-    let (never, time_left, told) = (Arc::<AtomicBool>::default(), TimeLeft::default(), Mutex::new(Vec::new()));
+    let (never, time_left, reported) = (Arc::<AtomicBool>::default(), TimeLeft::default(), Mutex::new(Vec::new()));
     let begin = Instant::now();
     let done = |_| {
         let left = time_left.left().expect("an image is there");
-        told.lock().unwrap().push((left.as_secs_f64(), begin.elapsed().as_secs_f64()));
+        reported.lock().unwrap().push((left.as_secs_f64(), begin.elapsed().as_secs_f64()));
     };
     let callbacks = Callbacks { begin: &|_| (), warn: &|_| (), done: &done, soon: &never, now: &never };
     let set = furrow_dataset::make::begin(&out, &order, &callbacks).unwrap();
@@ -479,11 +479,11 @@ fn the_time_that_is_left_counts_growing_once() {
     furrow_dataset::make::generate::generate(&set, &work, &callbacks).unwrap();
     let rows = timing_log::rows(&out).unwrap();
     assert!(rows.len() == 6 && rows[0].grow_s > 0.01 * rows[0].seconds, "{rows:?}");
-    let told = told.into_inner().unwrap();
-    let (left, elapsed) = told[0];
+    let reported = reported.into_inner().unwrap();
+    let (left, elapsed) = reported[0];
     let frames = 1.0 - rows[0].grow_s / rows[0].seconds;
     assert!(left > 0.0 && left <= 5.0 * frames * elapsed * 1.000_001, "{left} after {elapsed}: {rows:?}");
-    assert_eq!(told[5].0, 0.0);
+    assert_eq!(reported[5].0, 0.0);
 }
 
 /// Expected: poses written by `--format tum` and read again as a path give the same images.
@@ -541,8 +541,8 @@ fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
         ("wide.tum", wide.as_slice(), "not UTF-8 text"),
     ] {
         let page = flown(name, poses);
-        let said = fail(trace(&["--scene", path(&page), "--spp", "1", "--out", path(&folder.join("no"))]), 2);
-        assert!(said.contains(words) && said.contains(name), "{said}");
+        let message = fail(trace(&["--scene", path(&page), "--spp", "1", "--out", path(&folder.join("no"))]), 2);
+        assert!(message.contains(words) && message.contains(name), "{message}");
     }
 }
 
@@ -553,7 +553,7 @@ fn find(folder: &Path, name: &str) -> bool {
 }
 
 #[test]
-fn what_is_no_drive_is_told() {
+fn invalid_drives_are_reported() {
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     let refused = |name: &str, change: &dyn Fn(String) -> String| {
@@ -576,11 +576,11 @@ fn what_is_no_drive_is_told() {
         ),
         ("shape", "Nadir(height_m: 0.45, at_m", "Nadir(height_m: -0.45, at_m", "height_m"),
     ] {
-        let said = refused(&format!("{name}.ron"), &|text| {
+        let message = refused(&format!("{name}.ron"), &|text| {
             assert!(text.contains(from), "{from}");
             text.replacen(from, to, 1)
         });
-        assert!(said.contains(words), "{name}: {said}");
+        assert!(message.contains(words), "{name}: {message}");
     }
     let alone = trace(&["sequence", "--scene", "tests/ref/small.ron", "--out", path(&folder.join("no"))]);
     assert!(fail(alone, 2).contains("renders one image of each field"));

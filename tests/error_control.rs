@@ -14,7 +14,7 @@ use furrow_base::sampling::Points;
 use furrow_field::Field;
 use furrow_field::assemble::Options;
 use furrow_render::film::Film;
-use furrow_render::integrator::{Integrator, PathTracer, Sample, Sighting, World};
+use furrow_render::integrator::{CameraSample, Integrator, PathTracer, Sample, World};
 use furrow_render::render::{self, Progressive, Settings};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
@@ -112,7 +112,7 @@ fn an_adaptive_tile_does_not_depend_on_others() {
 /// − reference)², divided by the mean of the reported variance, must not exceed one beyond its own noise, and must not
 /// be so small that the reported error is meaningless.
 #[test]
-fn the_error_told_covers_the_error_made() {
+fn the_estimated_error_covers_the_true_error() {
     let (field, settings) = small(64);
     let path = PathTracer::default();
     with_world(&field.scene, 2, |world, watch| {
@@ -121,13 +121,13 @@ fn the_error_told_covers_the_error_made() {
         };
         let reference = shoot(2048, 77, Points::Sobol);
         let ratio = |film: &Film| {
-            let (mut made, mut told) = (0.0, 0.0);
+            let (mut made, mut estimated) = (0.0, 0.0);
             for (p, r) in film.pixels.iter().zip(&reference.pixels) {
                 let d = p.mean - r.mean;
                 made += f64::from((d * d).mean());
-                told += f64::from((p.variance + r.variance).mean());
+                estimated += f64::from((p.variance + r.variance).mean());
             }
-            made / told
+            made / estimated
         };
         let even = ratio(&shoot(64, 5, Points::Sobol));
         assert!(even > 0.05 && even < 1.0, "stratified: {even}");
@@ -143,10 +143,10 @@ fn the_error_told_covers_the_error_made() {
 struct Flashes;
 
 impl Integrator for Flashes {
-    fn li(&self, _: &World<'_>, sample: &Sample, _: f32) -> Sighting {
+    fn li(&self, _: &World<'_>, sample: &Sample, _: f32) -> CameraSample {
         let sampler = &sample.sampler;
         let flash = sampler.get4(9)[0] < 0.05;
-        Sighting { radiance: Spectrum::splat(if flash { 20.0 } else { 0.0 }), first: None }
+        CameraSample { radiance: Spectrum::splat(if flash { 20.0 } else { 0.0 }), first: None }
     }
 }
 
@@ -206,7 +206,7 @@ fn an_image_by_the_clock_is_that_of_its_number_of_samples() {
 }
 
 #[test]
-fn an_adaptive_image_tells_each_pixels_samples() {
+fn an_adaptive_image_records_each_pixels_samples() {
     let (_keep, out) = scratch();
     let small = ["--scene", "tests/ref/small.ron", "--width", "64", "--out", out.to_str().unwrap()];
     let done = trace(&[&small[..], &["--target-error", "0.08", "--max-spp", "256"]].concat()).output().unwrap();

@@ -102,12 +102,15 @@ fn what_would_take_too_much_is_refused_where_it_stands() {
         let out = keep.path().join("out");
         let scene = path.to_str().expect("UTF-8");
         let run = trace(&["--scene", scene, "--out", out.to_str().expect("UTF-8"), "--spp", "1", "--memory", "2"]);
-        let said = refused(run);
+        let message = refused(run);
         let line = soil.lines().position(|line| line.contains(blamed)).expect("the faulty line");
-        let first = said.lines().next().unwrap_or_default();
-        assert!(first.contains("this field would take about"), "{soil}: {said}");
-        assert!(said.contains("the limit is") && said.contains(" help: "), "{soil}: {said}");
-        assert!(said.lines().any(|l| l.contains(soil.lines().nth(line).expect("a line").trim())), "{soil}: {said}");
+        let first = message.lines().next().unwrap_or_default();
+        assert!(first.contains("this field would take about"), "{soil}: {message}");
+        assert!(message.contains("the limit is") && message.contains(" help: "), "{soil}: {message}");
+        assert!(
+            message.lines().any(|l| l.contains(soil.lines().nth(line).expect("a line").trim())),
+            "{soil}: {message}"
+        );
         assert!(!out.exists());
     }
 }
@@ -132,8 +135,8 @@ fn the_limit_is_raised_by_a_flag_and_changes_no_byte() {
             memory,
         ])
     };
-    let said = refused(run("0.1", "small"));
-    assert!(said.contains("the limit is 0.1 GiB") && said.contains("--memory"), "{said}");
+    let message = refused(run("0.1", "small"));
+    assert!(message.contains("the limit is 0.1 GiB") && message.contains("--memory"), "{message}");
     for name in ["8", "9"] {
         assert!(run(name, name).output().expect("the program").status.success());
     }
@@ -176,10 +179,13 @@ fn a_picture_that_would_take_too_much_is_refused() {
         vec!["--scene", scene, "--out", out, "--spp", "1", "--width", "64", "--memory", "1"],
         vec!["preview", scene, "--out", out, "--memory", "1"],
     ] {
-        let said = refused(trace(&arguments));
-        assert!(said.contains("`large.png` cannot be used: 6000 × 6000 pixels would take about 1.3 GiB"), "{said}");
-        assert!(said.contains("the limit is 1.0 GiB") && said.contains("--memory"), "{said}");
-        assert!(said.contains(layers) && !Path::new(out).exists(), "{said}");
+        let message = refused(trace(&arguments));
+        assert!(
+            message.contains("`large.png` cannot be used: 6000 × 6000 pixels would take about 1.3 GiB"),
+            "{message}"
+        );
+        assert!(message.contains("the limit is 1.0 GiB") && message.contains("--memory"), "{message}");
+        assert!(message.contains(layers) && !Path::new(out).exists(), "{message}");
     }
     assert_eq!(estimate(&path, 1 << 30).unwrap_err().exit_code(), 2);
     let estimate = estimate(&path, 4 << 30).unwrap_or_else(|e| panic!("{e}"));
@@ -202,10 +208,13 @@ fn pictures_of_a_model_are_counted_together() {
     let light = "lights: [Constant(radiance: (1, 1, 1, 1))]";
     write("page.ron", &format!("Field(camera: JaiAd130(), {light}, models: [(file: \"m.obj\", class: Weed)])"));
     let error = estimate(&keep.path().join("page.ron"), 64 << 20).unwrap_err();
-    let said = error.to_string();
-    assert_eq!(error.exit_code(), 2, "{said}");
-    assert!(said.contains("`m.obj` cannot be used: its picture `stem.png`: 2000 × 2000 pixels"), "{said}");
-    assert!(said.contains("about 56 MiB of memory, beside 20 MiB of other images; the limit is 64 MiB"), "{said}");
+    let message = error.to_string();
+    assert_eq!(error.exit_code(), 2, "{message}");
+    assert!(message.contains("`m.obj` cannot be used: its picture `stem.png`: 2000 × 2000 pixels"), "{message}");
+    assert!(
+        message.contains("about 56 MiB of memory, beside 20 MiB of other images; the limit is 64 MiB"),
+        "{message}"
+    );
     let estimate = estimate(&keep.path().join("page.ron"), 1 << 30).unwrap_or_else(|e| panic!("{e}"));
     let share = estimate.shares.iter().find(|share| share.advice.contains("m.obj")).expect("a share for m.obj");
     assert!((share.cost.bytes / (20.0 * 4e6) - 1.0).abs() < 0.01, "{share:?}");
@@ -253,9 +262,9 @@ fn what_no_field_was_meant_to_have_is_refused() {
 /// Runs a command that must be refused; returns its standard error.
 fn refused(mut command: std::process::Command) -> String {
     let output = command.output().expect("the program");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{command:?}: {said}");
-    said
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{command:?}: {message}");
+    message
 }
 
 /// The same limit for an environment map, whose reading needs more memory than the result. Expected: refused by its
@@ -277,8 +286,8 @@ fn an_environment_map_that_would_take_too_much_is_refused() {
         flat(&keep.path().join("soil.png"), 64, png::ColorType::Rgb);
         std::fs::write(&page, format!("Field(camera: JaiAd130(), {light}, {soil})")).expect("a scene file");
         let error = estimate(&page, 8 << 20).unwrap_err();
-        let said = error.to_string();
-        assert_eq!(error.exit_code(), 2, "{said}");
-        assert!(said.contains(name) && said.contains("1024 × 512 pixels would take about 16 MiB"), "{said}");
+        let message = error.to_string();
+        assert_eq!(error.exit_code(), 2, "{message}");
+        assert!(message.contains(name) && message.contains("1024 × 512 pixels would take about 16 MiB"), "{message}");
     }
 }

@@ -20,7 +20,7 @@ use furrow_train::measure::{Evaluation, Prediction, Report};
 use furrow_train::net;
 use furrow_train::refine::Refine;
 use furrow_train::run::{self, Identity, ModelCard, Results, TrainedModel};
-use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Predictor, Real, TableOptions};
+use furrow_train::table::{self, BoundExperiment, Callbacks, Experiment, Predictor, RealSet, TableOptions, WorkPart};
 use furrow_train::weights::{self, Array};
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
@@ -156,14 +156,14 @@ impl Players {
         Ok(evaluation.finish())
     }
 
-    fn run(&self, text: &str, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
+    fn run(&self, text: &str, out: &Path, shard: Shard, only: Option<WorkPart>) -> Result<Vec<PathBuf>> {
         self.run_page(&page(text), out, shard, only)
     }
 
-    fn run_page(&self, page: &RonFile, out: &Path, shard: Shard, only: Option<Only>) -> Result<Vec<PathBuf>> {
+    fn run_page(&self, page: &RonFile, out: &Path, shard: Shard, only: Option<WorkPart>) -> Result<Vec<PathBuf>> {
         let experiment = Experiment::of(page, None)?;
-        let real = [Real { name: "frames".into(), folder: frames().into() }];
-        let bound = Bound::new(experiment, &real, &[], out)?;
+        let real = [RealSet { name: "frames".into(), folder: frames().into() }];
+        let bound = BoundExperiment::new(experiment, &real, &[], out)?;
         let order = TableOptions {
             bound: &bound,
             out,
@@ -182,7 +182,7 @@ impl Players {
                 page: &|folder| furrow_output::write_atomically(&folder.join(table::PAGE), b"a page"),
                 evaluate: &|predictor, on, _| self.evaluate(predictor, on),
                 training: &|_, _| (),
-                tell: &|_| (),
+                message: &|_| (),
                 warn: &|words| warned.lock().expect("no panic").push(words.into()),
                 stop: &Arc::default(),
             },
@@ -319,7 +319,7 @@ fn a_page_whose_trainings_have_changed_is_refused_before_any_work() {
 }
 
 #[test]
-fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
+fn unusable_evaluations_are_reported_and_repeated() {
     let (_keep, out) = whole(PAGE);
     let before = files(&out);
     let file = out.join("runs/unet/few/seed-2/eval/test-a.json");
@@ -344,9 +344,9 @@ fn evaluations_that_cannot_be_believed_are_told_and_made_again() {
         assert_eq!(players.took().len(), judged);
         same(&files(&out), &before);
     }
-    // With `Only::Tables`, nothing is computed again; the faulty result is left out.
+    // With `WorkPart::Tables`, nothing is computed again; the faulty result is left out.
     std::fs::write(&file, "").unwrap();
-    players.run(PAGE, &out, Shard::ALL, Some(Only::Tables)).unwrap();
+    players.run(PAGE, &out, Shard::ALL, Some(WorkPart::Tables)).unwrap();
     assert!(std::mem::take(&mut *players.warned.lock().expect("no panic")).join("\n").contains("leave it out"));
     assert_eq!(number(&out, "table-1", &["unet", "Few"], "runs"), 1.0);
     // Only the other seed's result, whose predictions are wrong.
@@ -395,9 +395,9 @@ fn sets_are_bound_left_out_or_asked_for() {
     let scratch = tempfile::tempdir().unwrap();
     let experiment = |text: &str| Experiment::of(&page(text), None).unwrap();
     let bind = |text: &str, real: &[&str], without: &[&str]| {
-        let real: Vec<Real> = real.iter().map(|r| Real::parse(r).unwrap()).collect();
+        let real: Vec<RealSet> = real.iter().map(|r| RealSet::parse(r).unwrap()).collect();
         let without: Vec<String> = without.iter().map(|w| (*w).to_owned()).collect();
-        let bound = Bound::new(experiment(text), &real, &without, scratch.path())?;
+        let bound = BoundExperiment::new(experiment(text), &real, &without, scratch.path())?;
         bound.check().map(|()| bound)
     };
     let here = format!("frames={}", frames().display());
@@ -426,7 +426,7 @@ fn sets_are_bound_left_out_or_asked_for() {
         assert!(error.to_string().contains(words), "{real:?} {without:?}: {error}");
         assert_eq!(error.exit_code(), 2);
     }
-    assert!(Real::parse("frames").is_err() && Real::parse("=x").is_err());
+    assert!(RealSet::parse("frames").is_err() && RealSet::parse("=x").is_err());
 }
 
 /// Expected: the faulty text is underlined in its line, with a message that describes the fault and the remedy.
@@ -647,14 +647,14 @@ fn what_ablate_writes_is_an_experiment_on_its_datasets() {
         let page = RonFile { path: page.path.clone(), text: page.text.replace(from, to) };
         Experiment::of(&page, None).unwrap_err().to_string()
     };
-    let said = fault("path: \"no-sky\"", "path: \"no-skye\"");
-    assert!(said.contains("there is no dataset in `no-skye`") && said.contains('^'), "{said}");
-    let said = fault("against: \"full\"", "against: \"fulll\"");
-    assert!(said.contains("no training set `fulll`") && said.contains("did you mean `full`?"), "{said}");
+    let printed = fault("path: \"no-sky\"", "path: \"no-skye\"");
+    assert!(printed.contains("there is no dataset in `no-skye`") && printed.contains('^'), "{printed}");
+    let printed = fault("against: \"full\"", "against: \"fulll\"");
+    assert!(printed.contains("no training set `fulll`") && printed.contains("did you mean `full`?"), "{printed}");
 }
 
 #[test]
-fn changes_are_told_seed_by_seed_with_their_spread() {
+fn changes_are_reported_by_seed_with_their_spread() {
     let (_keep, out) = crate::common::program::scratch();
     let page = written();
     let page = RonFile { path: page.path.clone(), text: page.text.replace("\"real\"", "\"frames\"") };
@@ -670,7 +670,7 @@ fn changes_are_told_seed_by_seed_with_their_spread() {
         let mut judgement = read(&eval(set, seed));
         judgement["report"] = read(&eval(set, from))["report"].clone();
         std::fs::write(eval(set, seed), serde_json::to_vec(&judgement).unwrap()).unwrap();
-        Players::default().run_page(&page, &out, Shard::ALL, Some(Only::Tables)).unwrap();
+        Players::default().run_page(&page, &out, Shard::ALL, Some(WorkPart::Tables)).unwrap();
         let text = std::fs::read_to_string(out.join("against.csv")).unwrap();
         text.lines().nth(1).unwrap().split(',').filter(|cell| *cell == "yes").count()
     };

@@ -12,7 +12,7 @@ fn trace(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_trace")).args(arguments).output().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn message(output: &Output) -> String {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
@@ -20,7 +20,7 @@ fn said(output: &Output) -> String {
 fn pages_are_fresh(program: &str) {
     let folder = tempfile::tempdir().unwrap();
     let output = Command::new(program).args(["reference", "--out"]).arg(folder.path()).output().unwrap();
-    let written = said(&output);
+    let written = message(&output);
     assert!(written.lines().count() >= 2, "{written}");
     for path in written.lines().map(Path::new) {
         let name = path.file_name().unwrap();
@@ -38,22 +38,22 @@ fn the_generated_pages_are_fresh() {
 
 #[test]
 fn a_field_is_explained_with_unit_range_default_and_example() {
-    let words = said(&trace(&["explain", "soil.clods.over_5mm_per_m2"]));
+    let words = message(&trace(&["explain", "soil.clods.over_5mm_per_m2"]));
     for part in ["longer than 5 mm", "0 or above", "m⁻²", "Uniform(8000, 14000)", "number or distribution"] {
         assert!(words.contains(part), "{part}: {words}");
     }
-    let words = said(&trace(&["explain", "camera.JaiAd130"]));
+    let words = message(&trace(&["explain", "camera.JaiAd130"]));
     assert!(words.contains("height_m") && words.contains("default 0.85"), "{words}");
     // A name without its path, and a name that occurs in several places.
-    assert_eq!(said(&trace(&["explain", "moisture"])), said(&trace(&["explain", "soil.moisture"])));
-    let words = said(&trace(&["explain", "azimuth_deg"]));
+    assert_eq!(message(&trace(&["explain", "moisture"])), message(&trace(&["explain", "soil.moisture"])));
+    let words = message(&trace(&["explain", "azimuth_deg"]));
     assert!(words.contains("crops.rows.azimuth_deg") && words.contains("species.plant.azimuth_deg"), "{words}");
-    assert!(said(&trace(&["explain", "species.plant.stages.layers.blade_mm"])).contains("mm"));
+    assert!(message(&trace(&["explain", "species.plant.stages.layers.blade_mm"])).contains("mm"));
 }
 
 #[test]
 fn the_tree_names_everything_once() {
-    let words = said(&trace(&["explain"]));
+    let words = message(&trace(&["explain"]));
     for name in ["camera", "clods", "over_5mm_per_m2", "Daylight", "spacing_m"] {
         assert!(words.lines().any(|line| line.trim_start().starts_with(name)), "{name}: {words}");
     }
@@ -70,7 +70,7 @@ fn what_is_not_there_is_refused_with_the_nearest() {
         let words = String::from_utf8(trace(&["explain", path]).stderr).unwrap();
         assert!(words.contains(&format!("there is no `{path}`")), "{words}");
     }
-    let words = said(&trace(&["explain", "distribution"]));
+    let words = message(&trace(&["explain", "distribution"]));
     assert!(words.contains("LogNormal") && words.contains("median"), "{words}");
 }
 
@@ -96,50 +96,50 @@ fn every_command_that_an_error_names_answers() {
 /// Method: typical mistakes of users who have not read the documentation. Expected: all missing fields are reported at
 /// once, with the correct form of what is wrong.
 #[test]
-fn messages_tell_what_to_write() {
+fn messages_show_what_to_write() {
     let folder = tempfile::tempdir().unwrap();
-    let told = |text: &str| {
+    let answer_to = |text: &str| {
         let file = folder.path().join("field.ron");
         fs::write(&file, text).unwrap();
         let output = trace(&["--scene", file.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(2));
         String::from_utf8(output.stderr).unwrap()
     };
-    let words = told("Field(camera: JaiAd130(), soil: (layers: [(share: 1)]))");
+    let words = answer_to("Field(camera: JaiAd130(), soil: (layers: [(share: 1)]))");
     assert!(words.contains("fields `albedo`, `size_m`, `height_mm` of layer are missing"), "{words}");
     assert!(words.contains("see:  trace explain soil.layers"), "{words}");
-    let words = told("Field(camera: JaiAd130(height_m: Normal(0.8, 0.02)))");
+    let words = answer_to("Field(camera: JaiAd130(height_m: Normal(0.8, 0.02)))");
     assert!(words.contains("write Normal(mean: 0.8, sd: 0.02)"), "{words}");
-    let words = told("Field(camera: JaiAd130(), crops: [(species: \"maize\", growth: 18, rows: ())])");
+    let words = answer_to("Field(camera: JaiAd130(), crops: [(species: \"maize\", growth: 18, rows: ())])");
     assert!(words.contains("write AgeDays(18) or Bbch(18)"), "{words}");
-    let words = told("Field(camera: Phone, soil: ())");
+    let words = answer_to("Field(camera: Phone, soil: ())");
     assert!(words.contains("Phone has no brackets") && words.contains("write Phone()"), "{words}");
     // The suggested path ends at its last valid part.
-    let words = told("Field(camera: JaiAd130(), soyl: (clods: (max_mm 3)))");
+    let words = answer_to("Field(camera: JaiAd130(), soyl: (clods: (max_mm 3)))");
     let see = words.lines().find_map(|line| line.strip_prefix(" see:  ")).unwrap_or_else(|| panic!("{words}"));
     assert_eq!(see, "trace explain", "{words}");
-    let words = told("Field(camera: JaiAd130(height_m: [0.8, 0.9]))");
+    let words = answer_to("Field(camera: JaiAd130(height_m: [0.8, 0.9]))");
     assert!(words.contains("write Uniform(0.8, 0.9)"), "{words}");
 }
 
 /// Expected: the explanations of soil agree with the program's limits and with the tutorial scenes.
 #[test]
-fn what_is_said_of_soil_is_so() {
-    let told = |path: &str| {
-        let words = said(&trace(&["explain", path]));
+fn explanations_of_soil_match_the_limits() {
+    let answer_to = |path: &str| {
+        let words = message(&trace(&["explain", path]));
         words.split_whitespace().collect::<Vec<_>>().join(" ")
     };
     assert_eq!(furrow_grow::soil::MAX_LAYERS, 4);
-    assert!(told("soil").contains("One to four layers"), "{}", told("soil"));
+    assert!(answer_to("soil").contains("One to four layers"), "{}", answer_to("soil"));
     assert!(fs::read_to_string("scenes/11-drone.ron").unwrap().contains("patch_m: 2.5"));
-    let patches = told("soil.moisture.patch_m");
+    let patches = answer_to("soil.moisture.patch_m");
     assert!(patches.contains("0.02–0.15") && patches.contains("some metres in images of a field"), "{patches}");
 }
 
 /// Method: scene files with values that are valid but probably unintended. Expected: a warning for each, and none for
 /// the tutorial scenes.
 #[test]
-fn what_was_hardly_meant_is_told() {
+fn implausible_values_are_warned_of() {
     let folder = tempfile::tempdir().unwrap();
     let species = fs::canonicalize("scenes/species/maize.ron").unwrap();
     let warnings = |camera: &str, crop: &str| {
@@ -148,11 +148,12 @@ fn what_was_hardly_meant_is_told() {
         fs::write(&file, text).unwrap();
         let source = Source::open(&file).unwrap();
         let options = Options { width: Some(32), ..Options::default() };
-        let (foretold, all) = (source.foretold(&options).unwrap(), source.field(&options).unwrap().warnings);
+        let (expected_warnings, all) =
+            (source.expected_warnings(&options).unwrap(), source.field(&options).unwrap().warnings);
         // All warnings are given before the field is built, except those that depend on the built field.
-        let later: Vec<&String> = all.iter().filter(|warning| !foretold.contains(warning)).collect();
+        let later: Vec<&String> = all.iter().filter(|warning| !expected_warnings.contains(warning)).collect();
         assert!(later.iter().all(|warning| warning.contains("no crop is in")), "{later:?}");
-        assert!(foretold.iter().all(|warning| all.contains(warning)), "{foretold:?}");
+        assert!(expected_warnings.iter().all(|warning| all.contains(warning)), "{expected_warnings:?}");
         all.join("\n")
     };
     let rows = "rows: (spacing_m: 0.75, in_row_m: 0.05)";

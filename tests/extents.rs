@@ -243,7 +243,7 @@ fn a_plant_cut_by_the_frame_counts_beyond_it() {
 /// Rationale: a hectare has more than 65,536 plants. Expected: of 72,000 plants, one per pixel, labels show each once,
 /// and each has an extent of that pixel; none is confused with the one whose number is lower by 65,536.
 #[test]
-fn plants_beyond_16_bits_are_told_apart() {
+fn plants_beyond_16_bits_have_different_numbers() {
     let (w, h) = (300, 240);
     let at = |k: u32, n: u32| (k as f32 + 0.5 - 0.5 * n as f32) * 0.002;
     let plant = |k: u32| (vec3(at(k % w, w), at(k / w, h), 0.0), 0.0018, k + 1, 1);
@@ -294,9 +294,9 @@ fn keypoints_stand_in_the_world_where_the_leaves_do() {
         for plant in &grown.plants {
             let parts = || grown.scene.parts.iter().filter(|p| p.tag.plant == plant.number && p.tag.leaf > 0);
             let leaves: BTreeSet<u16> = parts().map(|p| p.tag.leaf).collect();
-            let told: Vec<u16> = plant.leaf_axes.iter().map(|a| a.leaf).collect();
-            assert!(!told.is_empty(), "plant {} has no leaves", plant.number);
-            assert_eq!(told, leaves.into_iter().collect::<Vec<_>>(), "plant {}", plant.number);
+            let recorded: Vec<u16> = plant.leaf_axes.iter().map(|a| a.leaf).collect();
+            assert!(!recorded.is_empty(), "plant {} has no leaves", plant.number);
+            assert_eq!(recorded, leaves.into_iter().collect::<Vec<_>>(), "plant {}", plant.number);
             for axis in &plant.leaf_axes {
                 for end in [axis.base, axis.tip] {
                     let corners = parts().filter(|p| p.tag.leaf == axis.leaf).flat_map(|p| &p.mesh.positions);

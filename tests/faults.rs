@@ -9,7 +9,7 @@
 use crate::common::dataset::{path, same, succeed, tree};
 use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, failed_well, misdate, open_to_all};
 use crate::common::program::{FILES, SMALL, names, scratch, trace};
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -23,7 +23,7 @@ fn image(out: &Path, seed: &str) -> Command {
 /// permanently after the first rename, each file is completely old or completely new. If old files cannot be
 /// hard-linked under a second name, they are replaced nevertheless.
 #[test]
-fn an_image_is_replaced_whole_or_told() {
+fn an_image_is_replaced_whole_or_an_error_is_reported() {
     let (_keep, out) = scratch();
     succeed(image(&out, "1"));
     let old = tree(&out);
@@ -47,7 +47,7 @@ fn an_image_is_replaced_whole_or_told() {
         let found = tree(&out);
         let replacing = ended.failed == "rename" || ended.failed == "link";
         if ended.failed == "link" && !lasts {
-            assert!(ended.output.status.success(), "change {at}: {}", ended.said());
+            assert!(ended.output.status.success(), "change {at}: {}", ended.printed());
             same(&found, &new);
         } else {
             failed_well(&ended, &out, at);
@@ -147,24 +147,27 @@ fn a_panic_ends_a_dataset_or_stream_with_the_images_number() {
     let (_keep, out) = scratch();
     succeed(make(&out, "1"));
     let whole = tree(&out);
-    let told = |command: &mut Command, at: u64| {
+    let message = |command: &mut Command, at: u64| {
         faults::panics(command, "pool", at);
         let output = command.output().expect("the program");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let stderr_text = String::from_utf8_lossy(&output.stderr).into_owned();
         if output.status.success() {
             return None;
         }
-        assert_eq!(output.status.code(), Some(1), "reading {at}: {said}");
-        let errors: Vec<&str> = said.lines().filter(|line| line.starts_with("error: ")).collect();
-        let [error] = errors[..] else { panic!("reading {at}: {said}") };
-        assert!(error.contains("the program failed: ") && said.contains("\n help: "), "reading {at}: {said}");
+        assert_eq!(output.status.code(), Some(1), "reading {at}: {stderr_text}");
+        let errors: Vec<&str> = stderr_text.lines().filter(|line| line.starts_with("error: ")).collect();
+        let [error] = errors[..] else { panic!("reading {at}: {stderr_text}") };
+        assert!(
+            error.contains("the program failed: ") && stderr_text.contains("\n help: "),
+            "reading {at}: {stderr_text}"
+        );
         Some(error.starts_with("error: image 00000"))
     };
     let (mut in_images, mut in_streams) = (0, 0);
     for at in [1, 2, 3, 5, 8, 13, 21, 34] {
         let (_keep, out) = scratch();
         let threads = if at % 2 == 0 { "3" } else { "1" };
-        in_images += u32::from(told(&mut make(&out, threads), at) == Some(true));
+        in_images += u32::from(message(&mut make(&out, threads), at) == Some(true));
         let there = if out.exists() { tree(&out) } else { Tree::new() };
         assert!(there.keys().all(|name| !name.contains(".furrow-")), "reading {at}");
         is_whole(&there, &whole, &Tree::new(), &format!("reading {at}"));
@@ -172,7 +175,7 @@ fn a_panic_ends_a_dataset_or_stream_with_the_images_number() {
         same(&tree(&out), &whole);
         let mut stream = trace(&["stream", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--spp", "1"]);
         stream.args(["--count", "4", "--width", "32", "--threads", threads]);
-        in_streams += u32::from(told(&mut stream, at) == Some(true));
+        in_streams += u32::from(message(&mut stream, at) == Some(true));
     }
     assert!(in_images > 2 && in_streams > 2, "{in_images} and {in_streams}");
 }
@@ -183,8 +186,8 @@ fn photographs(root: &Path) {
     let masks: Vec<u8> = (0..w * h).map(|i| u8::from(i % w > 4) + u8::from(i % w > 9)).collect();
     for (k, name) in ["train/a.png", "train/b.png", "val/c.png"].into_iter().enumerate() {
         let rgb: Vec<[u8; 3]> = (0..w * h).map(|i| [i as u8, (3 * i) as u8, 40 * k as u8]).collect();
-        write_png(&root.join("photos").join(name), w, h, &Picture::Rgb(&rgb), "").expect("a photograph");
-        write_png(&root.join("masks").join(name), w, h, &Picture::Gray(&masks), "").expect("a mask");
+        write_png(&root.join("photos").join(name), w, h, &ImageData::Rgb(&rgb), "").expect("a photograph");
+        write_png(&root.join("masks").join(name), w, h, &ImageData::Gray(&masks), "").expect("a mask");
     }
 }
 
@@ -221,8 +224,13 @@ fn files_of_another_user_and_old_clocks_are_an_error_or_the_same_result() {
     std::fs::remove_file(data.join("seals/000001.json")).expect("a seal");
     let before = tree(&data);
     let output = command.output().expect("the program");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.starts_with("error: ") && said.contains("Permission denied") && said.contains(" help: "), "{said}");
+    let stderr_text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{stderr_text}");
+    assert!(
+        stderr_text.starts_with("error: ")
+            && stderr_text.contains("Permission denied")
+            && stderr_text.contains(" help: "),
+        "{stderr_text}"
+    );
     same(&tree(&data), &before);
 }

@@ -86,7 +86,7 @@ fn a_calibration_that_meets_a_fault_leaves_nothing() {
 fn half_trained(out: &Path) {
     let checkpoint = out.join(checkpoint::FILE);
     let ended = faults::run(fit(out, &["--quiet"]), &checkpoint, 2, true);
-    assert_eq!(ended.output.status.code(), Some(1), "{}", ended.said());
+    assert_eq!(ended.output.status.code(), Some(1), "{}", ended.printed());
     assert_eq!(ended.failed, "rename");
     assert!(checkpoint.is_file() && !out.join(run::RESULT).exists());
 }
@@ -110,27 +110,27 @@ fn a_training_goes_on_whatever_the_times_of_its_files() {
 /// Expected: a folder that another user may not write to, or a checkpoint that they may not read, gives one error, and
 /// nothing is changed.
 #[test]
-fn a_training_of_another_user_is_told() {
+fn a_training_of_another_user_is_reported() {
     let (_keep, out) = scratch();
     half_trained(&out);
     let Some(mut barred) = as_nobody(&fit(&out, &["--quiet"])) else { return };
     let before = tree(&out);
     let refused = |command: &mut Command| {
         let output = command.output().expect("the program");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.starts_with("error: ") && said.matches("error: ").count() == 1, "{said}");
-        assert!(said.contains("Permission denied") && said.contains("\n help: "), "{said}");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.starts_with("error: ") && message.matches("error: ").count() == 1, "{message}");
+        assert!(message.contains("Permission denied") && message.contains("\n help: "), "{message}");
         same(&tree(&out), &before);
-        said
+        message
     };
     open_to_all(&out, 0o755);
     refused(&mut barred);
     open_to_all(&out, 0o777);
     let checkpoint = out.join(checkpoint::FILE);
     fs::set_permissions(&checkpoint, fs::Permissions::from_mode(0o600)).expect("permissions");
-    let said = refused(&mut barred);
-    assert!(said.contains(checkpoint::FILE), "{said}");
+    let message = refused(&mut barred);
+    assert!(message.contains(checkpoint::FILE), "{message}");
 }
 
 fn full() -> Stdio {
@@ -183,20 +183,23 @@ fn full_and_closed_streams_end_no_training_and_no_prediction() {
     let mut wrong = predict(&out, &["--band", "nir=nowhere"]);
     assert_eq!(wrong.stderr(full()).output().expect("the program").status.code(), Some(2));
     let lost = predict(&out, &["--quiet"]).stdout(full()).output().expect("the program");
-    let said = String::from_utf8_lossy(&lost.stderr);
-    assert!(lost.status.code() == Some(1) && said.contains("cannot write to stdout"), "{said}");
+    let message = String::from_utf8_lossy(&lost.stderr);
+    assert!(lost.status.code() == Some(1) && message.contains("cannot write to stdout"), "{message}");
     assert!(out.join("000001.png").is_file());
 }
 
 /// Rationale: the dynamic loader prints its own error about a preloaded library that it cannot find. Expected: without
 /// CUDA, exit code 2 and only the program's own message.
 #[test]
-fn a_missing_cuda_is_told_in_words_of_ours() {
+fn missing_cuda_is_our_own_error() {
     let (_keep, out) = scratch();
     let mut command = predict(&out, &["--device", "cuda"]);
     command.env_remove("LD_LIBRARY_PATH").env_remove("LD_PRELOAD");
-    let said = fail(command, 2);
-    assert!(said.starts_with("error: cuda: there is no libtorch_cuda.so on LD_LIBRARY_PATH"), "{said}");
-    assert!(said.contains("\n help: ") && !said.contains("ld.so") && !said.contains("LD_PRELOAD"), "{said}");
+    let message = fail(command, 2);
+    assert!(message.starts_with("error: cuda: there is no libtorch_cuda.so on LD_LIBRARY_PATH"), "{message}");
+    assert!(
+        message.contains("\n help: ") && !message.contains("ld.so") && !message.contains("LD_PRELOAD"),
+        "{message}"
+    );
     assert!(!out.exists());
 }

@@ -200,7 +200,7 @@ fn under(camera: &str) -> furrow_base::Result<Field> {
 /// a remedy, and the field is planted up to 6 m; a view that would be more than half bare is refused. Source: rows of
 /// 0.5 m by 0.5 m.
 #[test]
-fn all_that_a_camera_sees_is_planted_or_told() {
+fn all_ground_in_view_is_planted_or_reported_as_bare() {
     for camera in [
         "intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 8)",
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 1.8, 0))",
@@ -285,7 +285,7 @@ fn ground_is_made_as_far_as_it_is_seen_where_it_slopes() {
 /// warning if the ground's triangle at the camera's position is above the camera, and none otherwise; both cases occur
 /// in sixteen fields.
 #[test]
-fn a_camera_under_the_ground_is_told() {
+fn a_camera_under_the_ground_is_reported() {
     let text = r"Field(
         seed: 7,
         camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.002)),
@@ -307,9 +307,10 @@ fn a_camera_under_the_ground_is_told() {
         if (height - 0.002).abs() < 1e-4 {
             continue;
         }
-        let told = field.warnings.iter().any(|words| words.contains("below the ground") && words.contains("raise it"));
-        assert_eq!(told, height > 0.002, "{index}: {height} m, {:?}", field.warnings);
-        buried += usize::from(told);
+        let recorded =
+            field.warnings.iter().any(|words| words.contains("below the ground") && words.contains("raise it"));
+        assert_eq!(recorded, height > 0.002, "{index}: {height} m, {:?}", field.warnings);
+        buried += usize::from(recorded);
     }
     assert!((2..14).contains(&buried), "{buried} of 16 cameras are below the ground");
 }
@@ -374,7 +375,7 @@ fn a_cameras_record_projects_points_as_the_camera_does() {
 }
 
 #[test]
-fn the_lights_records_tell_what_reaches_the_ground() {
+fn the_lights_records_have_the_irradiance_of_the_ground() {
     let lights = "Daylight(sun: Angles(elevation_deg: Uniform(20, 60), azimuth_deg: Uniform(0, 360)), cloud: Uniform(0, 1)), \
                   Overcast(illuminance_klx: Uniform(5, 20)), Constant(radiance: (0.1, 0.2, 0.3, 0.4)), \
                   Lamp(shape: Disc(radius_m: 0.05), position_m: (0.3, 0, 0.8), glow: Radiance(1, 1, 1, 0.5))";
@@ -383,8 +384,8 @@ fn the_lights_records_tell_what_reaches_the_ground() {
         let field = studio(camera, lights, &Options { index, ..Options::default() });
         let records = &field.conditions.lights;
         let whole = field.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
-        let told = records.iter().fold(Spectrum::ZERO, |sum, r| sum + r.irradiance_w_m2_nm());
-        for (a, b) in whole.to_array().into_iter().zip(told.to_array()) {
+        let recorded = records.iter().fold(Spectrum::ZERO, |sum, r| sum + r.irradiance_w_m2_nm());
+        for (a, b) in whole.to_array().into_iter().zip(recorded.to_array()) {
             assert!((a - b).abs() < 1e-5 * a && a > 0.0, "{a} {b}");
         }
         let [LightRecord::Daylight(day), rest @ ..] = &records[..] else { panic!("{records:?}") };
@@ -434,15 +435,15 @@ fn the_species_of_a_page_are_numbered_the_same_in_every_field() {
         tables.push(field.species);
     }
     assert!(tables.iter().all(|t| *t == tables[0]));
-    let told: Vec<(&str, Class)> = tables[0].iter().map(|s| (s.eppo.as_str(), s.class)).collect();
-    let models = [("", told[3].1), ("", told[4].1)];
-    assert_eq!(told[..3], [("BEAVX", Class::Crop), ("GALAP", Class::Weed), ("CAPBP", Class::Weed)]);
+    let recorded: Vec<(&str, Class)> = tables[0].iter().map(|s| (s.eppo.as_str(), s.class)).collect();
+    let models = [("", recorded[3].1), ("", recorded[4].1)];
+    assert_eq!(recorded[..3], [("BEAVX", Class::Crop), ("GALAP", Class::Weed), ("CAPBP", Class::Weed)]);
     assert_eq!(models, [("", Class::Crop), ("", Class::Weed)], "a model's own class first, then the scene file's");
     assert!(tables[0][3..].iter().all(|s| s.name == "seedling") && tables[0].len() == 5, "{:?}", tables[0]);
 }
 
 #[test]
-fn the_rows_record_tells_where_the_crop_stands() {
+fn the_rows_record_has_the_positions_of_the_crop() {
     let drilled = "rows: (spacing_m: 0.3, in_row_m: 0.1, azimuth_deg: Uniform(0, 180), offset_m: Uniform(-0.1, 0.1))";
     let text =
         small_text().replace("rows: (spacing_m: 0.5, in_row_m: 0.3)", drilled).replace("plants: [", "models: [], // ");

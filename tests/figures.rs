@@ -10,7 +10,7 @@ use crate::common::program::scratch;
 use crate::common::python::python;
 use furrow_report::chart::{Chart, Curve};
 use furrow_train::data::{Band, Example};
-use furrow_train::figure::{Page, Shot, Shots, sheet, spread};
+use furrow_train::figure::{Page, Thumbnail, Thumbnails, compose, spread};
 use furrow_train::measure::{Evaluation, Prediction, Report};
 use std::process::Command;
 
@@ -18,21 +18,21 @@ const PALETTE: [[u8; 3]; 3] = [[0, 0, 0], [0, 255, 0], [255, 0, 0]];
 
 /// 6 × 4 pixels: a crop plant that is half missed, a weed classified as crop, crop predicted on soil, and an unlabelled
 /// pixel.
-fn shot(name: &str) -> Shot {
+fn thumbnail(name: &str) -> Thumbnail {
     let map = |rows: [&str; 4]| -> Vec<u8> {
         rows.concat().bytes().map(|c| if c == b'x' { 255 } else { c - b'0' }).collect()
     };
     let truth = map(["011000", "011000", "000002", "x00000"]);
     let answer = map(["010000", "010000", "000001", "010000"]);
     let rgb: Vec<[u8; 3]> = (0..24).map(|k| [4 * k, 100, 50]).collect();
-    Shot::new(name, (6, 4), &rgb, &truth, &[&answer], 100)
+    Thumbnail::new(name, (6, 4), &rgb, &truth, &[&answer], 100)
 }
 
 #[test]
 fn a_sheet_holds_each_picture_in_its_place() {
-    let first = shot("a");
-    let second = Shot { width: 4, height: 6, truth: Vec::new(), ..shot("b") };
-    let picture = sheet(&[first.clone(), second.clone()], &PALETTE, false);
+    let first = thumbnail("a");
+    let second = Thumbnail { width: 4, height: 6, truth: Vec::new(), ..thumbnail("b") };
+    let picture = compose(&[first.clone(), second.clone()], &PALETTE, false);
     // Three columns as wide as the widest image, four pixels apart; two rows.
     assert_eq!((picture.width, picture.height, picture.rgb.len()), (6 * 3 + 2 * 4, 4 + 4 + 6, 26 * 14));
     let at = |x: usize, y: usize| picture.rgb[y * 26 + x];
@@ -44,28 +44,28 @@ fn a_sheet_holds_each_picture_in_its_place() {
     }
     assert_eq!((at(6, 0), at(0, 5), at(12, 9), at(5, 9)), ([255; 3], [255; 3], [255; 3], [255; 3]));
     assert_eq!(at(3, 13), second.rgb[23]);
-    let empty = sheet(&[], &PALETTE, true);
+    let empty = compose(&[], &PALETTE, true);
     assert_eq!((empty.width, empty.height), (0, 0));
 }
 
 #[test]
-fn errors_are_told_by_their_colours() {
-    let errors = shot("a").errors(0);
+fn errors_have_their_colours() {
+    let errors = thumbnail("a").errors(0);
     let at = |x: usize, y: usize| errors[y * 6 + x];
     // Missed, correct; the weed classified as crop; crop predicted on soil; no label; correct soil.
     assert_eq!((at(2, 0), at(5, 2), at(1, 3), at(0, 3)), ([40, 120, 255], [230, 0, 200], [255, 190, 0], [128; 3]));
     let [plant, soil] = [at(1, 0), at(0, 0)];
     assert!(plant[0] == plant[1] && plant[0] > soil[0] && soil[0] == soil[2], "{plant:?} {soil:?}");
-    assert_eq!(sheet(&[shot("a")], &PALETTE, true).width, 4 * 6 + 3 * 4);
+    assert_eq!(compose(&[thumbnail("a")], &PALETTE, true).width, 4 * 6 + 3 * 4);
 }
 
 #[test]
 fn shots_are_made_small_and_spread_over_the_set() {
     let truth: Vec<u8> = (0..80 * 40).map(|at| u8::from(at % 80 >= 40)).collect();
-    let shot = Shot::new("a", (80, 40), &vec![[9, 8, 7]; 3200], &truth, &[&truth, &truth], 20);
-    assert_eq!((shot.width, shot.height, shot.rgb.len(), shot.predictions.len()), (20, 10, 200, 2));
-    assert!(shot.truth.iter().enumerate().all(|(at, class)| *class == u8::from(at % 20 >= 10)));
-    assert_eq!(shot.truth, shot.predictions[1]);
+    let thumbnail = Thumbnail::new("a", (80, 40), &vec![[9, 8, 7]; 3200], &truth, &[&truth, &truth], 20);
+    assert_eq!((thumbnail.width, thumbnail.height, thumbnail.rgb.len(), thumbnail.predictions.len()), (20, 10, 200, 2));
+    assert!(thumbnail.truth.iter().enumerate().all(|(at, class)| *class == u8::from(at % 20 >= 10)));
+    assert_eq!(thumbnail.truth, thumbnail.predictions[1]);
     assert_eq!((spread(100, 4), spread(3, 8), spread(0, 4)), (vec![12, 37, 62, 87], vec![0, 1, 2], vec![]));
 }
 
@@ -75,23 +75,23 @@ fn shots_are_made_small_and_spread_over_the_set() {
 #[test]
 fn the_worst_images_are_kept_and_some_spread_over_the_set() {
     let wrong = [3, 40, 7, 0, 90, 12, 55, 1, 30, 8];
-    let seen = |mut shots: Shots| {
+    let seen = |mut thumbnails: Thumbnails| {
         for (k, wrong) in wrong.iter().enumerate() {
             let labels = vec![0; 50].into_iter().chain(vec![1; 50]).collect::<Vec<u8>>();
             let predicted: Vec<u8> =
                 labels.iter().enumerate().map(|(at, class)| if at < *wrong { 1 - class } else { *class }).collect();
             let planes = vec![vec![9; 100]];
             let example = Example { name: k.to_string(), planes, labels, plants: Vec::new() };
-            shots.see(&example, (10, 10), &predicted).unwrap();
+            thumbnails.see(&example, (10, 10), &predicted).unwrap();
         }
-        shots.kept().into_iter().map(|shot| shot.name).collect::<Vec<_>>()
+        thumbnails.kept().into_iter().map(|thumbnail| thumbnail.name).collect::<Vec<_>>()
     };
-    let spread_alone = Shots::new(10, 3, 50, &[Band::Red]);
+    let spread_alone = Thumbnails::new(10, 3, 50, &[Band::Red]);
     assert_eq!(seen(spread_alone), ["1", "5", "8"]);
-    let shots = Shots::new(10, 3, 50, &[Band::Red]).and_worst(4, 2);
+    let thumbnails = Thumbnails::new(10, 3, 50, &[Band::Red]).and_worst(4, 2);
     // Of 10 × 10 pixels, the worst four have 90, 55, 40 and 30 wrong; 5 is the only evenly spaced image that is not
     // among them.
-    assert_eq!(seen(shots), ["4", "6", "1", "8", "5"]);
+    assert_eq!(seen(thumbnails), ["4", "6", "1", "8", "5"]);
 }
 
 /// Rationale: a loss falling from 1.6 to 1.2 had an axis without labels. Expected: at least three numbers on a
@@ -173,10 +173,10 @@ fn curves_are_well_formed() {
                        print(r.tag, *(t.text for t in r.iter('{http://www.w3.org/2000/svg}text')), sep='|')";
         let output = Command::new(&python).args(["-c", program]).arg(&file).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let said = String::from_utf8_lossy(&output.stdout);
+        let message = String::from_utf8_lossy(&output.stdout);
         assert!(
-            said.starts_with("{http://www.w3.org/2000/svg}svg|Loss < 4 & falling|training \"a\"|validation|"),
-            "{said}"
+            message.starts_with("{http://www.w3.org/2000/svg}svg|Loss < 4 & falling|training \"a\"|validation|"),
+            "{message}"
         );
     }
 }
@@ -185,7 +185,7 @@ fn curves_are_well_formed() {
 fn report() -> Report {
     let mut evaluation = Evaluation::new(["soil", "crop", "weed"]);
     for name in ["a", "b"] {
-        let s = shot(name);
+        let s = thumbnail(name);
         let answer = Prediction {
             name,
             width: s.width,
@@ -200,7 +200,7 @@ fn report() -> Report {
     evaluation.finish()
 }
 
-fn page(report: &Report, shots: &[Shot]) -> String {
+fn page(report: &Report, thumbnails: &[Thumbnail]) -> String {
     let names: Vec<String> = ["soil", "crop", "weed"].map(Into::into).to_vec();
     let page = Page {
         kind: "Evaluation",
@@ -211,7 +211,7 @@ fn page(report: &Report, shots: &[Shot]) -> String {
         plots: &[],
         report: Some(report),
         charts: &[chart(true), chart(false)],
-        shots,
+        thumbnails,
         predictors: &[],
         palette: &PALETTE,
         classes: &names,
@@ -228,9 +228,9 @@ fn number(page: &str, key: &str) -> f64 {
 
 #[test]
 fn numbers_of_a_page_are_those_of_the_report_and_it_asks_for_nothing() {
-    let (report, shots) = (report(), [shot("a"), shot("b")]);
-    let html = page(&report, &shots);
-    assert_eq!(html, page(&report, &shots), "the page must be reproducible");
+    let (report, thumbnails) = (report(), [thumbnail("a"), thumbnail("b")]);
+    let html = page(&report, &thumbnails);
+    assert_eq!(html, page(&report, &thumbnails), "the page must be reproducible");
     assert_eq!(number(&html, "mean_iou"), report.scores.mean_iou.unwrap());
     assert_eq!((number(&html, "images"), number(&html, "seconds")), (2.0, 0.25));
     for (truth, predicted) in (0..3).flat_map(|t| (0..3).map(move |p| (t, p))) {
@@ -270,7 +270,7 @@ fn a_browser_shows_the_page_in_wide_and_narrow_windows() {
     let (_kept, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("page.html");
-    std::fs::write(&file, page(&report(), &[shot("a"), shot("b")]).replace("</body>", PROBE)).unwrap();
+    std::fs::write(&file, page(&report(), &[thumbnail("a"), thumbnail("b")]).replace("</body>", PROBE)).unwrap();
     for width in [1280, 500] {
         let seen = probe(&browser, &folder, &file, width);
         assert_eq!((seen["images"].as_i64(), seen["decoded"].as_i64()), (Some(8), Some(8)), "{seen}");

@@ -9,7 +9,7 @@ use crate::common::python::{ask, python};
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use furrow_train::data::{Augment, Band, BatchSettings, Loader, Normalization, Pick, Selection, Shape, Store};
 use furrow_train::fit::{Plan, settings};
 use furrow_train::run::{self, Results, TrainedModel};
@@ -47,9 +47,9 @@ fn set_with(folder: &Path, images: u64, labelled: impl Fn(u64) -> bool) -> PathB
         let colors = [[120, 95, 70], [70, 150, 50], [80, 150, 45]];
         let rgb: Vec<[u8; 3]> = labels.iter().map(|c| colors[usize::from(*c)].map(&mut noise)).collect();
         let name = format!("{k:03}.png");
-        write_png(&photos.join(&name), W, H, &Picture::Rgb(&rgb), "").unwrap();
+        write_png(&photos.join(&name), W, H, &ImageData::Rgb(&rgb), "").unwrap();
         let labels = if labelled(k) { labels } else { vec![255; labels.len()] };
-        write_png(&masks.join(&name), W, H, &Picture::Gray(&labels), "").unwrap();
+        write_png(&masks.join(&name), W, H, &ImageData::Gray(&labels), "").unwrap();
     }
     let path = |p: &Path| p.to_str().unwrap().to_owned();
     let made = Command::new(env!("CARGO_BIN_EXE_trace"))
@@ -187,15 +187,19 @@ fn a_training_whose_disk_fails_ends_with_the_same_bytes() {
     let begin = |out: &Path| fit(&set, out, &more);
     let whole = folder.join("whole");
     let undisturbed = crate::common::faults::run(begin(&whole), &whole, 0, false);
-    assert!(undisturbed.output.status.success(), "{}", undisturbed.said());
+    assert!(undisturbed.output.status.success(), "{}", undisturbed.printed());
     for at in crate::common::faults::moments(undisturbed.changes, 9) {
         let out = folder.join(format!("at-{at}"));
         let ended = crate::common::faults::run(begin(&out), &out, at, at % 2 == 0);
-        let said = ended.said();
+        let message = ended.printed();
         // If an old file cannot be hard-linked under a second name, it is replaced nevertheless.
         if ended.failed != "link" || !ended.output.status.success() {
-            assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
-            assert!(said.contains("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
+            assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {message}", ended.failed);
+            assert!(
+                message.contains("error: ") && message.contains(" help: "),
+                "change {at}, {}: {message}",
+                ended.failed
+            );
             succeed(&mut fit(&set, &out, &more));
         }
         assert_eq!(weights(&out), weights(&whole), "change {at}");
@@ -225,7 +229,7 @@ fn seeds_decide_and_their_runs_lie_beside_each_other() {
 }
 
 #[test]
-fn what_cannot_be_gone_on_with_is_told() {
+fn what_cannot_be_continued_is_reported() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 4);
@@ -301,13 +305,13 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
     // No file is left that would block the corrected command.
     assert!(!folder.join("on").exists());
-    for (other, told) in
+    for (other, stated) in
         [("--network segnet", "--network unet"), ("--network unet --normalization fixed", "--normalization band")]
     {
         let other = format!("{other} --steps 1 --init {}", three.display());
         fs::copy(&kept, three.join(run::WEIGHTS)).unwrap();
         let error = refuse(&mut fit(&set, &folder.join("on"), &other), 2);
-        assert!(error.contains("cannot start from a run with") && error.contains(told), "{error}");
+        assert!(error.contains("cannot start from a run with") && error.contains(stated), "{error}");
     }
     // Model cards that would exhaust memory, divide by zero or name files elsewhere.
     let card = two.join(run::MODEL);
@@ -564,8 +568,8 @@ fn adjusted_logits_are_other_biases_and_nothing_else() {
         ("--refine plants --classes plant=crop,weed;soil", "the first class must be soil"),
         ("--refine colour --bands nir", "needs the bands red, green and blue"),
     ] {
-        let said = refuse(&mut fit(&set, &folder.join("refused"), more), 2);
-        assert!(said.contains(words) && !folder.join("refused").exists(), "{said}");
+        let message = refuse(&mut fit(&set, &folder.join("refused"), more), 2);
+        assert!(message.contains(words) && !folder.join("refused").exists(), "{message}");
     }
 }
 

@@ -9,7 +9,7 @@ use crate::common::program::{SMALL, small_text, trace};
 use crate::common::python::{python, torch_with};
 use furrow_dataset::format::{self, NAMES};
 use furrow_dataset::model::annotate;
-use furrow_dataset::model::recipe::Made;
+use furrow_dataset::model::recipe::ImageOrigin;
 use furrow_dataset::model::sample::IGNORE;
 use furrow_dataset::read::checksum_record;
 use furrow_dataset::read::native;
@@ -192,7 +192,7 @@ fn every_format_comes_out_the_same_from_the_native_files() {
 /// belongs to no plant. Returns the temporary folder, the folder of the files, and the sample.
 fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
     let (mut recipe, _) = samples(&FIELD);
-    recipe.made = Made::Imported { from: "masks".into(), source_sha256: String::new(), nir: None };
+    recipe.made = ImageOrigin::Imported { from: "masks".into(), source_sha256: String::new(), nir: None };
     recipe.species.clear();
     let [crop, weed] = numbers;
     let mut sample = Sample {
@@ -284,9 +284,10 @@ fn every_format_takes_numbers_beyond_16_bits() {
     let segments = numbers("panoptic/annotations/panoptic_val/000002.png");
     let (soil, crowd) = (70_001 + 4, 70_001 + 1);
     assert_eq!(segments, [soil, 7, 7, 0, 70_000, 70_000, soil, crowd]);
-    let told = std::fs::read_to_string(written.join("panoptic/segments/val/000002.json")).unwrap();
-    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
-    let crowds: Vec<_> = told.as_array().unwrap().iter().map(|s| (s["id"].as_u64(), s["iscrowd"].as_u64())).collect();
+    let written_json = std::fs::read_to_string(written.join("panoptic/segments/val/000002.json")).unwrap();
+    let written_json: serde_json::Value = serde_json::from_str(&written_json).unwrap();
+    let crowds: Vec<_> =
+        written_json.as_array().unwrap().iter().map(|s| (s["id"].as_u64(), s["iscrowd"].as_u64())).collect();
     let expected = [(7, 0), (70_000, 0), (crowd, 1), (soil, 0)].map(|(id, is)| (Some(u64::from(id)), Some(is)));
     assert_eq!(crowds, expected);
     drop(folder);

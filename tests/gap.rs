@@ -10,9 +10,9 @@ use crate::common::program::{small_text, trace};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_cli::reference::{answer, scene, species};
 use furrow_compare::Region;
-use furrow_compare::gap::advice::{self, Step, Way};
+use furrow_compare::gap::advice::{self, ChangeDirection, Step};
 use furrow_compare::gap::{Distance, FILES, Feature, Gap, Options};
-use furrow_output::{Picture as Png, read_gray, read_rgb, write_png};
+use furrow_output::{ImageData as Png, read_gray, read_rgb, write_png};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Output;
@@ -168,7 +168,7 @@ fn record(pixel_mm: f64, error: f64) -> String {
 /// images, with no distance; without downscaling, the plant sizes differ strongly. Noise from few samples, compared
 /// with that of the real set, is reported with a sufficient number of samples.
 #[test]
-fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
+fn sets_are_resampled_to_one_pixel_size_and_sampling_noise_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (real, made) = (folder.path().join("real"), folder.path().join("made"));
     set(&real, 1, 4, 0);
@@ -192,18 +192,18 @@ fn sets_are_brought_to_one_pixel_size_and_sampling_noise_is_told() {
         assert!(*distance < 1e-9, "{feature:?}: {distance}");
     }
     assert!(known.advice().iter().all(|advice| advice.step == Step::PixelSize && !advice.turns.is_empty()));
-    let told = |gap: &Gap, words: &str| gap.warnings.iter().any(|warning| warning.contains(words));
-    assert!(told(&known, "samples per pixel") && told(&known, "--spp "), "{:?}", known.warnings);
-    assert!(!told(&known, "--pixel-mm"));
+    let warns = |gap: &Gap, words: &str| gap.warnings.iter().any(|warning| warning.contains(words));
+    assert!(warns(&known, "samples per pixel") && warns(&known, "--spp "), "{:?}", known.warnings);
+    assert!(!warns(&known, "--pixel-mm"));
     let blind = with(None);
-    assert!(told(&blind, "--pixel-mm"), "{:?}", blind.warnings);
+    assert!(warns(&blind, "--pixel-mm"), "{:?}", blind.warnings);
     // Four times the area is 0.6 decades.
     let size = blind.distance(Feature::BlobSize(Region::Crop)).unwrap().distance;
     assert!((size - 4.0_f64.log10()).abs() < 0.06, "{size}");
     for k in 0..4 {
         std::fs::write(made.join(format!("images/{k:06}/record.json")), record(0.25, 0.001)).unwrap();
     }
-    assert!(!told(&with(Some(0.5)), "samples per pixel"));
+    assert!(!warns(&with(Some(0.5)), "samples per pixel"));
 }
 
 /// Rationale: advice that names a non-existent field, or the wrong direction, costs days. Expected: each advised path
@@ -214,9 +214,9 @@ fn every_field_that_advice_names_exists() {
     let fields = advice::fields();
     assert!(fields.len() > 30, "{fields:?}");
     for field in &fields {
-        let said = answer(field, &references, "trace").unwrap_or_else(|e| panic!("{field}: {e}"));
+        let message = answer(field, &references, "trace").unwrap_or_else(|e| panic!("{field}: {e}"));
         let name = field.rsplit('.').next().unwrap();
-        assert!(said.lines().next().unwrap().ends_with(name), "{field} is explained as {said}");
+        assert!(message.lines().next().unwrap().ends_with(name), "{field} is explained as {message}");
     }
     assert!(answer("sensor.exposure.Auto.lewel", &references, "trace").is_err());
 }
@@ -244,22 +244,22 @@ fn what_was_changed_in_a_scene_file_is_advised_to_be_turned_back() {
         out
     };
     let real = make("real", 0.6, 0.15);
-    let advised = |gap: &Gap, field: &str| -> Vec<Way> {
+    let advised = |gap: &Gap, field: &str| -> Vec<ChangeDirection> {
         let turns = gap.advice().into_iter().flat_map(|advice| advice.turns);
         turns.filter(|turn| turn.field == field).map(|turn| turn.way).collect()
     };
     let dark = compared(&real, &make("dark", 0.3, 0.15));
     assert_eq!(dark.advice()[0].step, Step::Exposure, "{:?}", dark.advice());
-    assert_eq!(advised(&dark, "sensor.exposure.White.level"), [Way::Raise]);
+    assert_eq!(advised(&dark, "sensor.exposure.White.level"), [ChangeDirection::Raise]);
     let wet = compared(&real, &make("wet", 0.6, 0.85));
     let ways = advised(&wet, "soil.moisture.mean");
-    assert!(!ways.is_empty() && ways[0] == Way::Lower, "{:?}", wet.advice());
+    assert!(!ways.is_empty() && ways[0] == ChangeDirection::Lower, "{:?}", wet.advice());
     assert!(advised(&wet, "sensor.exposure.White.level").is_empty(), "{:?}", wet.advice());
     assert!(wet.pixels.real_mm.is_some() && wet.pixels.real_mm == wet.pixels.synthetic_mm);
 }
 
 #[test]
-fn what_is_no_set_is_told() {
+fn folders_that_are_no_set_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     set(&folder.path().join("good"), 1, 2, 0);
     set(&folder.path().join("bad"), 1, 2, 0);
@@ -272,9 +272,9 @@ fn what_is_no_set_is_told() {
         ("bad", "good", "001.png: it has 8 × 8 pixels, its image 96 × 64"),
     ] {
         let output = run(folder.path(), &["--real", real, "--synthetic", synthetic]);
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        assert!(told.contains(words), "{told}");
+        let warns = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{warns}");
+        assert!(warns.contains(words), "{warns}");
     }
     for arguments in [&["--real", "good"][..], &["good"], &["good", "bad", "--real", "good", "--synthetic", "bad"], &[]]
     {

@@ -10,13 +10,13 @@ use crate::common::program::{SMALL, scratch, trace};
 use crate::common::python::python;
 use furrow_compare::{Pairs, gap};
 use furrow_dataset::model::classes::Classes;
-use furrow_dataset::model::recipe::{FILE, Made};
+use furrow_dataset::model::recipe::{FILE, ImageOrigin};
 use furrow_dataset::model::record::Record;
 use furrow_dataset::model::split::Split;
 use furrow_dataset::read::checksum_record::ChecksumRecord;
 use furrow_dataset::read::native;
 use furrow_dataset::{Sample, Set};
-use furrow_output::{Picture, encode_jpeg, write_png};
+use furrow_output::{ImageData, encode_jpeg, write_png};
 use furrow_render::scene::tag::Class;
 use furrow_train::data::{Band, Example};
 use serde_json::{Value, json};
@@ -94,15 +94,15 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn numbered(root: &Path) {
     for (k, (split, name)) in [("train", "b"), ("train", "a"), ("val", "c")].into_iter().enumerate() {
         let (image, mask) = (photo(k as u8), classes());
-        write_png(&root.join(format!("images/{split}/{name}.png")), W, H, &Picture::Rgb(&image), "").unwrap();
+        write_png(&root.join(format!("images/{split}/{name}.png")), W, H, &ImageData::Rgb(&image), "").unwrap();
         let gray: Vec<u8> = image.iter().map(|p| p[0]).collect();
-        write_png(&root.join(format!("nir/{split}/{name}.png")), W, H, &Picture::Gray(&gray), "").unwrap();
+        write_png(&root.join(format!("nir/{split}/{name}.png")), W, H, &ImageData::Gray(&gray), "").unwrap();
         let mask_path = root.join(format!("masks/{split}/{name}_mask.png"));
         if k == 0 {
             let palette: Vec<[u8; 3]> = (0..=255).map(|n| [n, 255 - n, n / 2]).collect();
-            write_png(&mask_path, W, H, &Picture::Indexed(&mask, &palette), "").unwrap();
+            write_png(&mask_path, W, H, &ImageData::Indexed(&mask, &palette), "").unwrap();
         } else {
-            write_png(&mask_path, W, H, &Picture::Gray(&mask), "").unwrap();
+            write_png(&mask_path, W, H, &ImageData::Gray(&mask), "").unwrap();
         }
     }
 }
@@ -154,11 +154,11 @@ fn masks_of_colours_and_jpeg_images_come_in() {
             .iter()
             .map(|c| [[0, 0, 0], [0, 255, 0], [255, 0, 0], [9, 9, 8]][usize::from(*c).min(3)])
             .collect();
-        write_png(&root.join(format!("masks/{k}.png")), W, H, &Picture::Rgb(&colors), "").unwrap();
+        write_png(&root.join(format!("masks/{k}.png")), W, H, &ImageData::Rgb(&colors), "").unwrap();
     }
     let [images, masks] = ["images", "masks"].map(|name| root.join(name));
     std::fs::write(root.join("images/11.heic"), "").unwrap();
-    write_png(&root.join("masks/left.png"), 1, 1, &Picture::Gray(&[0]), "").unwrap();
+    write_png(&root.join("masks/left.png"), 1, 1, &ImageData::Gray(&[0]), "").unwrap();
     let colors = "0,255,0=crop;255,0,0=weed;0,0,0=soil";
     let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--colors", colors];
     let words = refused(&out, &arguments);
@@ -174,7 +174,7 @@ fn masks_of_colours_and_jpeg_images_come_in() {
 }
 
 #[test]
-fn what_cannot_be_read_is_told_by_its_file() {
+fn unreadable_files_are_reported_by_name() {
     let (kept, out) = scratch();
     let root = kept.path();
     numbered(root);
@@ -190,7 +190,7 @@ fn what_cannot_be_read_is_told_by_its_file() {
     assert!(refused(&out, &all(&["--colors", "0,0=crop"])).contains("not a colour"));
     // A mask of another size, and one that is truncated.
     let mask = masks.join("val/c_mask.png");
-    write_png(&mask, 1, 1, &Picture::Gray(&[0]), "").unwrap();
+    write_png(&mask, 1, 1, &ImageData::Gray(&[0]), "").unwrap();
     assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("it has 1 × 1 pixels"));
     std::fs::write(&mask, b"\x89PNG\r\n\x1a\n").unwrap();
     assert!(refused(&out, &all(&["--mask-suffix", "_mask"])).contains("c_mask.png"));
@@ -199,7 +199,7 @@ fn what_cannot_be_read_is_told_by_its_file() {
     let full = root.join("full");
     std::fs::create_dir_all(&full).unwrap();
     std::fs::write(full.join("mine.txt"), "mine").unwrap();
-    write_png(&mask, W, H, &Picture::Gray(&classes()), "").unwrap();
+    write_png(&mask, W, H, &ImageData::Gray(&classes()), "").unwrap();
     assert!(refused(&full, &all(&["--mask-suffix", "_mask"])).contains("mine.txt"));
 }
 
@@ -227,8 +227,8 @@ fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
 /// Returns whether the recipe of a set states that its images came with near infrared.
 fn says_nir(set: &Set) -> Option<bool> {
     match &set.recipe.made {
-        Made::Imported { nir, .. } => *nir,
-        Made::Rendered(_) => panic!("these images were imported"),
+        ImageOrigin::Imported { nir, .. } => *nir,
+        ImageOrigin::Rendered(_) => panic!("these images were imported"),
     }
 }
 
@@ -294,7 +294,7 @@ fn an_import_of_an_earlier_build_goes_on() {
     let [images, masks] = ["images", "masks"].map(|name| root.join(name));
     let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
     let mut recipe = imported(&out, &arguments).0.recipe;
-    if let Made::Imported { nir, .. } = &mut recipe.made {
+    if let ImageOrigin::Imported { nir, .. } = &mut recipe.made {
         *nir = None;
     }
     let written = String::from_utf8(recipe.text().unwrap()).unwrap();
@@ -400,7 +400,7 @@ fn coco_comes_back_as_it_was_written() {
 fn plants_beyond_16_bits_come_in_and_back() {
     let (kept, out) = scratch();
     let root = kept.path();
-    write_png(&root.join("x.png"), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+    write_png(&root.join("x.png"), W, H, &ImageData::Rgb(&photo(3)), "").unwrap();
     let square = |x: u32, plant: u32| {
         json!({
             "id": plant, "image_id": 5, "category_id": 1, "iscrowd": 0, "attributes": { "plant": plant },
@@ -439,7 +439,7 @@ fn plants_beyond_16_bits_come_in_and_back() {
 fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
     let (kept, out) = scratch();
     let root = kept.path();
-    write_png(&root.join("x.png"), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+    write_png(&root.join("x.png"), W, H, &ImageData::Rgb(&photo(3)), "").unwrap();
     let polygon = |x0: u32, y0: u32, x1: u32, y1: u32| json!([[x0, y0, x1, y0, x1, y1, x0, y1]]);
     // A column of nine pixels at x = 9, as run lengths in column order.
     let runs = json!({ "size": [H, W], "counts": [9 * H, H, (W - 10) * H] });
@@ -508,8 +508,8 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
         let mut wrong = document("maize");
         wrong["annotations"][0]["segmentation"] = mask;
         write(wrong);
-        let said = refused(&another, &arguments);
-        assert!(said.contains(words) && said.contains("help: "), "{said}");
+        let message = refused(&another, &arguments);
+        assert!(message.contains(words) && message.contains("help: "), "{message}");
     }
     let mut turned = document("maize");
     turned["images"][0]["width"] = (W + 1).into();
@@ -527,7 +527,7 @@ fn what_a_coco_file_lacks_is_counted() {
     let (kept, out) = scratch();
     let root = kept.path();
     for name in ["x.png", "y.png"] {
-        write_png(&root.join(name), W, H, &Picture::Rgb(&photo(3)), "").unwrap();
+        write_png(&root.join(name), W, H, &ImageData::Rgb(&photo(3)), "").unwrap();
     }
     let crop = |id: u32, mask: Value| json!({ "id": id, "image_id": "x", "category_id": 3, "segmentation": mask });
     let square = json!([[2, 2, 6, 2, 6, 7, 2, 7]]);
@@ -546,8 +546,8 @@ fn what_a_coco_file_lacks_is_counted() {
     std::fs::write(&file, format!("\u{feff}{document}")).unwrap();
     let arguments = ["--format", "coco", "--from", text(&file), "--split", "1,0,0"];
     let output = import(&out, &arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{message}");
     for words in [
         "`http://host/a%20b/x.png` was found as `x.png`",
         "1 image: 1 annotations have the id of another annotation",
@@ -557,7 +557,10 @@ fn what_a_coco_file_lacks_is_counted() {
         "1 image: 1 polygons with fewer than three points",
         "1 image: the source has no annotations of this image",
     ] {
-        assert!(said.contains(&format!("warning: {words}")) || said.contains(words), "{words} is not in {said}");
+        assert!(
+            message.contains(&format!("warning: {words}")) || message.contains(words),
+            "{words} is not in {message}"
+        );
     }
     let set = Set::open(&out).unwrap();
     let sample = native::read(&out, &Set::name(0)).unwrap();
@@ -591,7 +594,7 @@ fn photographs_are_turned_as_viewers_show_them() {
         // The red half is on the right, or above.
         let is_red = |i: u32| if orientation == 6 { i / w < 16 } else { i % w >= 16 };
         let mask: Vec<u8> = (0..w * h).map(|i| u8::from(is_red(i))).collect();
-        write_png(&root.join("masks/a.png"), w, h, &Picture::Gray(&mask), "").unwrap();
+        write_png(&root.join("masks/a.png"), w, h, &ImageData::Gray(&mask), "").unwrap();
         let [images, masks, nir] = ["images", "masks", "nir"].map(|name| root.join(name));
         let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--nir", text(&nir)];
         let (_, samples) = imported(&out, &arguments);
@@ -603,7 +606,7 @@ fn photographs_are_turned_as_viewers_show_them() {
         let warned = &samples[0].record.warnings;
         assert_eq!(warned, &[format!("the photograph was turned by its EXIF orientation {orientation}")]);
         if orientation == 6 {
-            write_png(&root.join("masks/a.png"), 32, 16, &Picture::Gray(&mask), "").unwrap();
+            write_png(&root.join("masks/a.png"), 32, 16, &ImageData::Gray(&mask), "").unwrap();
             let words = refused(&root.join("other"), &arguments);
             assert!(words.contains("masks/a.png") && words.contains("EXIF orientation 6"), "{words}");
         }
@@ -626,7 +629,7 @@ fn a_photograph_without_its_end_is_refused() {
     place("whole/a.jpg", &whole);
     place("bench/train/images/a.jpg", cut);
     for path in ["masks/a.png", "bench/train/semantics/a.png"] {
-        write_png(&root.join(path), W, H, &Picture::Gray(&[0; N]), "").unwrap();
+        write_png(&root.join(path), W, H, &ImageData::Gray(&[0; N]), "").unwrap();
     }
     let document = json!({
         "images": [{ "id": 5, "file_name": "a.jpg", "width": W, "height": H }], "categories": [], "annotations": [],

@@ -20,7 +20,7 @@ use furrow_field::{Field, PartKind, PlantRecord};
 use furrow_grow::plant::OrganKind;
 use furrow_optics::bsdf::{Bsdf, Leaf, Portable};
 use furrow_optics::optics::{LeafOptics, Pigments};
-use furrow_render::accel::{Brute, EmbreeAccel, Surface};
+use furrow_render::accel::{BruteForce, EmbreeAccel, Surface};
 use furrow_render::material::Material;
 use furrow_render::scene::tag::Class;
 use furrow_render::scene::{Instance, Part};
@@ -99,7 +99,7 @@ fn instances_meet_what_their_copies_meet() {
     let (parts, copies) = stand();
     let [instanced, plain] = [&parts, &copies].map(|parts| EmbreeAccel::build(&surfaces(parts), 1).unwrap());
     let all = surfaces(&copies);
-    let brute = Brute::new(&all);
+    let brute = BruteForce::new(&all);
     let mut s = stream(2);
     let (mut met, mut masked, mut close) = (0, 0, 0);
     for i in 0..60_000 {

@@ -14,9 +14,9 @@ use furrow_dataset::model::classes::Classes;
 use furrow_dataset::read::checksum::Checksum;
 use furrow_dataset::read::checksum_record::ChecksumRecord;
 use furrow_dataset::read::native;
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use furrow_train::data::{Band, Example, Shape};
-use furrow_train::deploy::pictures;
+use furrow_train::deploy::input_images;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
@@ -38,9 +38,9 @@ fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
 
 /// Verifies a dataset and renders two of its images again.
 fn verify(folder: &Path) {
-    let said = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
-    let said = String::from_utf8_lossy(&said);
-    assert!(said.contains("2 rendered again and the same; 0 faults"), "{said}");
+    let printed = succeed(verb("verify", folder, &["--rerender", "2"])).stderr;
+    let printed = String::from_utf8_lossy(&printed);
+    assert!(printed.contains("2 rendered again and the same; 0 faults"), "{printed}");
 }
 
 /// Returns the files whose path satisfies a condition.
@@ -96,8 +96,8 @@ fn photographs_and_classes_alone_are_as_good_as_all_maps() {
     // The same requested from the start; and the output of `status`.
     succeed(make(&early, 4, &[&["--keep", "semantics,rgb"][..], &asked].concat()));
     same(&tree(&early), &tree(&bare));
-    let said = String::from_utf8_lossy(&succeed(verb("status", &bare, &[])).stdout).into_owned();
-    assert!(said.contains("4 of 4 images"), "{said}");
+    let printed = String::from_utf8_lossy(&succeed(verb("status", &bare, &[])).stdout).into_owned();
+    assert!(printed.contains("4 of 4 images"), "{printed}");
 }
 
 #[test]
@@ -124,8 +124,8 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
     ] {
         let before = tree(folder);
         let words = fail(make(folder, 3, &["--keep", keep]), 2);
-        let told = format!("another dataset is in this folder: label maps that --keep leaves out {begun}");
-        assert!(words.contains(&told) && words.contains("omit --keep to continue"), "{keep}: {words}");
+        let message = format!("another dataset is in this folder: label maps that --keep leaves out {begun}");
+        assert!(words.contains(&message) && words.contains("omit --keep to continue"), "{keep}: {words}");
         same(&tree(folder), &before);
     }
     let other = base.join("other");
@@ -138,8 +138,8 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
         assert!(words.contains(part) && !other.join("dataset.json").exists(), "{more:?}: {words}");
     }
     // A dry run also reports the cost.
-    let said = succeed(make(&other, 5, &["--keep", "rgb,semantics", "--dry-run"]));
-    assert!(said.status.success() && !other.exists());
+    let printed = succeed(make(&other, 5, &["--keep", "rgb,semantics", "--dry-run"]));
+    assert!(printed.status.success() && !other.exists());
 }
 
 /// Expected: with `--labels-only`, classes alone may be kept; an image cannot be kept, because none is rendered.
@@ -161,11 +161,11 @@ fn labels_alone_may_be_classes_alone() {
     let (width, height) = before.size();
     let photograph = vec![[90_u8; 3]; before.pixels()];
     let file = data.join("images/000001/rgb.png");
-    write_png(&file, width, height, &Picture::Rgb(&photograph), "").expect("an image");
+    write_png(&file, width, height, &ImageData::Rgb(&photograph), "").expect("an image");
     assert!(native::read(&data, "000001").expect("an image") == before);
     assert_eq!(fail(verb("verify", &data, &["--quiet"]), 1), stray("000001", "rgb.png"));
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
-    let error = pictures::find(std::slice::from_ref(&data), &shape, &[]).expect_err("no photograph");
+    let error = input_images::find(std::slice::from_ref(&data), &shape, &[]).expect_err("no photograph");
     assert!(error.to_string().contains("holds labels only"), "{error}");
 }
 
@@ -191,7 +191,7 @@ assert sorted(sample) == ['image', 'record', 'semantics'], sorted(sample)
     let [plants, leaves] = ["plants.png", "leaves.png"].map(|map| data.join("images/000000").join(map));
     let (width, height) = before.size();
     let numbers = vec![7_u32; before.plants.len()];
-    write_png(&plants, width, height, &Picture::Numbers(&numbers), "").expect("an image");
+    write_png(&plants, width, height, &ImageData::Numbers(&numbers), "").expect("an image");
     fs::write(&leaves, "no picture").expect("a file");
     assert!(set.sample(0).expect("an image") == before);
     assert!(native::read(&data, "000000").expect("an image") == before);
@@ -249,7 +249,7 @@ assert sorted(sample) == ['image', 'leaves', 'plants', 'record', 'semantics'], s
     // A band with another name belongs to the user.
     let (width, height) = before.size();
     let gray = vec![90_u8; before.pixels()];
-    write_png(&at(&data, "thermal.png"), width, height, &Picture::Gray(&gray), "").expect("an image");
+    write_png(&at(&data, "thermal.png"), width, height, &ImageData::Gray(&gray), "").expect("an image");
     assert_eq!(seen(&set, "thermal").expect("a band"), [gray]);
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
@@ -273,7 +273,7 @@ fn cannot_be_seen(set: &Set, band: &str) {
     let error = seen(set, band).expect_err("no band");
     assert!(error.to_string().contains(&format!("no band `{band}`: its dataset was made without")), "{error}");
     let shape = Shape { bands: vec![Band::Red, Band::Gray(band.into())], width: 96, height: 96 };
-    let error = pictures::find(std::slice::from_ref(&set.folder), &shape, &[]).expect_err("no band");
+    let error = input_images::find(std::slice::from_ref(&set.folder), &shape, &[]).expect_err("no band");
     assert!(error.to_string().contains(&format!("the network sees the band `{band}`")), "{error}");
 }
 
@@ -359,7 +359,7 @@ for folder in sys.argv[1:]:
     let packs = Set::open(&packed).expect("a dataset");
     assert!(packs.sample(0).expect("an image") == native::read(&folders, "000000").expect("an image"));
     let shape = Shape { bands: Band::RGB.to_vec(), width: 96, height: 96 };
-    let found = pictures::find(std::slice::from_ref(&packed), &shape, &[]).expect("images");
+    let found = input_images::find(std::slice::from_ref(&packed), &shape, &[]).expect("images");
     assert!(found.len() == 3 && found.iter().all(|picture| picture.read().is_ok()));
     let Some(python) = python("import numpy, PIL") else { return };
     let mut read = Command::new(python);

@@ -18,7 +18,7 @@ use furrow_field::assemble::Options;
 use furrow_field::{Field, assemble};
 use furrow_optics::sensor::{Camera, Distortion, Pose};
 use furrow_output::{Provenance, Spp};
-use furrow_render::accel::{Brute, EmbreeAccel};
+use furrow_render::accel::{BruteForce, EmbreeAccel};
 use furrow_render::film::{Film, Filter, Pixel};
 use furrow_render::material::Material;
 use furrow_render::render::label::NONE;
@@ -202,7 +202,7 @@ fn every_triangle(scene: &Scene) -> (Vec<u32>, Vec<f32>) {
     let camera = &scene.camera;
     let (w, h) = (camera.width(), camera.height());
     let surfaces = scene.surfaces();
-    let brute = Brute::new(&surfaces);
+    let brute = BruteForce::new(&surfaces);
     let rays: Vec<Ray> = (0..w * h)
         .map(|i| {
             let (origin, direction) = camera.centre_ray(i % w, i / w);
@@ -252,7 +252,7 @@ fn check_every_pixel(name: &str, scene: &Scene) {
     let (parts, distances) = every_triangle(scene);
     let camera = &scene.camera;
     let surfaces = scene.surfaces();
-    let brute = Brute::new(&surfaces);
+    let brute = BruteForce::new(&surfaces);
     let mut expected = parts.clone();
     let mut doubtful = 0;
     let wrong: Vec<usize> = (0..parts.len()).filter(|i| map.parts[*i] != parts[*i]).collect();

@@ -56,18 +56,24 @@ fn labels_are_those_of_the_photographed_fields() {
 /// hash, files, warnings, species, plants and conditions of the full field, from fewer triangles and with the same
 /// random numbers. Source: the full field.
 #[test]
-fn a_field_that_is_only_told_of_tells_the_same() {
+fn a_field_built_for_its_records_has_the_same_records() {
     for page in [SMALL, "scenes/synthetic-d.ron"] {
         let file = SceneFile::open(page).unwrap().width(96);
-        let (whole, told) = (file.field(1).unwrap(), file.told_only().field(1).unwrap());
+        let (whole, records_alone) = (file.field(1).unwrap(), file.records_only().field(1).unwrap());
         let triangles =
             |field: &Field| -> usize { field.grown().scene.parts.iter().map(|part| part.mesh.triangles.len()).sum() };
-        assert!(triangles(&told) < triangles(&whole), "{page}");
-        let (whole, told) = (whole.grown(), told.grown());
-        assert_eq!((&told.hash, &told.files, &told.shipped), (&whole.hash, &whole.files, &whole.shipped));
-        assert_eq!((&told.warnings, &told.species, &told.models), (&whole.warnings, &whole.species, &whole.models));
-        assert!(told.plants == whole.plants && told.conditions == whole.conditions, "{page}");
-        assert_eq!(told.scene.camera.record(), whole.scene.camera.record());
+        assert!(triangles(&records_alone) < triangles(&whole), "{page}");
+        let (whole, records_alone) = (whole.grown(), records_alone.grown());
+        assert_eq!(
+            (&records_alone.hash, &records_alone.files, &records_alone.shipped),
+            (&whole.hash, &whole.files, &whole.shipped)
+        );
+        assert_eq!(
+            (&records_alone.warnings, &records_alone.species, &records_alone.models),
+            (&whole.warnings, &whole.species, &whole.models)
+        );
+        assert!(records_alone.plants == whole.plants && records_alone.conditions == whole.conditions, "{page}");
+        assert_eq!(records_alone.scene.camera.record(), whole.scene.camera.record());
     }
 }
 
@@ -95,8 +101,8 @@ fn formats_without_photographs_are_written_and_others_refused() {
         (&["--spp", "4"], "cannot be used with"),
     ] {
         let (_keep, other) = scratch();
-        let said = fail(make(&other, &[&["--labels-only"], more].concat()), 2);
-        assert!(said.contains(words), "{more:?}: {said}");
+        let message = fail(make(&other, &[&["--labels-only"], more].concat()), 2);
+        assert!(message.contains(words), "{more:?}: {message}");
         assert!(!other.join("dataset.json").exists(), "{more:?}");
     }
 }

@@ -95,7 +95,7 @@ fn what_is_of_nothing_is_unknown_and_left_out_of_means() {
 }
 
 #[test]
-fn faults_of_maps_are_told_and_nothing_is_counted() {
+fn faults_of_maps_are_reported_and_nothing_is_counted() {
     let mut matrix = Confusion::new(3);
     for (truth, predicted, words) in [
         (&[0, 1][..], &[0][..], "2 pixels, the prediction 1"),
@@ -221,7 +221,7 @@ fn an_outline_that_is_off_by_less_than_the_tolerance_is_right() {
 }
 
 #[test]
-fn small_plants_and_large_ones_are_told_apart() {
+fn small_and_large_plants_are_scored_separately() {
     // A crop plant of 16 pixels with a frayed edge, a missed weed of 3, and a speck of predicted weed on bare soil.
     let truth = map(&["0000000000", "0111100000", "0111100220", "0111100200", "0111100000", "0000000000"]);
     let answer = map(&["0000000000", "0111110000", "0111110000", "0111100000", "0110000000", "0000000020"]);
@@ -236,7 +236,7 @@ fn small_plants_and_large_ones_are_told_apart() {
 }
 
 #[test]
-fn plants_that_touch_are_told_apart_by_their_numbers() {
+fn touching_plants_are_separated_by_their_numbers() {
     let truth = map(&["11111111", "11111111"]);
     let numbers: Vec<u32> = (0..16).map(|at| if at % 8 < 2 { 7 } else { 3 }).collect();
     // The small plant of 4 pixels is detected; of the one with 12, five pixels are found.
@@ -420,9 +420,9 @@ fn scikit_learn_and_scipy_find_the_same_numbers() {
     std::fs::write(&file, serde_json::to_vec(&cases()).unwrap()).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/train/check_metrics.py");
     let output = Command::new(python).arg(script).arg(&file).env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
-    let (said, faults) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{said}{faults}");
-    assert!(said.contains("40 cases agree"), "{said}");
+    let (message, faults) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{message}{faults}");
+    assert!(message.contains("40 cases agree"), "{message}");
 }
 
 /// Image of brown soil and green plants by their classes, with normal noise of standard deviation `noise` (8-bit
@@ -473,7 +473,7 @@ fn judged(baseline: &Baseline, images: &[Example]) -> (f64, f64) {
 }
 
 #[test]
-fn colour_and_size_tell_clean_squares_apart() {
+fn colour_and_size_separate_clean_squares() {
     let (train, test) = (fields(1, 0.0), fields(2, 0.0));
     for cut in [Cut::Otsu, Cut::Fitted] {
         let colour = fit(Kind::Exg, cut, &train);
@@ -520,18 +520,18 @@ fn what_is_fitted_beats_what_is_not_where_there_is_noise() {
 #[test]
 fn baselines_say_what_they_cannot_learn_from() {
     let bare = Example { width: 2, height: 1, rgb: vec![[90; 3]; 2], truth: vec![0, 255] };
-    let said = |kind, cut, images: &[Example]| {
+    let message = |kind, cut, images: &[Example]| {
         Baseline::fit(kind, cut, || images.iter().cloned().map(Ok)).unwrap_err().to_string()
     };
     assert!(
-        said(Kind::Exg, Cut::Fitted, std::slice::from_ref(&bare))
+        message(Kind::Exg, Cut::Fitted, std::slice::from_ref(&bare))
             .contains("no pixel of the training images is a plant")
     );
-    assert!(said(Kind::ExgSize, Cut::Otsu, &[]).contains("there is no training image"));
+    assert!(message(Kind::ExgSize, Cut::Otsu, &[]).contains("there is no training image"));
     let strange = Example { truth: vec![0, 3], ..bare.clone() };
-    assert!(said(Kind::Exg, Cut::Fitted, &[strange]).contains("has the class 3"));
+    assert!(message(Kind::Exg, Cut::Fitted, &[strange]).contains("has the class 3"));
     let short = Example { truth: vec![0], ..bare.clone() };
-    assert!(said(Kind::ExgSize, Cut::Otsu, &[short]).contains("2 × 1 pixels has 2 colours and 1 labels"));
+    assert!(message(Kind::ExgSize, Cut::Otsu, &[short]).contains("2 × 1 pixels has 2 colours and 1 labels"));
     // A uniform image has no outliers, and Otsu's threshold uses no training images.
     let never = || -> Vec<furrow_base::Result<Example>> { panic!("no training image is needed") };
     let otsu = Baseline::fit(Kind::Exg, Cut::Otsu, never).unwrap();

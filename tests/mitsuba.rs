@@ -28,7 +28,7 @@ use furrow_optics::texture::{ColorSpace, HeightFromBrightness, Maps, Texture};
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::film::{Film, Filter};
 use furrow_render::integrator::PathTracer;
-use furrow_render::material::{LeafDesc, LeafMaterial, Material, Picture};
+use furrow_render::material::{LeafDesc, LeafMaterial, LeafTexture, Material};
 use furrow_render::render;
 use furrow_render::scene::tag::{Class, Tag};
 use furrow_render::scene::{Part, Scene};
@@ -284,7 +284,7 @@ fn large_and_small() -> Scene {
     let texels: Vec<u8> = (0..64 * 64_u32).flat_map(|i| [(i * 37 % 101) as u8 + 40, 120, 30, 255]).collect();
     let color = Texture::from_rgba8(64, 64, &texels, ColorSpace::Srgb);
     let maps = Maps::derive(&color, &HeightFromBrightness::LEAF);
-    let leaf = LeafMaterial::new(&LeafDesc::default(), Some(Arc::new(Picture { color, maps })));
+    let leaf = LeafMaterial::new(&LeafDesc::default(), Some(Arc::new(LeafTexture { color, maps })));
     let part = |half: f32, at: Vec3, leaf| {
         let mut mesh = square(half);
         mesh.transform(Mat3::IDENTITY, at);
@@ -359,7 +359,7 @@ fn equal_exports_are_equal_bytes() {
 
 /// Expected: features that Mitsuba does not support are reported, and supported ones cause no warning.
 #[test]
-fn what_is_lost_is_said() {
+fn losses_of_an_export_are_reported() {
     let (folder, _) = exported(&sheets());
     let quiet = furrow_job::mitsuba::export(folder.path(), &sheets(), "").expect("files").warnings;
     assert_eq!(quiet, Vec::<String>::new());

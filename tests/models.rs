@@ -178,11 +178,11 @@ fn the_program_exports_a_scene_and_says_what_is_missing() {
         .arg(&out)
         .output()
         .unwrap();
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(done.status.success(), "{said}");
+    let message = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{message}");
     assert_eq!(program::names(&out), ["scene.glb"]);
     assert_eq!(String::from_utf8(done.stdout).unwrap().trim(), out.join("scene.glb").display().to_string());
-    assert!(said.contains("no sky"), "{said}");
+    assert!(message.contains("no sky"), "{message}");
 }
 
 /// An OBJ square of two triangles with corners at y = 0 and 1, so that the up axis is visible.
@@ -198,7 +198,7 @@ fn write(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
 
 /// Writes a grey 2 × 2 image whose top row is white.
 fn picture(folder: &Path, name: &str) {
-    furrow_output::write_png(&folder.join(name), 2, 2, &furrow_output::Picture::Gray(&[255, 255, 0, 0]), "").unwrap();
+    furrow_output::write_png(&folder.join(name), 2, 2, &furrow_output::ImageData::Gray(&[255, 255, 0, 0]), "").unwrap();
 }
 
 #[test]
@@ -302,7 +302,7 @@ fn opacity_is_cut_where_the_file_says() {
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     let texels = [[255, 0, 0, 255], [255, 0, 0, 200], [255, 0, 0, 100], [255, 0, 0, 0]];
-    furrow_output::write_png(&folder.join("cut.png"), 2, 2, &furrow_output::Picture::Rgba(&texels), "").unwrap();
+    furrow_output::write_png(&folder.join("cut.png"), 2, 2, &furrow_output::ImageData::Rgba(&texels), "").unwrap();
     let there = |mode: &str, cutoff: f32| {
         let document = triangle(|d| {
             d["meshes"][0]["primitives"][0]["material"] = json!(0);

@@ -14,17 +14,17 @@ use furrow_train::fit::{Hyperparameters, Plan};
 use furrow_train::net::{Network, Pretrained, is_encoder};
 use furrow_train::run::TrainedModel;
 use furrow_train::torch::tch::{self, Device, Tensor};
-use furrow_train::torch::{Model, Pass, Precision, Where, device};
+use furrow_train::torch::{Model, Pass, Placement, Precision, device};
 use furrow_train::weights::{self, Array};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("networks-set"));
 
-const SINGLE: Where = Where { device: Device::Cpu, precision: Precision::Single };
+const SINGLE: Placement = Placement { device: Device::Cpu, precision: Precision::Single };
 
 /// Builds a network with the weights of a trained model.
-fn model(learnt: &TrainedModel, place: Where) -> Model {
+fn model(learnt: &TrainedModel, place: Placement) -> Model {
     device::set_threads(1);
     let card = &learnt.card;
     Model::with(card.network, card.input.bands.len(), card.classes.len(), &learnt.values, place).unwrap()
@@ -175,7 +175,7 @@ fn an_answer_depends_neither_on_precision_nor_batch_nor_layout() {
         let layout = apart(&Vec::<f32>::try_from(plain).unwrap(), &scores);
         // Eight bits of mantissa: a rounding of 2⁻⁹ after each of up to 26 layers; maxima that become equal are
         // unpooled to another position.
-        let half = model(&learnt, Where { device: Device::Cpu, precision: Precision::Bf16 });
+        let half = model(&learnt, Placement { device: Device::Cpu, precision: Precision::Bf16 });
         let half = half.scores(&pixels, training::SIZE).unwrap();
         let half = apart(&half, &scores);
         eprintln!("{}: batch {batch:?}, layout {layout:?}, bf16 {half:?}", network.name());

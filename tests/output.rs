@@ -133,7 +133,7 @@ fn text_of(path: &File) -> Vec<(String, String)> {
 }
 
 #[test]
-fn a_pngs_text_tells_its_origin_but_no_path_and_no_time() {
+fn a_pngs_text_has_its_origin_but_no_path_and_no_time() {
     let (_keep, out, .., provenance) = written();
     for name in FILES.iter().filter(|f| **f != "radiance.exr") {
         let texts = text_of(&out.join(name));
@@ -162,8 +162,9 @@ fn a_folder_that_cannot_be_made_is_a_clear_error() {
     for out in [&under, &file] {
         let args = ["--scene", SMALL, "--spp", "1", "--width", "24", "--out", out.to_str().unwrap()];
         let output = trace(&args).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
+        let message = String::from_utf8_lossy(&output.stderr);
+        let error =
+            message.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {message}"));
         assert!(error.contains(file.to_str().unwrap()), "no path in: {error}");
         assert_eq!(output.status.code(), Some(2), "{error}");
         assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
@@ -187,9 +188,10 @@ fn a_full_disk_leaves_no_half_written_file() {
     );
     let refused = || {
         let output = std::process::Command::new("sh").args(["-c", &script]).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        let error = said.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {said}"));
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        let error =
+            message.lines().find(|l| l.starts_with("error: ")).unwrap_or_else(|| panic!("no error in {message}"));
         assert!(error.contains("radiance.exr") && error.contains("File too large"), "{error}");
     };
     refused();

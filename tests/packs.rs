@@ -15,9 +15,9 @@ use furrow_compare::gap;
 use furrow_dataset::Set;
 use furrow_dataset::model::classes::Classes;
 use furrow_dataset::read::native;
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use furrow_train::data::{Band, Example, Shape};
-use furrow_train::deploy::pictures;
+use furrow_train::deploy::input_images;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
@@ -70,11 +70,11 @@ fn archives_hold_the_files_of_the_folders() {
     for (name, bytes) in folder_tree.iter().filter(|(name, _)| name.starts_with("coco/") || *name == "plants.parquet") {
         assert!(packed_tree[name] == *bytes, "{name}");
     }
-    let said = succeed(verb("verify", &data, &["--rerender", "2"]));
-    let said = String::from_utf8_lossy(&said.stderr);
-    assert!(said.contains("9 of 9 images checked, 2 rendered again and the same; 0 faults"), "{said}");
-    let said = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
-    assert!(said.contains("9 of 9 images"), "{said}");
+    let message = succeed(verb("verify", &data, &["--rerender", "2"]));
+    let message = String::from_utf8_lossy(&message.stderr);
+    assert!(message.contains("9 of 9 images checked, 2 rendered again and the same; 0 faults"), "{message}");
+    let message = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
+    assert!(message.contains("9 of 9 images"), "{message}");
     // An archive has the bytes that `trace stream` writes for these images.
     let mut stream = trace(&["stream", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--split", "3,1,0"]);
     stream.args(["--count", "3"]);
@@ -104,8 +104,8 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     same(&tree(&shards), &whole);
     // Shards consist of whole packs: there are three for training and one for validation, so a fifth shard would be
     // empty.
-    let said = fail(verb("emit", &shards, &["--scheduler", "slurm", "--shards", "5"]), 2);
-    assert!(said.contains("5 shards of 4 packs"), "{said}");
+    let message = fail(verb("emit", &shards, &["--scheduler", "slurm", "--shards", "5"]), 2);
+    assert!(message.contains("5 shards of 4 packs"), "{message}");
 
     let (_keep, grown) = scratch();
     succeed(packed(&grown, 5, &[]));
@@ -120,8 +120,8 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     same(&tree(&later), &whole);
     let mut other = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
     other.args(["--split", "3,1,0", "--pack", "5", "--out"]).arg(&later);
-    let said = fail(other, 2);
-    assert!(said.contains("another dataset is in this folder: pack 4 there, 5 here"), "{said}");
+    let message = fail(other, 2);
+    assert!(message.contains("another dataset is in this folder: pack 4 there, 5 here"), "{message}");
 
     // Killed repeatedly.
     let (_keep, killed) = scratch();
@@ -160,7 +160,8 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     let before = native::read(&data, "000000").expect("an image");
     let (width, height) = before.size();
     let thermal = vec![90_u8; before.pixels()];
-    write_png(&data.join("images/000000/thermal.png"), width, height, &Picture::Gray(&thermal), "").expect("an image");
+    write_png(&data.join("images/000000/thermal.png"), width, height, &ImageData::Gray(&thermal), "")
+        .expect("an image");
     fs::create_dir(data.join("images/000003/mine")).expect("a folder");
     fs::write(data.join("images/000003/mine/notes.txt"), "wet").expect("a file");
     for file in ["images/000000/thermal.png", "images/000003/mine/notes.txt"] {
@@ -177,7 +178,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     let (_, learnt) = Example::read_whole(&set, 0, &map, 0.0, &[Band::Gray("thermal".into())], true).expect("a band");
     assert_eq!(learnt.planes, [thermal]);
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
-    let found = || pictures::find(std::slice::from_ref(&data), &shape, &[]);
+    let found = || input_images::find(std::slice::from_ref(&data), &shape, &[]);
     let pictures = found().expect("images");
     assert!(pictures.len() == 6 && pictures.iter().all(|picture| picture.read().is_ok()));
     assert_eq!(gap::photos(&data, "--real").expect("images").len(), 6);
@@ -187,8 +188,8 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
         if arguments[1] == "--real" {
             command.args(["--synthetic", path(&images)]);
         }
-        let said = fail(command, 2);
-        assert!(said.contains("are in archives"), "{said}");
+        let message = fail(command, 2);
+        assert!(message.contains("are in archives"), "{message}");
     }
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
@@ -204,8 +205,8 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     succeed(packed(&data, 6, &[]));
     same(&tree(&data), &whole);
     succeed(verb("verify", &data, &["--quiet", "--rerender", "1"]));
-    let said = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
-    assert!(said.contains("6 of 6 images"), "{said}");
+    let message = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
+    assert!(message.contains("6 of 6 images"), "{message}");
     // The folder of an image that is in no archive is not read as an image.
     for file in ["packs/val-000000.tar", "seals/val-000000.json"] {
         fs::remove_file(data.join(file)).expect("a file");
@@ -229,8 +230,8 @@ fn changed_archives_are_found_and_mended() {
         let mut other = bytes.clone();
         other[place] ^= 1;
         fs::write(&archive, other).expect("an archive");
-        let said = fail(verb("verify", &data, &["--quiet"]), 1);
-        assert!(said.contains("packs/train-000000.tar was changed"), "{said}");
+        let message = fail(verb("verify", &data, &["--quiet"]), 1);
+        assert!(message.contains("packs/train-000000.tar was changed"), "{message}");
         succeed(packed(&data, 6, &[]));
         same(&tree(&data), &whole);
     }
@@ -241,11 +242,11 @@ fn changed_archives_are_found_and_mended() {
             fs::write(&archive, &bytes[..1000]).expect("an archive");
         }
         for verb_name in ["finish", "verify"] {
-            let said = fail(verb(verb_name, &data, &["--quiet"]), 1);
-            let lines: Vec<&str> = said.lines().collect();
-            assert!(lines[0].contains(&format!("packs/train-000000.tar {fault}")), "{verb_name}: {said}");
-            assert!(lines[1].contains("4 of 6 images are missing") && lines[2].contains("dataset render"), "{said}");
-            assert_eq!(lines.len(), 3, "{said}");
+            let message = fail(verb(verb_name, &data, &["--quiet"]), 1);
+            let lines: Vec<&str> = message.lines().collect();
+            assert!(lines[0].contains(&format!("packs/train-000000.tar {fault}")), "{verb_name}: {message}");
+            assert!(lines[1].contains("4 of 6 images are missing") && lines[2].contains("dataset render"), "{message}");
+            assert_eq!(lines.len(), 3, "{message}");
         }
         succeed(packed(&data, 6, &[]));
         same(&tree(&data), &whole);
@@ -255,8 +256,8 @@ fn changed_archives_are_found_and_mended() {
     let place = bytes.windows(9).position(|some| some == b"{\"index\":").expect("a record");
     other[place] = b'[';
     fs::write(&archive, other).expect("an archive");
-    let said = fail(verb("finish", &data, &["--quiet"]), 1);
-    assert!(said.contains("record.json: it was changed") && said.contains("dataset render"), "{said}");
+    let message = fail(verb("finish", &data, &["--quiet"]), 1);
+    assert!(message.contains("record.json: it was changed") && message.contains("dataset render"), "{message}");
     succeed(packed(&data, 6, &[]));
     same(&tree(&data), &whole);
     // A lost index of an archive that the manifest lists: no image is rendered again, formats are written again.
@@ -267,8 +268,8 @@ fn changed_archives_are_found_and_mended() {
         let text = fs::read_to_string(&record).expect("a record");
         if lost { fs::remove_file(&record) } else { fs::write(&record, text.replacen("512", "513", 1)) }
             .expect("a record");
-        let said = fail(verb("verify", &data, &["--quiet"]), 1);
-        assert!(said.contains("packs/val-000000.tar is not written yet"), "{said}");
+        let message = fail(verb("verify", &data, &["--quiet"]), 1);
+        assert!(message.contains("packs/val-000000.tar is not written yet"), "{message}");
         let drawn = || {
             let rows = furrow_dataset::make::timing_log::rows(&data).expect("a timing log");
             rows.iter().filter(|row| row.draw_s > 0.0).count()
@@ -281,8 +282,8 @@ fn changed_archives_are_found_and_mended() {
     // A format added later.
     succeed(verb("finish", &data, &["--quiet", "--format", "coco"]));
     succeed(verb("verify", &data, &["--quiet"]));
-    let said = fail(verb("finish", &data, &["--quiet", "--format", "nerf"]), 2);
-    assert!(said.contains("--format nerf names the files in images/"), "{said}");
+    let message = fail(verb("finish", &data, &["--quiet", "--format", "nerf"]), 2);
+    assert!(message.contains("--format nerf names the files in images/"), "{message}");
 }
 
 /// All images of a field are in the same pack.
@@ -295,8 +296,8 @@ fn packs_do_not_cut_fields() {
             &[&["dataset", "--scene", "scenes/09-drive.ron", "--pack", pack, "--out", path(&data)], &size[..]].concat(),
         )
     };
-    let said = fail(make("1"), 2);
-    assert!(said.contains("would cut fields") && !data.exists(), "{said}");
+    let message = fail(make("1"), 2);
+    assert!(message.contains("would cut fields") && !data.exists(), "{message}");
 }
 
 /// Expected: a push command that copies files builds the same dataset at the target, whatever characters the paths
@@ -314,8 +315,8 @@ fn what_is_finished_is_pushed_once_and_whole() {
     let copy = format!("cp -r {{dir}}/. \"{there_quoted}/\" && echo {{dir}} >> \"{there_quoted}.log\"");
     // The second pack fails.
     let failing = format!("case {{dir}} in *train-000001) echo no room >&2; exit 7;; esac; {copy}");
-    let said = fail(packed(&data, 9, &["--push", &failing, "--push-tries", "1", "--threads", "1"]), 1);
-    assert!(said.contains("train-000001 was not pushed") && said.contains("ended with 7: no room"), "{said}");
+    let message = fail(packed(&data, 9, &["--push", &failing, "--push-tries", "1", "--threads", "1"]), 1);
+    assert!(message.contains("train-000001 was not pushed") && message.contains("ended with 7: no room"), "{message}");
     assert!(there.join("packs/train-000000.tar").is_file() && there.join("dataset.json").is_file());
     let refused = fail(packed(&data, 9, &["--push", "true"]), 2);
     assert!(refused.contains("write {dir}"), "{refused}");
@@ -331,8 +332,8 @@ fn what_is_finished_is_pushed_once_and_whole() {
     assert_eq!(fs::read_to_string(format!("{}.log", path(&there))).expect("a log"), log);
     let status = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
     assert!(status.contains("9 of 9 images"), "{status}");
-    let said = fail(verb("finish", &data, &["--quiet"]), 2);
-    assert!(said.contains("the local files of 3 packs were removed after they were pushed"), "{said}");
+    let message = fail(verb("finish", &data, &["--quiet"]), 2);
+    assert!(message.contains("the local files of 3 packs were removed after they were pushed"), "{message}");
     succeed(verb("finish", &there, &["--quiet"]));
     same(&tree(&there), &whole);
     succeed(verb("verify", &there, &["--quiet"]));
@@ -348,8 +349,8 @@ fn a_push_that_hangs_is_ended_with_all_it_has_started() {
     fs::create_dir_all(&there).expect("a folder");
     let late = there.join("late");
     let hangs = format!("(sleep 4; echo {{dir}} > '{}') & sleep 60", path(&late));
-    let said = fail(packed(&data, 2, &["--push", &hangs, "--push-tries", "1", "--push-timeout", "1"]), 1);
-    assert!(said.contains("recipe was not pushed") && said.contains("took longer than 1 s"), "{said}");
+    let message = fail(packed(&data, 2, &["--push", &hangs, "--push-tries", "1", "--push-timeout", "1"]), 1);
+    assert!(message.contains("recipe was not pushed") && message.contains("took longer than 1 s"), "{message}");
     std::thread::sleep(std::time::Duration::from_secs(5));
     assert!(!late.exists(), "a subprocess of the command continued");
 }
@@ -419,12 +420,12 @@ fn who_reads_folders_says_how_to_unpack() {
                 succeed(command);
                 continue;
             }
-            let said = fail(command, 2);
-            assert!(said.contains("are in archives"), "{said}");
+            let message = fail(command, 2);
+            assert!(message.contains("are in archives"), "{message}");
         }
     }
-    let said = fail(trace(&["compare", path(&data), path(&data)]), 2);
-    let way = said.split_once("give `unpacked`: ").expect("a remedy").1.trim();
+    let message = fail(trace(&["compare", path(&data), path(&data)]), 2);
+    let way = message.split_once("give `unpacked`: ").expect("a remedy").1.trim();
     let mut shell = Command::new("sh");
     shell.current_dir(data.parent().expect("a folder")).args(["-c", way]);
     succeed(shell);

@@ -10,7 +10,7 @@ use crate::common::devtools::Page;
 use crate::common::program::{scratch, trace};
 use furrow_report::chart::{Chart, Curve, Effect};
 use furrow_report::{Cell, Table};
-use furrow_train::figure::{self, Plot, Shot};
+use furrow_train::figure::{self, Plot, Thumbnail};
 use furrow_train::measure::{Evaluation, Prediction};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -98,14 +98,14 @@ fn the_answer_of_an_ablation_opens() {
 fn an_evaluation_opens_with_the_worst_first_and_pictures_enlarge() {
     let Some(browser) = browser() else { return };
     let (_kept, folder) = scratch();
-    let (mut evaluation, mut shots) = (Evaluation::new(["soil", "crop", "weed"]), Vec::new());
+    let (mut evaluation, mut thumbnails) = (Evaluation::new(["soil", "crop", "weed"]), Vec::new());
     for (name, right) in [("good", 23), ("bad", 3), ("middling", 12)] {
         let truth: Vec<u8> = (0..24).map(|k| u8::from(k % 2 == 0)).collect();
         let predicted: Vec<u8> = truth.iter().enumerate().map(|(k, t)| if k < right { *t } else { 1 - t }).collect();
         let answer =
             Prediction { name, width: 6, height: 4, truth: &truth, predicted: &predicted, plants: None, seconds: None };
         evaluation.add(&answer).unwrap();
-        shots.push(Shot::new(name, (6, 4), &[[90, 120, 60]; 24], &truth, &[&predicted], 100));
+        thumbnails.push(Thumbnail::new(name, (6, 4), &[[90, 120, 60]; 24], &truth, &[&predicted], 100));
     }
     let report = evaluation.finish();
     let curve = |name: &str| Curve { name: name.into(), points: vec![(0.0, 2.0), (10.0, 0.5)] };
@@ -120,7 +120,7 @@ fn an_evaluation_opens_with_the_worst_first_and_pictures_enlarge() {
         kind: "Evaluation",
         title: "run",
         report: Some(&report),
-        shots: &shots,
+        thumbnails: &thumbnails,
         charts: &charts,
         palette: &[[0; 3], [0, 255, 0], [255, 0, 0]],
         classes: &report.classes,
@@ -153,10 +153,10 @@ fn the_catalogue_opens() {
     ];
     let output = trace(&arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let said = "[...document.querySelectorAll('.stage')].length > 3 && [...document.querySelectorAll('.stage')].every(s => \
+    let message = "[...document.querySelectorAll('.stage')].length > 3 && [...document.querySelectorAll('.stage')].every(s => \
                 /^BBCH \\d+$/.test(s.querySelector('figcaption').textContent) && s.querySelectorAll('svg image').length === 2) && \
                 [...document.querySelectorAll('.bar')].every(b => Number(b.dataset.mm) > 0 && b.getBoundingClientRect().width > 5)";
-    opens(&browser, &out.join("catalogue.html"), said);
+    opens(&browser, &out.join("catalogue.html"), message);
 }
 
 /// Expected: for two sets, one of which is darker, the page lists fields to change.
@@ -168,7 +168,7 @@ fn a_comparison_of_sets_opens() {
         std::fs::create_dir_all(folder.join(name)).unwrap();
         for k in 0..4_u32 {
             let rgb: Vec<[u8; 3]> = (0..96 * 64).map(|p| [((p * 7 + k * 13) % 90 + 80 - lift) as u8; 3]).collect();
-            let picture = furrow_output::Picture::Rgb(&rgb);
+            let picture = furrow_output::ImageData::Rgb(&rgb);
             furrow_output::write_png(&folder.join(format!("{name}/{k}.png")), 96, 64, &picture, "").unwrap();
         }
     }

@@ -11,7 +11,7 @@ use crate::common::python::python;
 use furrow_compare::Pairs;
 use furrow_dataset::read::native;
 use furrow_dataset::{Sample, Set};
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -147,17 +147,17 @@ assert sample['image'].max() > 0 and sample['nir'].max() > 0
     let (width, height) = before.size();
     let (dark, gray) = (vec![[0_u8; 3]; before.pixels()], vec![0_u8; before.pixels()]);
     let at = |file: &str| data.join("images/000000").join(file);
-    furrow_output::write_png(&at("rgb.png"), width, height, &Picture::Rgb(&dark), "").unwrap();
-    furrow_output::write_png(&at("nir.png"), width, height, &Picture::Gray(&gray), "").unwrap();
+    furrow_output::write_png(&at("rgb.png"), width, height, &ImageData::Rgb(&dark), "").unwrap();
+    furrow_output::write_png(&at("nir.png"), width, height, &ImageData::Gray(&gray), "").unwrap();
     let set = Set::open(&data).unwrap();
     assert!(native::read(&data, "000000").unwrap() == before && set.sample(0).unwrap() == before);
     learnt_alike(&set, &before);
     let pair = Pairs::find(&data, &data, None).unwrap().pairs.remove(0);
     assert_eq!((pair.a, pair.nir.map(|nir| nir.1)), (at("rgb.jpg"), Some(at("nir.jpg"))));
-    let said = fail(verb("verify", &data, &["--quiet"]), 1);
+    let message = fail(verb("verify", &data, &["--quiet"]), 1);
     let stray =
         |file: &str| format!("error: images/000000/{file} does not belong here: the recipe leaves it out; remove it\n");
-    assert_eq!(said, ["rgb.png", "nir.png"].map(stray).concat());
+    assert_eq!(message, ["rgb.png", "nir.png"].map(stray).concat());
     if let Some(python) = python("import numpy, PIL") {
         let mut read = Command::new(python);
         read.args(["-c", READ, path(&data)]);
@@ -208,16 +208,16 @@ fn however_it_is_made_it_is_one_dataset() {
     fs::remove_file(&damaged).unwrap();
     fs::write(&damaged, bytes).unwrap();
     fs::remove_dir_all(whole.join("images/000002")).unwrap();
-    let said = fail(verb("verify", &whole, &[]), 1);
+    let message = fail(verb("verify", &whole, &[]), 1);
     for fault in
         ["images/000000/nir.jpg is missing", "images/000001/rgb.jpg was changed", "images/000002/rgb.jpg is missing"]
     {
-        assert!(said.contains(fault), "{said}");
+        assert!(message.contains(fault), "{message}");
     }
     succeed(make(&whole, 3, &more[2..]));
     same(&tree(&whole), &expected);
-    let said = succeed(verb("verify", &whole, &["--rerender", "3"])).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("3 rendered again and the same; 0 faults"));
+    let message = succeed(verb("verify", &whole, &["--rerender", "3"])).stderr;
+    assert!(String::from_utf8_lossy(&message).contains("3 rendered again and the same; 0 faults"));
 
     // Archives contain the same files in the same order as before.
     let (_keep, packed) = scratch();
@@ -226,8 +226,10 @@ fn however_it_is_made_it_is_one_dataset() {
     let members: Vec<String> =
         archive.entries().unwrap().map(|entry| entry.unwrap().path().unwrap().display().to_string()).collect();
     assert_eq!(members[..3], ["000000.rgb.jpg", "000000.nir.jpg", "000000.semantics.png"]);
-    let said = succeed(verb("verify", &packed, &["--rerender", "2"])).stderr;
-    assert!(String::from_utf8_lossy(&said).contains("3 of 3 images checked, 2 rendered again and the same; 0 faults"));
+    let message = succeed(verb("verify", &packed, &["--rerender", "2"])).stderr;
+    assert!(
+        String::from_utf8_lossy(&message).contains("3 of 3 images checked, 2 rendered again and the same; 0 faults")
+    );
     assert_eq!(Set::open(&packed).unwrap().sample(1).unwrap(), native::read(&whole, "000001").unwrap());
     if let Some(python) = python("import numpy, PIL") {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -308,9 +310,9 @@ fn datasets_of_before_keep_their_bytes() {
     {
         let before = tree(folder);
         let count = if folder == &old { 2 } else { 1 };
-        let said = fail(make(folder, count, &["--photo", photo]), 2);
+        let message = fail(make(folder, count, &["--photo", photo]), 2);
         let words = format!("another dataset is in this folder: photo {there} there, \"{photo}\" here");
-        assert!(said.contains(&words), "{said}");
+        assert!(message.contains(&words), "{message}");
         same(&tree(folder), &before);
     }
     succeed(make(&jpeg, 2, &[]));
@@ -319,16 +321,16 @@ fn datasets_of_before_keep_their_bytes() {
 }
 
 #[test]
-fn wrong_words_are_told() {
+fn wrong_words_are_reported() {
     let (_keep, data) = scratch();
     for bad in ["jpeg", "jpeg0", "jpeg49", "jpeg101", "webp"] {
-        let said = fail(make(&data, 1, &["--photo", bad]), 2);
-        assert!(said.contains("such as jpeg95") && said.matches("error: ").count() == 1, "{bad}: {said}");
+        let message = fail(make(&data, 1, &["--photo", bad]), 2);
+        assert!(message.contains("such as jpeg95") && message.matches("error: ").count() == 1, "{bad}: {message}");
     }
     let mut labels =
         trace(&["dataset", "--scene", SMALL, "--count", "1", "--labels-only", "--photo", "jpeg95", "--out"]);
     labels.arg(&data);
-    let said = fail(labels, 2);
-    assert!(said.contains("--labels-only renders none") && said.matches("error: ").count() == 1, "{said}");
+    let message = fail(labels, 2);
+    assert!(message.contains("--labels-only renders none") && message.matches("error: ").count() == 1, "{message}");
     assert!(names(&data).is_empty(), "files were written");
 }

@@ -15,12 +15,12 @@ use crate::common::training::{self, SIZE, learn, pictures, stirred};
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_train::data::{
     Augment, AugmentScale, Band, Batch, BatchSettings, Crop, Ground, Loader, Normalization, Pick, Selection, Shape,
     Store,
 };
-use furrow_train::deploy::pictures::Prediction;
+use furrow_train::deploy::input_images::Prediction;
 use furrow_train::fit::hyper::NormalizationMode;
 use furrow_train::measure::Report;
 use furrow_train::net::Network;
@@ -74,11 +74,11 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
     assert!(masks(&out("twice")) == masks(&out("long")), "images with pixels twice as large are not enlarged by two");
     assert!(masks(&out("twice")) != masks(&out("same")), "the pixel size has no effect");
 
-    let told = |name: &str| -> Prediction { run::read_json(&out(name).join("prediction.json")).unwrap() };
-    assert_eq!((told("twice").pixel_mm, told("twice").resize.as_str()), (Some(2.0 * mm), "× 2.000"));
-    assert_eq!((told("same").pixel_mm, told("same").resize.as_str()), (None, "stretch"));
-    let said = fail(predict(&out("twice"), &["--pixel-mm", &(2.000001 * mm).to_string()]), 2);
-    assert!(said.contains("this folder holds predictions at other sizes"), "{said}");
+    let recorded = |name: &str| -> Prediction { run::read_json(&out(name).join("prediction.json")).unwrap() };
+    assert_eq!((recorded("twice").pixel_mm, recorded("twice").resize.as_str()), (Some(2.0 * mm), "× 2.000"));
+    assert_eq!((recorded("same").pixel_mm, recorded("same").resize.as_str()), (None, "stretch"));
+    let message = fail(predict(&out("twice"), &["--pixel-mm", &(2.000001 * mm).to_string()]), 2);
+    assert!(message.contains("this folder holds predictions at other sizes"), "{message}");
 
     let eval = |name: &str, more: &[&str]| -> (Report, String) {
         let out = out(name);
@@ -97,18 +97,19 @@ fn pictures_are_brought_to_the_pixels_that_a_network_was_trained_on() {
         ("nan", "an image is scaled by"),
         ("9000", "the network was trained on pixels of 5.1"),
     ] {
-        let said = fail(predict(&out("none"), &[&format!("--pixel-mm={value}")]), 2);
-        assert!(said.contains(words), "{value}: {said}");
+        let message = fail(predict(&out("none"), &[&format!("--pixel-mm={value}")]), 2);
+        assert!(message.contains(words), "{value}: {message}");
     }
-    let said = fail(predict(&out("none"), &["--pixel-mm", "2", "--resize", "64"]), 2);
-    assert!(said.contains("cannot be used with"), "{said}");
-    let mut untold = trained;
-    untold.card.pixel_mm = None;
-    untold.write(&run).unwrap();
-    let said = fail(predict(&out("none"), &["--pixel-mm", "2"]), 2);
+    let message = fail(predict(&out("none"), &["--pixel-mm", "2", "--resize", "64"]), 2);
+    assert!(message.contains("cannot be used with"), "{message}");
+    let mut without_size = trained;
+    without_size.card.pixel_mm = None;
+    without_size.write(&run).unwrap();
+    let message = fail(predict(&out("none"), &["--pixel-mm", "2"]), 2);
     assert!(
-        said.contains("training images do not record their ground sampling distance") && said.contains("--resize"),
-        "{said}"
+        message.contains("training images do not record their ground sampling distance")
+            && message.contains("--resize"),
+        "{message}"
     );
     assert!(!out("none").exists());
 }
@@ -122,8 +123,8 @@ fn crops_are_scaled_by_the_pixels_of_their_own_image() {
     let all = Selection { pick: Some(Pick::All), ..Selection::of(SET.as_path()) };
     let store = Store::open(&[all], Pick::All, 1, &Classes::default(), &shape, false, 1 << 28).unwrap();
     let store = Arc::new(store);
-    let told = store.pixel_sizes_mm().unwrap();
-    assert!(told.len() == 8 && told.iter().all(|mm| (mm - told[0]).abs() < 1e-9), "{told:?}");
+    let recorded = store.pixel_sizes_mm().unwrap();
+    assert!(recorded.len() == 8 && recorded.iter().all(|mm| (mm - recorded[0]).abs() < 1e-9), "{recorded:?}");
 
     let (range_mm, sizes) = ((1.0, 2.0), (0..8).map(|k| 1.0 + 0.25 * f64::from(k)).collect::<Vec<_>>());
     let pixels = AugmentScale::PixelMm(range_mm.0, range_mm.1).of(|| Ok(sizes.clone())).unwrap();
@@ -158,8 +159,8 @@ fn imported(folder: &Path) -> PathBuf {
     let (w, h) = SIZE;
     for k in 0..2 {
         let (name, pixels) = (format!("{k}.png"), pictures(1, SIZE, 3, k));
-        furrow_output::write_png(&photos.join(&name), w, h, &Picture::Rgb(pixels.as_chunks().0), "").unwrap();
-        furrow_output::write_png(&masks.join(&name), w, h, &Picture::Gray(&vec![0; (w * h) as usize]), "").unwrap();
+        furrow_output::write_png(&photos.join(&name), w, h, &ImageData::Rgb(pixels.as_chunks().0), "").unwrap();
+        furrow_output::write_png(&masks.join(&name), w, h, &ImageData::Gray(&vec![0; (w * h) as usize]), "").unwrap();
     }
     let mut import = trace(&["dataset", "import", "--format", "masks", "--images", path(&photos)]);
     import.args(["--masks", path(&masks), "--out", path(&out)]);
@@ -181,20 +182,24 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
         train(&[&["fit", "--set", &set, "--out", path(&out)][..], &how, more].concat())
     };
     let plan = |out: &str| -> serde_json::Value { run::read_json(&folder.join(out).join(run::PLAN)).unwrap() };
-    let said = |output: &std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = |output: &std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
     let plain = succeed(fit(&SET, "plain", &[]));
     assert!(
-        plan("plain")["plan"].get("augment_scale").is_none() && !said(&plain).contains("warning"),
+        plan("plain")["plan"].get("augment_scale").is_none() && !message(&plain).contains("warning"),
         "{}",
-        said(&plain)
+        message(&plain)
     );
     let auto = succeed(fit(&SET, "auto", &["--augment-scale", "auto", "--freeze", "2"]));
     assert_eq!(plan("auto")["plan"]["augment_scale"], "auto");
-    assert!(said(&auto).contains("warning: --augment-scale auto: all crops have pixels of 5.1"), "{}", said(&auto));
-    assert!(said(&auto).contains("warning: the encoder keeps its random weights"), "{}", said(&auto));
+    assert!(
+        message(&auto).contains("warning: --augment-scale auto: all crops have pixels of 5.1"),
+        "{}",
+        message(&auto)
+    );
+    assert!(message(&auto).contains("warning: the encoder keeps its random weights"), "{}", message(&auto));
     let range = succeed(fit(&SET, "range", &["--augment-scale", "3..8"]));
     assert_eq!(plan("range")["plan"]["augment_scale"]["pixel_mm"], serde_json::json!([3.0, 8.0]));
-    assert!(!said(&range).contains("warning"), "{}", said(&range));
+    assert!(!message(&range).contains("warning"), "{}", message(&range));
     let weights = |out: &str| std::fs::read(folder.join(out).join(run::WEIGHTS)).unwrap();
     assert!(weights("range") != weights("plain"), "the range has no effect");
 
@@ -213,8 +218,8 @@ fn a_range_of_pixel_sizes_is_asked_for_and_refused_with_words() {
             "`scale` is not among the augmentations, which are flip",
         ),
     ] {
-        let said = fail(fit(set, "refused", &more), 2);
-        assert!(said.contains(words) && said.contains("--augment-scale"), "{more:?}: {said}");
+        let message = fail(fit(set, "refused", &more), 2);
+        assert!(message.contains(words) && message.contains("--augment-scale"), "{more:?}: {message}");
         assert!(!folder.join("refused").exists(), "{more:?} has left a folder");
     }
     succeed(fit(&imported, "imported-run", &[]));
@@ -240,7 +245,7 @@ fn table(file: &Path, set: &Path, out: &Path, more: &[&str]) -> Command {
 /// experiment's), with exit code 2 and before anything is written, in a dry run as in a real run. Test images may lack
 /// pixel sizes, and `relative` needs none. Source: none.
 #[test]
-fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
+fn unscalable_crops_are_reported_before_anything_is_rendered() {
     let scratch = tempfile::tempdir().unwrap();
     let (folder, out) = (scratch.path(), scratch.path().join("out"));
     let imported = imported(folder);
@@ -287,8 +292,11 @@ fn sets_whose_crops_cannot_be_scaled_are_told_before_anything_is_rendered() {
         write(&filled);
         let scale: &[&str] = if line == 7 { &["--scale", "less"] } else { &[] };
         for more in [&["--dry-run"][..], &[]] {
-            let said = fail(table(&file, set, &out, &[more, scale].concat()), 2);
-            assert!(said.contains(&format!("experiment.ron:{line}:")) && said.contains(words), "{filled:?}: {said}");
+            let message = fail(table(&file, set, &out, &[more, scale].concat()), 2);
+            assert!(
+                message.contains(&format!("experiment.ron:{line}:")) && message.contains(words),
+                "{filled:?}: {message}"
+            );
             assert!(!out.exists(), "{filled:?}");
         }
     }

@@ -20,7 +20,7 @@ use furrow_optics::sensor::{Camera, Distortion, Pose};
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::film::Filter;
 use furrow_render::material::Material;
-use furrow_render::raster::{Drawn, Rasterizer};
+use furrow_render::raster::{LabelledImage, Rasterizer};
 use furrow_render::render::{LabelMap, label};
 use furrow_render::scene::tag::{Class, Tag};
 use furrow_render::scene::{Part, Scene};
@@ -37,7 +37,7 @@ fn card() -> &'static Rasterizer {
     CARD.get_or_init(|| Rasterizer::new().expect("a Vulkan driver: apt-get install mesa-vulkan-drivers libvulkan1"))
 }
 
-fn draw(scene: &Scene, without: &[Technique]) -> Drawn {
+fn draw(scene: &Scene, without: &[Technique]) -> LabelledImage {
     card().draw(scene, &Techniques::without(without)).expect("an image")
 }
 
@@ -236,12 +236,12 @@ fn a_dataset_is_drawn_again_the_same() {
     let recipe = std::fs::read_to_string(out.join("dataset.json")).expect("a recipe");
     assert!(recipe.contains("\"engine\": \"raster\"") && recipe.contains(card().adapter()), "{recipe}");
     let checked = trace(&["dataset", "verify", folder, "--rerender", "2"]).output().expect("the program");
-    let said = String::from_utf8_lossy(&checked.stderr);
-    assert!(checked.status.success() && said.contains("2 rendered again and the same"), "{said}");
+    let message = String::from_utf8_lossy(&checked.stderr);
+    assert!(checked.status.success() && message.contains("2 rendered again and the same"), "{message}");
 }
 
 #[test]
-fn what_it_cannot_do_is_said() {
+fn unsupported_features_are_reported() {
     let (_keep, out) = scratch();
     let out = out.to_str().expect("a path");
     for (flags, words) in [
@@ -252,8 +252,8 @@ fn what_it_cannot_do_is_said() {
         (&["--without", "msaa"], "--without msaa has no effect with --engine trace"),
     ] {
         let output = trace(&["--scene", SMALL, "--out", out]).args(flags).output().expect("the program");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(2) && said.contains(words), "{flags:?}: {said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && message.contains(words), "{flags:?}: {message}");
         assert!(!Path::new(out).exists(), "{flags:?} left files");
     }
 }
@@ -264,8 +264,8 @@ fn without_a_driver_it_names_the_package() {
     let mut command = trace(&["--scene", SMALL, "--engine", "raster", "--out", out.to_str().expect("a path")]);
     let output = command.env("VK_DRIVER_FILES", "/nowhere.json").env("VK_ICD_FILENAMES", "/nowhere.json").output();
     let output = output.expect("the program");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && said.contains("mesa-vulkan-drivers"), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && message.contains("mesa-vulkan-drivers"), "{message}");
     assert!(!out.exists());
 }
 
@@ -276,6 +276,6 @@ fn without_a_window_system_nothing_is_said_of_one() {
     let arguments =
         ["--scene", SMALL, "--engine", "raster", "--width", "8", "--quiet", "--out", out.to_str().expect("UTF-8")];
     let output = trace(&arguments).env_remove("XDG_RUNTIME_DIR").output().expect("the program");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && said.is_empty(), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && message.is_empty(), "{message}");
 }

@@ -21,7 +21,7 @@ use furrow_base::sampling::Points;
 use furrow_field::assemble::{self, Options};
 use furrow_optics::bsdf::{Bsdf, Leaf, OrenNayar};
 use furrow_optics::light::{Lamp, Light, Outline};
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use furrow_render::film::Film;
 use furrow_render::integrator::{PathTracer, Technique};
 use furrow_render::scene::Scene;
@@ -168,7 +168,7 @@ fn keep(name: &str, got: &Estimate, reference: &Estimate) -> String {
         .collect();
     for (file, pixels) in [("image", picture(got)), ("reference", picture(reference)), ("p", p_map)] {
         let path = folder.join(format!("{file}.png"));
-        write_png(&path, SIZE.0, SIZE.1, &Picture::Rgb(&pixels), name).expect("an image");
+        write_png(&path, SIZE.0, SIZE.1, &ImageData::Rgb(&pixels), name).expect("an image");
     }
     folder.display().to_string()
 }

@@ -223,11 +223,11 @@ fn a_dataset_of_an_earlier_version_is_read_to_the_same_report() {
         std::fs::write(path, bytes).unwrap();
     }
     let run = |verb: &str| {
-        let said = crate::common::dataset::succeed(crate::common::dataset::verb(verb, &out, &[])).stderr;
-        String::from_utf8_lossy(&said).into_owned()
+        let message = crate::common::dataset::succeed(crate::common::dataset::verb(verb, &out, &[])).stderr;
+        String::from_utf8_lossy(&message).into_owned()
     };
-    let said = run("verify");
-    assert!(said.contains("2 of 2 images checked") && said.contains("; 0 faults"), "{said}");
+    let message = run("verify");
+    assert!(message.contains("2 of 2 images checked") && message.contains("; 0 faults"), "{message}");
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     for name in ["000000", "000001"] {
         let record = furrow_dataset::read::native::read_record(&out, name).unwrap();

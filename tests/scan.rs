@@ -165,13 +165,13 @@ fn a_beam_over_the_edge_of_a_leaf_has_two_echoes() {
         assert!((f64::from(shares[0]) - expected).abs() < 0.12, "{beyond}: {}, not {expected}", shares[0]);
         // The same echoes, selected by the return mode.
         let brightest = if leaf.intensity > soil.intensity { leaf } else { soil };
-        for (returns, told) in [
+        for (returns, recorded) in [
             ("First", vec![leaf]),
             ("Last", vec![soil]),
             ("Strongest", vec![brightest]),
             ("FirstAndLast", vec![leaf, soil]),
         ] {
-            assert_eq!(scanned(&stage, &aimed(returns, 3.33)), told, "{returns}");
+            assert_eq!(scanned(&stage, &aimed(returns, 3.33)), recorded, "{returns}");
         }
         let long = scanned(&stage, &aimed("All", 10.0));
         let [one] = long[..] else { panic!("{} echoes of a long pulse", long.len()) };
@@ -277,20 +277,23 @@ fn every_echo_has_the_labels_of_a_ray_of_its_own() {
         assert!((hit.t - echo.range).abs() < 1e-6 * hit.t, "{} {}", hit.t, echo.range);
         let tag = parts[hit.part as usize].tag;
         *seen.entry(tag.class as u8).or_insert(0) += 1;
-        let told = |name: &str| columns[name][k];
+        let recorded = |name: &str| columns[name][k];
         assert_eq!(
-            [told("class"), told("plant"), told("leaf")],
+            [recorded("class"), recorded("plant"), recorded("leaf")],
             [f64::from(tag.class as u8), f64::from(tag.plant), f64::from(tag.leaf)]
         );
-        assert_eq!(told("plant_id"), f64::from(ids.get(&tag.plant).copied().unwrap_or(0)));
+        assert_eq!(recorded("plant_id"), f64::from(ids.get(&tag.plant).copied().unwrap_or(0)));
         let at = pulse.origin + pulse.direction * hit.t;
         for (name, expected) in
             [("x", at.x), ("y", at.y), ("z", at.z), ("range", hit.t), ("azimuth", pulse.azimuth_deg)]
         {
-            assert!((told(name) - f64::from(expected)).abs() < 1e-5 * (1.0 + told(name).abs()), "{name}");
+            assert!((recorded(name) - f64::from(expected)).abs() < 1e-5 * (1.0 + recorded(name).abs()), "{name}");
         }
-        assert_eq!([told("beam"), told("return_number"), told("number_of_returns")], [f64::from(pulse.beam), 1.0, 1.0]);
-        assert!((told("reflectance") / (told("intensity") * told("range").powi(2)) - 1.0).abs() < 1e-5);
+        assert_eq!(
+            [recorded("beam"), recorded("return_number"), recorded("number_of_returns")],
+            [f64::from(pulse.beam), 1.0, 1.0]
+        );
+        assert!((recorded("reflectance") / (recorded("intensity") * recorded("range").powi(2)) - 1.0).abs() < 1e-5);
     }
     assert!([0, 1, 2].iter().all(|class| seen.get(class).is_some_and(|n| *n > 20)), "{seen:?}");
 }
@@ -423,15 +426,16 @@ fn a_scan_needs_no_light() {
         "camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5))";
     std::fs::write(&scene, format!("Field({camera}, {RAYS} lights: [])")).unwrap();
     let image = SceneFile::open(&scene).unwrap();
-    let warns =
-        |scene: SceneFile| scene.foretold(0).unwrap().iter().any(|words| words.contains("no light in the scene"));
+    let warns = |scene: SceneFile| {
+        scene.expected_warnings(0).unwrap().iter().any(|words| words.contains("no light in the scene"))
+    };
     assert!(!warns(image.clone().scanned(Scanner::OfScene)));
     assert!(warns(image));
 }
 
 /// Expected: exit code 2, one error with a remedy, and no file; then a scan that succeeds.
 #[test]
-fn mistakes_are_told_and_write_nothing() {
+fn errors_are_reported_and_write_nothing() {
     let (_keep, folder) = scratch();
     let out = folder.join("out");
     let written = |k: usize, more: &str| page(&folder, &format!("{k}.ron"), more).to_str().unwrap().to_owned();

@@ -147,7 +147,7 @@ fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
 }
 
 /// Returns the error for an invalid file, as the program prints it.
-fn told(path: &Path) -> String {
+fn message_of(path: &Path) -> String {
     match assemble::field(path, &Options { width: Some(16), ..Options::default() }) {
         Ok(_) => panic!("{}: it builds", path.display()),
         Err(e) => format!("error: {e}\n").replace('\\', "/"),
@@ -164,7 +164,7 @@ fn every_mistake_gets_exactly_the_words_beside_it() {
     assert!(bad().len() >= 24, "invalid scene files are missing");
     let mut wrong = Vec::new();
     for path in bad() {
-        let (words, beside) = (told(&path), path.with_extension("txt"));
+        let (words, beside) = (message_of(&path), path.with_extension("txt"));
         if bless {
             std::fs::write(&beside, &words).unwrap();
         }
@@ -191,7 +191,7 @@ fn pointed_at(words: &str) -> (usize, usize, String) {
 #[test]
 fn every_message_points_into_its_page_and_helps() {
     for path in bad() {
-        let words = told(&path);
+        let words = message_of(&path);
         assert!(words.contains("\n help: "), "no help: {words}");
         if path.file_stem().unwrap() == "binary" {
             continue;
@@ -218,7 +218,7 @@ fn the_caret_is_under_the_right_characters() {
         ("text_for_number", 2, 32, "\"0.85\""),
         ("too_many_plants", 6, 84, "(per_m2: 1e9)"),
     ] {
-        let words = told(Path::new(&format!("tests/bad/{name}.ron")));
+        let words = message_of(Path::new(&format!("tests/bad/{name}.ron")));
         assert_eq!(pointed_at(&words), (line, column, under.to_owned()), "{words}");
     }
 }
@@ -237,7 +237,7 @@ fn the_program_refuses_bad_pages_and_writes_nothing() {
             .unwrap();
         assert_eq!(done.status.code(), Some(2), "{}", path.display());
         assert!(done.stdout.is_empty(), "{}", path.display());
-        assert_eq!(String::from_utf8(done.stderr).unwrap(), told(&path));
+        assert_eq!(String::from_utf8(done.stderr).unwrap(), message_of(&path));
         assert!(!out.exists(), "{}: a folder was created", path.display());
     }
 }

@@ -252,10 +252,10 @@ fn images_of_days_do_not_depend_on_the_others() {
         let time = f64::from(k / 4) * 12.0 * 86_400.0 + f64::from(k / 2 % 2) * 0.1;
         assert!((capture.time_s - time).abs() < 1e-6, "{}", capture.time_s);
     }
-    let told = |record: &Record| -> BTreeMap<u32, (u32, f32)> {
+    let recorded = |record: &Record| -> BTreeMap<u32, (u32, f32)> {
         record.plants.iter().map(|p| (p.id.unwrap(), (p.number, p.grown.as_ref().unwrap().age_days))).collect()
     };
-    let (early, late) = (told(&records[0]), told(&records[4]));
+    let (early, late) = (recorded(&records[0]), recorded(&records[4]));
     let both: Vec<_> = early.iter().filter_map(|(id, then)| Some((then, late.get(id)?))).collect();
     assert!(both.len() > 1 && both.iter().all(|(then, now)| then.0 == now.0 && then.1 < now.1));
     for name in
@@ -294,12 +294,12 @@ fn images_of_days_do_not_depend_on_the_others() {
     assert!(fail(make(&one, &["--days", "9,21"]), 2).contains("days [21] there, [9,21] here"));
     // Tables contain the field, camera and day of their entries.
     succeed(verb("finish", &whole, &["--format", "coco,traits"]));
-    let told = std::fs::read(whole.join("coco/annotations/instances_train.json")).unwrap();
-    let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
+    let recorded = std::fs::read(whole.join("coco/annotations/instances_train.json")).unwrap();
+    let recorded: serde_json::Value = serde_json::from_slice(&recorded).unwrap();
     // A video contains the images of one camera over all days.
     for (video, name) in [(1, "000000-camera"), (2, "000000-right")] {
-        assert_eq!(told["videos"][video - 1]["name"], name);
-        let of = told["images"].as_array().unwrap().iter().filter(|image| image["video_id"] == video);
+        assert_eq!(recorded["videos"][video - 1]["name"], name);
+        let of = recorded["images"].as_array().unwrap().iter().filter(|image| image["video_id"] == video);
         assert!(of.map(|image| image["frame_id"].as_u64().unwrap()).eq(0..4), "{name}");
     }
     if let Some(python) = python("import pandas, pyarrow") {
@@ -311,24 +311,24 @@ fn images_of_days_do_not_depend_on_the_others() {
 /// without content for these images are omitted silently; named ones cause a warning. Optical flow, which has no target
 /// with one image per day, then has no files, and the dataset is complete.
 #[test]
-fn formats_that_have_nothing_to_tell_are_left_out() {
+fn formats_without_content_are_left_out() {
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).unwrap();
     let run = |out: &Path, scene: &str, more: &[&str]| {
         let size = ["--scene", scene, "--width", "64", "--quiet", "--out", path(out)];
-        let said = succeed(trace(&[&["sequence"][..], &size[..], more].concat())).stderr;
+        let printed = succeed(trace(&[&["sequence"][..], &size[..], more].concat())).stderr;
         let folders = tree(out).into_keys().filter_map(|name| Some(name.split_once('/')?.0.to_owned()));
         let formats: BTreeSet<String> = folders.filter(|name| format::named(name).is_some()).collect();
-        (String::from_utf8(said).unwrap(), formats.into_iter().collect::<Vec<_>>())
+        (String::from_utf8(printed).unwrap(), formats.into_iter().collect::<Vec<_>>())
     };
     let days = ["--days", "9,21", "--spp", "1"];
-    let (said, formats) = run(&folder.join("usual"), SMALL, &days);
-    assert!(!said.contains("one image a day"), "{said}");
+    let (printed, formats) = run(&folder.join("usual"), SMALL, &days);
+    assert!(!printed.contains("one image a day"), "{printed}");
     assert_eq!(formats, ["mots", "tum"]);
     let named = folder.join("named");
-    let (said, formats) = run(&named, SMALL, &[&days[..], &["--format", "colmap,flow,tum"]].concat());
+    let (printed, formats) = run(&named, SMALL, &[&days[..], &["--format", "colmap,flow,tum"]].concat());
     for name in ["colmap", "flow"] {
-        assert!(said.contains(&format!("warning: {name}: each field has one image a day")), "{said}");
+        assert!(printed.contains(&format!("warning: {name}: each field has one image a day")), "{printed}");
     }
     assert_eq!(formats, ["colmap", "tum"]);
     succeed(verb("render", &named, &["--quiet"]));
@@ -340,7 +340,7 @@ fn formats_that_have_nothing_to_tell_are_left_out() {
 }
 
 #[test]
-fn what_is_no_day_is_told() {
+fn invalid_days_are_reported() {
     let refused = |change: &dyn Fn(String) -> String| {
         let error = field_of(&change(bare("()")), &Options::default()).err().expect("refused").to_string();
         assert!(error.contains("help: "), "{error}");
@@ -356,8 +356,8 @@ fn what_is_no_day_is_told() {
         ("(to: 40, on: [9])", "given twice"),
         ("(from: 4.5)", "a whole number"),
     ] {
-        let told = refused(&|text| text.replace(days, &format!("days: {wrong},")));
-        assert!(told.contains(words) && told.contains("page.ron:1:"), "{told}");
+        let recorded = refused(&|text| text.replace(days, &format!("days: {wrong},")));
+        assert!(recorded.contains(words) && recorded.contains("page.ron:1:"), "{recorded}");
     }
 }
 

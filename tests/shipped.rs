@@ -123,14 +123,14 @@ fn a_name_that_no_species_has_is_shown_where_it_stands() {
         ("thistle.ron", "there is no file `thistle.ron`"),
     ] {
         std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", name)).unwrap();
-        let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
-        assert!(said.contains("mine.ron:5:") && said.contains(words), "{said}");
+        let message = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
+        assert!(message.contains("mine.ron:5:") && message.contains(words), "{message}");
     }
     // A file of the user takes precedence.
     std::fs::write(folder.join("cirsium"), "Species(").unwrap();
     std::fs::write(folder.join("mine.ron"), BY_NAME.replace("thistle", "cirsium")).unwrap();
-    let said = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
-    assert!(said.contains("cirsium:1:"), "{said}");
+    let message = refused(&run(&folder, repository(), &["--scene", "mine.ron"]));
+    assert!(message.contains("cirsium:1:"), "{message}");
 }
 
 #[test]

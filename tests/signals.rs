@@ -123,29 +123,29 @@ fn interrupted_while_it_grows(arguments: &[&str]) -> Option<(Option<i32>, String
         return None;
     };
     let mut talk = script.stdout.take().unwrap();
-    let (mut said, mut bytes) = (Vec::new(), [0; 4096]);
-    while !String::from_utf8_lossy(&said).contains("growing: ") {
+    let (mut message, mut bytes) = (Vec::new(), [0; 4096]);
+    while !String::from_utf8_lossy(&message).contains("growing: ") {
         let read = talk.read(&mut bytes).unwrap();
-        assert!(read > 0, "the program ended early: {}", String::from_utf8_lossy(&said));
-        said.extend_from_slice(&bytes[..read]);
+        assert!(read > 0, "the program ended early: {}", String::from_utf8_lossy(&message));
+        message.extend_from_slice(&bytes[..read]);
     }
-    let first = String::from_utf8_lossy(&said).lines().next().unwrap().trim().to_owned();
+    let first = String::from_utf8_lossy(&message).lines().next().unwrap().trim().to_owned();
     assert!(Command::new("kill").args(["-INT", &first]).status().unwrap().success(), "INT to {first}");
-    talk.read_to_end(&mut said).unwrap();
-    Some((end(&mut script).code(), String::from_utf8_lossy(&said).into_owned()))
+    talk.read_to_end(&mut message).unwrap();
+    Some((end(&mut script).code(), String::from_utf8_lossy(&message).into_owned()))
 }
 
 /// Returns the output of such a command after the progress line was cleared; its exit code must be 75. `None` if
 /// `script` is missing.
 #[cfg(target_os = "linux")]
-fn said_after_it_grew(arguments: &[&str]) -> Option<String> {
-    let (code, said) = interrupted_while_it_grows(arguments)?;
-    assert_eq!(code, Some(75), "{arguments:?}: {said}");
-    let (_, after) = said.rsplit_once("growing: ").unwrap();
+fn stderr_after_building(arguments: &[&str]) -> Option<String> {
+    let (code, message) = interrupted_while_it_grows(arguments)?;
+    assert_eq!(code, Some(75), "{arguments:?}: {message}");
+    let (_, after) = message.rsplit_once("growing: ").unwrap();
     // The line is cleared, then the message is printed on it.
     let (_, after) =
-        after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{arguments:?}: the line is not cleared: {said:?}"));
-    assert!(!after.contains("error"), "{arguments:?}: {said}");
+        after.split_once("\u{1b}[2K").unwrap_or_else(|| panic!("{arguments:?}: the line is not cleared: {message:?}"));
+    assert!(!after.contains("error"), "{arguments:?}: {message}");
     Some(after.to_owned())
 }
 
@@ -168,12 +168,12 @@ const MANY: u32 = 4000;
 /// with a note.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupt_while_a_plan_grows_its_field_is_told() {
+fn an_interrupt_during_a_plan_is_reported() {
     let (keep, data) = scratch();
     let page = keep.path().join("page.ron");
     let rest = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count"];
     let stopped = |verb: &[&str], words: &str| -> bool {
-        let Some(after) = said_after_it_grew(&[verb, &rest, &["5"]].concat()) else { return false };
+        let Some(after) = stderr_after_building(&[verb, &rest, &["5"]].concat()) else { return false };
         assert!(after.contains(&format!("{}: {words}", path(&data))), "{verb:?}: {after}");
         true
     };
@@ -195,13 +195,13 @@ fn an_interrupt_while_a_plan_grows_its_field_is_told() {
 /// Expected: the same for the cost estimate of a dataset, which builds fields like a plan and writes nothing.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupt_while_a_bill_grows_its_fields_is_told() {
+fn an_interrupt_during_a_cost_estimate_is_reported() {
     let (keep, data) = scratch();
     let page = keep.path().join("page.ron");
     write_weeds(&page, MANY);
     let order = ["--scene", path(&page), "--out", path(&data), "--width", "96", "--spp", "1", "--count", "5"];
     for (verb, estimate) in [(&["dataset"][..], "--dry-run"), (&["dataset", "plan"], "--estimate")] {
-        let Some(after) = said_after_it_grew(&[verb, &order, &[estimate]].concat()) else { return };
+        let Some(after) = stderr_after_building(&[verb, &order, &[estimate]].concat()) else { return };
         assert!(after.contains("stopped before it was done; nothing was written"), "{verb:?}: {after}");
         assert!(!after.contains("core hours") && !data.exists(), "{verb:?}: {after}");
     }

@@ -29,7 +29,7 @@ fn number(status: &Value, key: &str) -> f64 {
 }
 
 /// Returns the text output of `trace dataset status`.
-fn told(data: &Path, more: &[&str]) -> String {
+fn reported(data: &Path, more: &[&str]) -> String {
     String::from_utf8(succeed(verb("status", data, more)).stdout).unwrap()
 }
 
@@ -63,7 +63,7 @@ fn a_dataset_that_is_done_says_so() {
     }
     assert!(number(&found, "core_s") > 0.0 && number(&found, "peak_bytes") > 1e6, "{found}");
     // With `--watch` it ends at once, and it changes no file.
-    let words = told(&data, &["--watch"]);
+    let words = reported(&data, &["--watch"]);
     assert!(
         words.contains("4 of 4 images") && words.contains("all done") && words.contains("slowest images:"),
         "{words}"
@@ -71,7 +71,7 @@ fn a_dataset_that_is_done_says_so() {
     assert!(before == tree(&data));
     // The page has the same figures, and no longer reloads itself.
     let page = keep.path().join("status.html");
-    told(&data, &["--watch", "--page", path(&page)]);
+    reported(&data, &["--watch", "--page", path(&page)]);
     let html = fs::read_to_string(&page).unwrap();
     assert!(html.contains(r#"data-key="done" data-value="4""#) && html.contains("Slowest images"), "{html}");
     assert!(html.contains("000000") && !html.contains("location.reload"), "{html}");
@@ -99,7 +99,7 @@ fn images_whose_files_are_gone_are_missing() {
     // At the rate of the previous run, for four images.
     let expected = 4.0 * 3600.0 / number(&found, "images_per_hour");
     assert!((number(&found, "left_s") / expected - 1.0).abs() < 1e-6, "{found}");
-    let words = told(&data, &[]);
+    let words = reported(&data, &[]);
     assert!(words.contains("2 of 6 images") && words.contains("left") && !words.contains("all done"), "{words}");
     succeed(make(&data, 6, &[]));
     assert_eq!(number(&status(&data, &[]), "done"), 6.0);
@@ -157,7 +157,7 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
             fs::write(&log, lines.join("\n") + "\n").unwrap();
             let found = status(&data, &[]);
             assert_eq!((&found["shards"][0]["state"], number(&found, "working")), (&Value::from("silent"), 0.0));
-            assert!(told(&data, &[]).contains("possibly killed"));
+            assert!(reported(&data, &[]).contains("possibly killed"));
         }
     }
 }
@@ -186,7 +186,7 @@ fn watching_ends_with_a_signal() {
 
 /// The sun is below the horizon in some fields: those images fail, each with its error, until a run succeeds.
 #[test]
-fn images_that_fail_are_told_with_their_errors() {
+fn failed_images_are_listed_with_their_errors() {
     let (_keep, data) = scratch();
     let page = data.with_extension("ron");
     let text = |seed: u32| {
@@ -201,7 +201,7 @@ fn images_that_fail_are_told_with_their_errors() {
         trace(&plan).output().unwrap().status.success()
     });
     assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
-    let said = fail(verb("render", &data, &["--quiet"]), 2);
+    let message = fail(verb("render", &data, &["--quiet"]), 2);
     let found = status(&data, &[]);
     let failures = found["failures"].as_array().unwrap();
     assert!(!failures.is_empty());
@@ -212,17 +212,17 @@ fn images_that_fail_are_told_with_their_errors() {
         let error = failure["error"].as_str().unwrap();
         assert!(error.contains("below the horizon"), "{error}");
         let name = format!("{:06}", number(failure, "index"));
-        assert!(said.contains(&format!("image {name}: {error}")), "{name}: {error}: {said}");
+        assert!(message.contains(&format!("image {name}: {error}")), "{name}: {error}: {message}");
         assert!(!data.join("seals").join(format!("{name}.json")).exists(), "{name}");
     }
-    let words = told(&data, &[]);
+    let words = reported(&data, &[]);
     assert!(words.contains(&format!("{} failed", failures.len())) && words.contains("failed images:"), "{words}");
 }
 
 /// Expected: each shard has its own images, rate and state; the number of shards is inferred from the log, or can be
 /// given.
 #[test]
-fn shards_are_told_apart() {
+fn shards_are_reported_separately() {
     let (_keep, data) = scratch();
     succeed(trace(&[&["dataset", "plan", "--scene", SMALL, "--count", "5", "--out", path(&data)], &SIZE[..]].concat()));
     succeed(verb("render", &data, &["--shard", "1/2", "--quiet"]));
@@ -234,7 +234,7 @@ fn shards_are_told_apart() {
     let states: Vec<_> = shards.iter().map(|shard| shard["state"].as_str().unwrap()).collect();
     assert_eq!(states, ["missing", "done"]);
     assert!(shards[0]["images_per_hour"].is_null() && number(&shards[1], "images_per_hour") > 0.0);
-    let words = told(&data, &[]);
+    let words = reported(&data, &[]);
     assert!(words.contains("2 of 5 images") && words.contains("shard  images"), "{words}");
     assert_eq!(status(&data, &["--shards", "1"])["shards"].as_array().unwrap().len(), 1);
     succeed(verb("render", &data, &["--shard", "0/2", "--quiet"]));
@@ -244,19 +244,19 @@ fn shards_are_told_apart() {
 #[test]
 fn what_is_no_dataset_is_refused() {
     let (_keep, data) = scratch();
-    let said = fail(verb("status", &data, &[]), 2);
-    assert!(said.contains("this is no dataset") && said.contains(path(&data)), "{said}");
+    let message = fail(verb("status", &data, &[]), 2);
+    assert!(message.contains("this is no dataset") && message.contains(path(&data)), "{message}");
     fs::create_dir_all(&data).unwrap();
-    let said = fail(verb("status", &data, &["--watch"]), 2);
-    assert!(said.contains("it has no dataset.json") && said.contains("trace dataset plan"), "{said}");
+    let message = fail(verb("status", &data, &["--watch"]), 2);
+    assert!(message.contains("it has no dataset.json") && message.contains("trace dataset plan"), "{message}");
     fs::write(data.join("dataset.json"), "{}").unwrap();
-    let said = fail(verb("status", &data, &["--json"]), 1);
-    assert!(said.contains("not a dataset's recipe"), "{said}");
+    let message = fail(verb("status", &data, &["--json"]), 1);
+    assert!(message.contains("not a dataset's recipe"), "{message}");
     fail(verb("status", &data, &["--shards", "0"]), 2);
 }
 
 /// Returns the rows of a cost estimate by name.
-fn bill(arguments: &[&str]) -> BTreeMap<String, String> {
+fn estimate_rows(arguments: &[&str]) -> BTreeMap<String, String> {
     rows(trace(arguments))
 }
 
@@ -305,7 +305,7 @@ fn measured(folder: &Path) -> (u64, u64) {
 /// and memory are positive and within the range of a small machine; neither `--out` nor the temporary folder contains
 /// any file.
 #[test]
-fn the_bill_is_what_is_taken() {
+fn the_cost_estimate_matches_the_run() {
     let drive = "scenes/09-drive.ron";
     let orders: [(&str, &[&str]); 3] = [
         ("12", &["--scene", SMALL, "--width", "96", "--spp", "16", "--format", "coco,imagefolder,phenobench,yolo"]),
@@ -324,21 +324,21 @@ fn the_bill_is_what_is_taken() {
         dry.arg("--dry-run").env("TMPDIR", &temporary);
         let output = succeed(dry);
         assert!(!data.exists() && names(&temporary).is_empty(), "{order:?}");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(said.contains("rendering images, 1 of 3"), "a log must show the current step: {said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(message.contains("rendering images, 1 of 3"), "a log must show the current step: {message}");
         let rows = parsed(&output);
         if order.contains(&"64") {
             // `plan --estimate` prints the same rows; the cheapest order is enough.
             let arguments =
                 [&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--estimate"]].concat();
-            assert!(bill(&arguments).keys().eq(rows.keys()), "{order:?}");
+            assert!(estimate_rows(&arguments).keys().eq(rows.keys()), "{order:?}");
             assert!(!data.exists(), "{order:?}");
         }
         succeed(trace(&[&all[..], &["--quiet"]].concat()));
         let (files, bytes) = measured(&data);
         assert_eq!(first_number(&rows["files"]) as u64, files, "{order:?}");
-        let (_, told) = rows["disk"].split_once('(').unwrap();
-        let off = first_number(told) * 1e6 / bytes as f64;
+        let (_, reported) = rows["disk"].split_once('(').unwrap();
+        let off = first_number(reported) * 1e6 / bytes as f64;
         assert!((0.7..1.3).contains(&off), "{order:?}: {off} of {bytes} bytes");
         let (_, core) = rows["core hours"].split_once('(').unwrap();
         let memory = first_number(&rows["memory"]);
@@ -364,7 +364,7 @@ fn several(folder: &Path, days: &str) -> PathBuf {
 /// files and bytes of the dataset, and leave no file; the estimate refuses an inconsistent sequence with the same
 /// message as the run.
 #[test]
-fn the_bill_of_a_sequence_is_what_is_taken() {
+fn the_cost_estimate_of_a_sequence_matches_the_run() {
     for (days, fields, images) in
         [("", "2", "8 images of 2 fields"), ("days: (on: [9, 21]), ", "1", "8 images of 1 field")]
     {
@@ -383,8 +383,8 @@ fn the_bill_of_a_sequence_is_what_is_taken() {
         succeed(order("1", &[]));
         let (files, bytes) = measured(&data);
         assert_eq!(first_number(&rows["files"]) as u64, files, "{days}");
-        let (_, told) = rows["disk"].split_once('(').unwrap();
-        let off = first_number(told) * 1e6 / bytes as f64;
+        let (_, reported) = rows["disk"].split_once('(').unwrap();
+        let off = first_number(reported) * 1e6 / bytes as f64;
         assert!((0.7..1.3).contains(&off), "{days}: {off} of {bytes} bytes");
         let [dry, run] = [&["--dry-run"][..], &[]].map(|more| fail(order("2", more), 2));
         assert!(dry == run && dry.contains("spp 1 there, 2 here"), "{dry}");
@@ -408,7 +408,7 @@ fn a_dry_run_refuses_what_the_run_refuses() {
     let begun = ["--keep", "none", "--format", "coco"];
     succeed(order(&data, SMALL, "1", &[&["--count", "2"][..], &begun].concat()));
     let before = tree(keep.path());
-    for (out, scene, spp, more, told) in [
+    for (out, scene, spp, more, reported) in [
         (&data, "scenes/01-one-leaf.ron", "1", &["--count", "2"][..], "another dataset is in this folder: "),
         (&data, SMALL, "2", &["--count", "2"], "spp 1 there, 2 here"),
         (&data, SMALL, "1", &["--count", "2", "--seed", "7"], "seed 3 there, 7 here"),
@@ -418,7 +418,7 @@ fn a_dry_run_refuses_what_the_run_refuses() {
         (&full, SMALL, "1", &["--count", "2"], "this folder contains other files, such as notes.txt"),
     ] {
         let words = [&["--dry-run"][..], &[]].map(|dry| fail(order(out, scene, spp, &[more, dry].concat()), 2));
-        assert!(words[0] == words[1] && words[0].contains(told), "{more:?}: {words:?}");
+        assert!(words[0] == words[1] && words[0].contains(reported), "{more:?}: {words:?}");
         same(&tree(keep.path()), &before);
     }
     let longer = ["--count", "3", "--dry-run"];
@@ -455,25 +455,25 @@ fn peak_memory(mut command: Command) -> f64 {
 /// a few thousand pixels of a bare scene need little memory compared with the program itself, and would test nothing.
 /// Source: the kernel's accounting of the process.
 #[test]
-fn the_memory_of_a_bill_is_what_is_taken() {
+fn the_estimated_memory_matches_the_run() {
     let order = ["dataset", "--scene", "scenes/field.ron", "--width", "480", "--spp", "4", "--count", "4"];
     let order = [&order[..], &["--threads", "2"]].concat();
     let (_keep, data) = scratch();
-    let rows = bill(&[&order[..], &["--out", path(&data), "--dry-run"]].concat());
+    let rows = estimate_rows(&[&order[..], &["--out", path(&data), "--dry-run"]].concat());
     let words = rows["memory"].as_str();
     assert!(words.contains("for one image at a time, ") && words.ends_with(" with 2 cores"), "{words}");
-    for (told, at_once) in words.split(", ").zip(["1", "2"]) {
+    for (reported, at_once) in words.split(", ").zip(["1", "2"]) {
         let (_keep, data) = scratch();
         let order = [&order[..], &["--out", path(&data), "--at-once", at_once, "--quiet"]].concat();
         let taken = peak_memory(trace(&order)) / f64::from(1 << 30);
-        let off = first_number(told) / taken;
-        assert!((0.7..1.3).contains(&off), "{at_once} at once: {told} estimated, {taken} GiB used, {off}");
+        let off = first_number(reported) / taken;
+        assert!((0.7..1.3).contains(&off), "{at_once} at once: {reported} estimated, {taken} GiB used, {off}");
     }
 }
 
 /// Expected: Ctrl-C ends the estimate soon, with the exit code of an interruption, and leaves no file.
 #[test]
-fn a_bill_that_is_stopped_leaves_nothing() {
+fn a_stopped_cost_estimate_leaves_nothing() {
     let (keep, data) = scratch();
     let temporary = keep.path().join("temporary");
     fs::create_dir(&temporary).unwrap();
@@ -503,7 +503,7 @@ fn a_bill_that_is_stopped_leaves_nothing() {
 }
 
 #[test]
-fn orders_that_cannot_be_have_no_bill() {
+fn impossible_orders_have_no_cost_estimate() {
     let (_keep, data) = scratch();
     let order = |scene: &str, more: &[&str]| {
         trace(&[&["dataset", "--scene", scene, "--out", path(&data), "--count", "3", "--dry-run"], more].concat())

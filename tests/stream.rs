@@ -143,11 +143,11 @@ fn a_reader_that_leaves_ends_it_quietly() {
     }
     assert!(!crate::common::program::names(&folder).is_empty(), "the scene must be copied while the program runs");
     drop(out);
-    let mut said = String::new();
+    let mut message = String::new();
     let mut stderr = child.stderr.take().expect("stderr");
     assert_eq!(end(child).code(), Some(0));
-    stderr.read_to_string(&mut said).expect("text");
-    assert_eq!(said, "");
+    stderr.read_to_string(&mut message).expect("text");
+    assert_eq!(message, "");
     assert_eq!(crate::common::program::names(&folder), Vec::<String>::new());
 }
 
@@ -168,9 +168,9 @@ fn signals_end_it_while_nobody_reads() {
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill").success());
         let mut stderr = child.stderr.take().expect("stderr");
         assert_eq!(end(child).code(), Some(75), "{signal}");
-        let mut said = String::new();
-        stderr.read_to_string(&mut said).expect("text");
-        assert!(said.starts_with("stopped: ") && said.contains("\n help: --first "), "{signal}: {said}");
+        let mut message = String::new();
+        stderr.read_to_string(&mut message).expect("text");
+        assert!(message.starts_with("stopped: ") && message.contains("\n help: --first "), "{signal}: {message}");
         assert_eq!(crate::common::program::names(&folder), Vec::<String>::new(), "{signal}");
     }
 }
@@ -185,11 +185,11 @@ fn what_cannot_be_streamed_is_refused() {
         (&["--edit", "none-such"], "none-such"),
         (&["--keep", "colour"], "invalid value 'colour'"),
     ] {
-        let said = fail(stream(arguments), 2);
-        assert!(said.contains(words), "{arguments:?}: {said}");
+        let message = fail(stream(arguments), 2);
+        assert!(message.contains(words), "{arguments:?}: {message}");
     }
-    let said = fail(trace(&["stream", "--scene", "fild"]), 2);
-    assert!(said.contains("there is no such scene file") && said.contains("did you mean field"), "{said}");
+    let message = fail(trace(&["stream", "--scene", "fild"]), 2);
+    assert!(message.contains("there is no such scene file") && message.contains("did you mean field"), "{message}");
 }
 
 /// The program `script` provides a terminal; without it the test is skipped with a note.
@@ -202,9 +202,9 @@ fn a_terminal_is_refused() {
         eprintln!("skipped: no `script` makes a terminal here");
         return;
     };
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("error: stdout is a terminal") && said.lines().count() == 2, "{said}");
+    let message = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("error: stdout is a terminal") && message.lines().count() == 2, "{message}");
 }
 
 /// The sun is below the horizon in some fields. Expected: these are reported when they fail and again at the end, the
@@ -231,16 +231,16 @@ fn fields_that_cannot_be_made_are_left_out_and_named() {
     assert!(begun, "the sun was below the horizon in the first field of all twenty seeds");
     fail(trace(&["dataset", "render", path(&data), "--quiet"]), 2);
     let output = trace(&[&["stream", "--quiet"], &order[..]].concat()).output().expect("the program");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
     let found = files(&output.stdout);
     let there = keys(&found);
     assert!(!there.is_empty() && there.len() < 12, "{there:?}");
     for index in (0..12).filter(|index| !there.contains(index)) {
-        assert!(said.contains(&format!("warning: image {index:06} is left out: ")), "{said}");
-        assert!(said.contains(&format!("error: image {index:06}: ")), "{said}");
+        assert!(message.contains(&format!("warning: image {index:06} is left out: ")), "{message}");
+        assert!(message.contains(&format!("error: image {index:06}: ")), "{message}");
     }
-    assert!(said.contains("below the horizon"), "{said}");
+    assert!(message.contains("below the horizon"), "{message}");
     assert!(found.into_iter().collect::<BTreeMap<_, _>>() == of_dataset(&data), "bytes differ from the dataset's");
 }
 

@@ -69,9 +69,9 @@ fn whole() -> &'static (TempDir, PathBuf, Duration) {
         let (keep, out) = scratch();
         let begin = Instant::now();
         let output = succeed(table(&out, &[]));
-        let told: Vec<PathBuf> = String::from_utf8_lossy(&output.stdout).lines().map(PathBuf::from).collect();
-        assert!(told.len() >= 15 && told.iter().all(|p| p.is_file()), "{told:?}");
-        assert!(told.contains(&out.join("table-1.md")));
+        let listed: Vec<PathBuf> = String::from_utf8_lossy(&output.stdout).lines().map(PathBuf::from).collect();
+        assert!(listed.len() >= 15 && listed.iter().all(|p| p.is_file()), "{listed:?}");
+        assert!(listed.contains(&out.join("table-1.md")));
         (keep, out, begin.elapsed())
     })
 }
@@ -157,17 +157,21 @@ fn killed_at_many_moments_it_ends_as_if_never_killed() {
 /// Expected: wherever the disk fails first, exit code 1 and one error; then the same command ends with the same tables.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
-fn a_disk_that_fails_is_told_and_the_table_goes_on() {
+fn a_failing_disk_is_reported_and_the_table_goes_on() {
     let (_, expected, _) = whole();
     let expected = files(expected);
     let (_keep, out) = scratch();
     // All runs share one folder, as if space were freed little by little: each run gets further than the previous one.
     for at in [1, 4, 40, 150, 60, 30] {
         let ended = crate::common::faults::run(table(&out, &[]), &out, at, at % 4 == 0);
-        let said = ended.said();
-        assert_ne!(ended.failed, "none", "the run ended before change {at}: {said}");
-        assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {said}", ended.failed);
-        assert!(said.starts_with("error: ") && said.contains(" help: "), "change {at}, {}: {said}", ended.failed);
+        let message = ended.printed();
+        assert_ne!(ended.failed, "none", "the run ended before change {at}: {message}");
+        assert_eq!(ended.output.status.code(), Some(1), "change {at}, {}: {message}", ended.failed);
+        assert!(
+            message.starts_with("error: ") && message.contains(" help: "),
+            "change {at}, {}: {message}",
+            ended.failed
+        );
     }
     succeed(table(&out, &[]));
     same(&files(&out), &expected);
@@ -194,10 +198,10 @@ fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
         open_to_all(&out, 0o755);
         let before = tree(&out);
         let output = command.output().expect("the program");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.starts_with("error: ") && said.contains("Permission denied"), "{said}");
-        assert!(said.contains("\n help: "), "{said}");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.starts_with("error: ") && message.contains("Permission denied"), "{message}");
+        assert!(message.contains("\n help: "), "{message}");
         same(&tree(&out), &before);
     }
     succeed(table(&out, &[]));
@@ -275,9 +279,9 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
     ];
     for (from, to, words) in pages {
         std::fs::write(desk().join("wrong.ron"), page.replacen(from, to, 1)).expect("an experiment file");
-        let said = fail(renamed(&table(&out, &[]), "wrong.ron"), 2);
-        assert!(said.starts_with("error: ") && said.matches("error").count() == 1, "{said}");
-        assert!(said.contains(words), "{words}: {said}");
+        let message = fail(renamed(&table(&out, &[]), "wrong.ron"), 2);
+        assert!(message.starts_with("error: ") && message.matches("error").count() == 1, "{message}");
+        assert!(message.contains(words), "{words}: {message}");
         assert!(!out.exists());
     }
     let arguments: [(&[&str], &str); 6] = [
@@ -289,48 +293,48 @@ fn wrong_input_is_one_clear_error_and_leaves_nothing() {
         (&["--precision", "f8"], "there is no precision `f8`"),
     ];
     for (more, words) in arguments {
-        let said = fail(table(&out, more), 2);
-        assert!(said.contains(words), "{words}: {said}");
+        let message = fail(table(&out, more), 2);
+        assert!(message.contains(words), "{words}: {message}");
         assert!(!out.exists(), "{more:?}");
     }
     let mut unbound = Command::new(env!("CARGO_BIN_EXE_train"));
     unbound.current_dir(desk()).args(["table", "page.ron", "--out", path(&out.join("new"))]);
-    let said = fail(unbound, 2);
-    assert!(said.contains("`frames` (a few frames)") && said.contains("--real frames=DIR"), "{said}");
+    let message = fail(unbound, 2);
+    assert!(message.contains("`frames` (a few frames)") && message.contains("--real frames=DIR"), "{message}");
     assert!(!out.join("new").exists());
 }
 
 #[test]
-fn a_set_that_cannot_be_made_is_told_with_its_reason() {
+fn a_set_that_cannot_be_made_is_reported_with_its_reason() {
     let (_keep, out) = scratch();
     let page = std::fs::read_to_string(desk().join("page.ron")).expect("the experiment file");
     let (at, end) = (page.find("file: \"").expect("a scene") + 7, page.find("\", count").expect("a scene"));
     std::fs::write(desk().join("scene.ron"), "Field(seeed: 1)").expect("an experiment file");
     std::fs::write(desk().join("broken.ron"), format!("{}scene.ron{}", &page[..at], &page[end..]))
         .expect("an experiment file");
-    let said = fail(renamed(&table(&out, &[]), "broken.ron"), 2);
-    assert!(said.contains("scene.ron:1:7: unknown field `seeed`"), "{said}");
-    assert!(said.contains("the set `small` cannot be made"), "{said}");
+    let message = fail(renamed(&table(&out, &[]), "broken.ron"), 2);
+    assert!(message.contains("scene.ron:1:7: unknown field `seeed`"), "{message}");
+    assert!(message.contains("the set `small` cannot be made"), "{message}");
     assert!(!out.join("runs").exists());
 }
 
 #[test]
-fn a_dry_run_tells_the_rows_and_does_nothing() {
+fn a_dry_run_lists_the_rows_and_does_nothing() {
     let (_keep, out) = scratch();
     let output = succeed(table(&out, &["--dry-run"]));
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(said.lines().filter(|l| l.contains("missing")).count(), 4 + 8, "{said}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(message.lines().filter(|l| l.contains("missing")).count(), 4 + 8, "{message}");
     let cells = |line: &str| line.split('|').map(|cell| cell.trim().to_owned()).filter(|c| !c.is_empty()).collect();
-    let set = |said: &str, name: &str| -> Vec<String> {
-        said.lines().map(cells).find(|row: &Vec<String>| row.first().is_some_and(|c| c == name)).expect("a row")
+    let set = |message: &str, name: &str| -> Vec<String> {
+        message.lines().map(cells).find(|row: &Vec<String>| row.first().is_some_and(|c| c == name)).expect("a row")
     };
-    assert_eq!(set(&said, "small")[2..], ["48 × 36", "6", "0"], "{said}");
-    assert!(set(&said, "frames").contains(&"0".to_owned()), "{said}");
+    assert_eq!(set(&message, "small")[2..], ["48 × 36", "6", "0"], "{message}");
+    assert!(set(&message, "frames").contains(&"0".to_owned()), "{message}");
     assert!(!out.exists());
     let (_, done, _) = whole();
-    let said = succeed(table(done, &["--dry-run"])).stderr;
-    let said = String::from_utf8_lossy(&said);
-    assert_eq!(said.lines().filter(|l| l.contains("done") && l.contains("1 of 1")).count(), 4 + 8, "{said}");
-    assert_eq!(set(&said, "small")[2..], ["48 × 36", "6", "6"], "{said}");
-    assert_eq!(set(&said, "frames").last().map(String::as_str), Some("5"), "{said}");
+    let message = succeed(table(done, &["--dry-run"])).stderr;
+    let message = String::from_utf8_lossy(&message);
+    assert_eq!(message.lines().filter(|l| l.contains("done") && l.contains("1 of 1")).count(), 4 + 8, "{message}");
+    assert_eq!(set(&message, "small")[2..], ["48 × 36", "6", "6"], "{message}");
+    assert_eq!(set(&message, "frames").last().map(String::as_str), Some("5"), "{message}");
 }

@@ -22,14 +22,14 @@ const PAGE: &str = r"Field(
 )";
 
 /// Mean over the image and its variance for each band, the film's red channel, and the comment of the header.
-struct Shot {
+struct Rendered {
     mean: Vec<f64>,
     variance: Vec<f64>,
     red: Vec<f32>,
     comment: String,
 }
 
-fn shoot(folder: &Path, arguments: &[&str]) -> Shot {
+fn shoot(folder: &Path, arguments: &[&str]) -> Rendered {
     let species = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species/sugar_beet.ron");
     std::fs::create_dir_all(folder).unwrap();
     let page = folder.join("page.ron");
@@ -44,11 +44,11 @@ fn shoot(folder: &Path, arguments: &[&str]) -> Shot {
     };
     let n = layers["R"].len() as f64;
     let variance = mean("variance.").iter().map(|v| v / n).collect();
-    Shot { mean: mean(""), variance, red: layers["R"].clone(), comment }
+    Rendered { mean: mean(""), variance, red: layers["R"].clone(), comment }
 }
 
 /// Smallest p-value over the bands.
-fn p(a: &Shot, b: &Shot) -> f64 {
+fn p(a: &Rendered, b: &Rendered) -> f64 {
     let band = |i: usize| p_value((a.mean[i] - b.mean[i]) / (a.variance[i] + b.variance[i]).sqrt());
     (0..4).map(band).fold(1.0, f64::min)
 }
@@ -61,8 +61,8 @@ fn leaving_a_technique_out_changes_the_noise_but_not_the_mean() {
     let flags = ["mis", "roulette", "qmc", "light-sampling", "light-sampling,mis,roulette,qmc"];
     for flag in flags {
         let less = shoot(&out.join(flag), &["--without", flag]);
-        let told = format!("\nwithout: {}", flag.replace(',', ", "));
-        assert!(less.comment.ends_with(&told), "{}", less.comment);
+        let recorded = format!("\nwithout: {}", flag.replace(',', ", "));
+        assert!(less.comment.ends_with(&recorded), "{}", less.comment);
         assert!(less.red != all.red, "--without {flag} changes nothing");
         let p = p(&all, &less);
         assert!(p > sidak(1e-4, 4 * flags.len()), "--without {flag}: p = {p}, {:?} and {:?}", all.mean, less.mean);
@@ -70,12 +70,12 @@ fn leaving_a_technique_out_changes_the_noise_but_not_the_mean() {
 }
 
 #[test]
-fn limits_that_bias_are_found_to_bias_and_told() {
+fn biased_limits_are_found_to_bias_and_are_recorded() {
     let (_keep, out) = scratch();
     let all = shoot(&out.join("all"), &[]);
-    for (flags, told) in [(["--max-depth", "1"], "\nmax depth: 1"), (["--clamp", "1.5"], "\nclamp: 1.5")] {
+    for (flags, recorded) in [(["--max-depth", "1"], "\nmax depth: 1"), (["--clamp", "1.5"], "\nclamp: 1.5")] {
         let less = shoot(&out.join(flags[0]), &flags);
-        assert!(less.comment.ends_with(told), "{}", less.comment);
+        assert!(less.comment.ends_with(recorded), "{}", less.comment);
         let p = p(&all, &less);
         assert!(p < 1e-6, "{flags:?}: p = {p}, so the z-test would not find a bias");
         assert!(less.mean.iter().zip(&all.mean).all(|(l, a)| l <= a), "{flags:?} must not add light");

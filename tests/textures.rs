@@ -5,7 +5,7 @@
 
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::vec2;
-use furrow_optics::texture::draw::{self, Drawn, Margin, Recipe};
+use furrow_optics::texture::draw::{self, GeneratedTexture, Margin, Recipe};
 use furrow_optics::texture::{ColorSpace, Height, Texture, Wrap};
 use std::path::{Path, PathBuf};
 
@@ -328,7 +328,7 @@ fn odd_leaves_are_drawn_too() {
                   relief: Some(range_mm: 1, furrow_mm: 9, blister_mm: 9))"
             );
             let recipe = Recipe::Leaf(Box::new(ron::from_str(&page).unwrap_or_else(|e| panic!("{page}: {e}"))));
-            let drawn: Drawn = draw::draw(&recipe).unwrap();
+            let drawn: GeneratedTexture = draw::draw(&recipe).unwrap();
             assert_eq!(drawn.rgba.len(), drawn.width as usize * drawn.height as usize * 4);
         }
     }

@@ -35,7 +35,7 @@ struct Watched {
     /// `127.0.0.1:port`, and the path that starts with the token.
     host: String,
     base: String,
-    said: BufReader<std::process::ChildStderr>,
+    message: BufReader<std::process::ChildStderr>,
 }
 
 impl Watched {
@@ -63,13 +63,13 @@ impl Watched {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        let mut said = BufReader::new(program.stderr.take().unwrap());
+        let mut message = BufReader::new(program.stderr.take().unwrap());
         let mut line = String::new();
-        said.read_line(&mut line).unwrap();
+        message.read_line(&mut line).unwrap();
         let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}")).trim();
         let (host, base) = address.split_once('/').unwrap();
         let (host, base) = (host.to_owned(), format!("/{base}"));
-        Self { program, folder, host, base, said }
+        Self { program, folder, host, base, message }
     }
 
     fn file(&self) -> PathBuf {
@@ -135,7 +135,7 @@ impl Watched {
             std::thread::sleep(Duration::from_millis(10));
         };
         let mut rest = String::new();
-        self.said.read_to_string(&mut rest).unwrap();
+        self.message.read_to_string(&mut rest).unwrap();
         (code, rest)
     }
 }
@@ -174,7 +174,7 @@ impl Events {
 }
 
 #[test]
-fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_words() {
+fn a_saved_file_is_shown_and_its_error_is_reported_in_the_programs_words() {
     let watched = Watched::start(&[]);
     let mut events = watched.events();
     let first = events.done();
@@ -200,12 +200,12 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
     let last = view("rgb");
     watched.save(&good.replace("turn_deg", "turn_dge"));
     let broken = events.until(|s| !s["error"].is_null());
-    let said = Command::new(env!("CARGO_BIN_EXE_trace"))
+    let message = Command::new(env!("CARGO_BIN_EXE_trace"))
         .current_dir(watched.folder.path())
         .args(["--scene", "a.ron"])
         .output()
         .unwrap();
-    assert_eq!(format!("{}\n", broken["error"].as_str().unwrap()), String::from_utf8(said.stderr).unwrap());
+    assert_eq!(format!("{}\n", broken["error"].as_str().unwrap()), String::from_utf8(message.stderr).unwrap());
     assert!(
         broken["error"].as_str().unwrap().contains("a.ron:6:")
             && broken["error"].as_str().unwrap().contains("^^^^^^^^")
@@ -229,9 +229,9 @@ fn a_file_that_is_saved_is_shown_and_a_mistake_in_it_is_told_in_the_programs_wor
     });
     std::fs::write(watched.folder.path().join("beet.ron"), own + "// saved\n").unwrap();
     events.until(|s| s["picture"]["hash"] != named["picture"]["hash"]);
-    let (code, said) = watched.end("INT");
-    assert_eq!(code, Some(75), "{said}");
-    assert!(said.contains("ssh -L") && said.contains("stopped watching"), "{said}");
+    let (code, message) = watched.end("INT");
+    assert_eq!(code, Some(75), "{message}");
+    assert!(message.contains("ssh -L") && message.contains("stopped watching"), "{message}");
 }
 
 /// Rationale: a model's materials and textures are named in the model, not in the scene file, and users who repair them
@@ -318,7 +318,7 @@ fn a_field_that_cannot_grow_leaves_the_picture_and_the_other_fields() {
 }
 
 #[test]
-fn a_pixel_tells_what_it_shows() {
+fn a_pixel_reports_what_it_shows() {
     let watched = Watched::start(&[]);
     watched.events().done();
     let at = |x: u32, y: u32| -> Value { serde_json::from_slice(&watched.get(&format!("at?x={x}&y={y}")).1).unwrap() };
@@ -410,8 +410,8 @@ fn slow_and_endless_requests_stop_nothing() {
     let slow: Vec<TcpStream> = (0..70).map(|_| open(&head)).collect();
     assert_eq!(watched.get("state").0, 200);
     let begin = Instant::now();
-    let (code, said) = watched.end("INT");
-    assert_eq!(code, Some(75), "{said}");
+    let (code, message) = watched.end("INT");
+    assert_eq!(code, Some(75), "{message}");
     // Half a second is enough; the machine may be busy.
     assert!(begin.elapsed() < Duration::from_secs(3), "{:?}", begin.elapsed());
     drop(slow);
@@ -430,8 +430,8 @@ fn a_slider_is_a_look_until_it_is_written() {
     let moved = events.until(|s| s["picture"]["asked"] == s["asked"] && s["picture"]["index"] == 2);
     assert_ne!(moved["picture"]["hash"], first["picture"]["hash"]);
     assert_eq!(watched.text(), before, "a request for an image must not write to the file");
-    let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": 12 }));
-    assert_eq!(status, 200, "{said}");
+    let (status, message) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": 12 }));
+    assert_eq!(status, 200, "{message}");
     assert_eq!(watched.text(), before.replace("Choice([14, 16])", "12"), "comments and all other text must stay");
     let written =
         events.until(|s| s["values"].as_object().is_some_and(|v| v.len() == 1) && s["picture"]["asked"] == s["asked"]);
@@ -439,9 +439,9 @@ fn a_slider_is_a_look_until_it_is_written() {
     assert_eq!(watched.post("write", &json!({ "path": "nothing", "value": 1 })).0, 400);
     // An invalid value is not written to the file.
     let before = watched.text();
-    let (status, said) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": -1 }));
-    assert_eq!(status, 400, "{said}");
-    assert!(said.contains("nothing was written"), "{said}");
+    let (status, message) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": -1 }));
+    assert_eq!(status, 400, "{message}");
+    assert!(message.contains("nothing was written"), "{message}");
     assert_eq!(watched.text(), before);
     assert_eq!(watched.post("wish", &json!({ "values": {}, "index": 0, "seed": 9, "sheet": true })).0, 200);
     let sheet = events.until(|s| s["sheet"]["done"] == 12);
@@ -563,15 +563,15 @@ fn too_many_connections_end_nothing() {
         let mut stream = connect().ok()?;
         stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
         write!(stream, "GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", watched.base, watched.host).ok()?;
-        let mut said = Vec::new();
-        stream.read_to_end(&mut said).ok()?;
-        said.starts_with(b"HTTP/1.1 200").then_some(())
+        let mut message = Vec::new();
+        stream.read_to_end(&mut message).ok()?;
+        message.starts_with(b"HTTP/1.1 200").then_some(())
     };
     while answers().is_none() {
         assert!(begin.elapsed() < PATIENCE, "the program never answered again");
         std::thread::sleep(Duration::from_millis(100));
     }
-    let (code, said) = watched.end("TERM");
-    assert_eq!(code, Some(75), "{said}");
-    assert!(said.contains("too many connections"), "the limit was not reached: {said}");
+    let (code, message) = watched.end("TERM");
+    assert_eq!(code, Some(75), "{message}");
+    assert!(message.contains("too many connections"), "the limit was not reached: {message}");
 }

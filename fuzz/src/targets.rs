@@ -134,7 +134,7 @@ fn obj(bytes: &[u8]) {
 
 /// Returns a PNG file of 4 × 3 pixels.
 fn picture() -> Vec<u8> {
-    furrow_output::encode_png(4, 3, &furrow_output::Picture::Rgb(&[[90, 120, 60]; 12]), "").expect("a picture")
+    furrow_output::encode_png(4, 3, &furrow_output::ImageData::Rgb(&[[90, 120, 60]; 12]), "").expect("a picture")
 }
 
 fn coco(bytes: &[u8]) {

@@ -59,13 +59,13 @@ fn a_shard_goes_on_on_another_node() {
     }
     drawn_once(&folder, COUNT);
     assert_eq!(names(&disk("node 2").join("it's furrow")), Vec::<String>::new());
-    let told = succeed(verb("status", &folder, &["--json"]));
-    assert!(String::from_utf8_lossy(&told.stdout).contains(r#""images":16,"done":16,"#));
+    let status_json = succeed(verb("status", &folder, &["--json"]));
+    assert!(String::from_utf8_lossy(&status_json.stdout).contains(r#""images":16,"done":16,"#));
     let mut finish = std::process::Command::new("bash");
     finish.arg(jobs.join("finish.sbatch")).env("SLURM_CPUS_PER_TASK", "1");
-    let said = succeed(finish);
-    let said = String::from_utf8_lossy(&said.stderr);
-    assert!(said.contains("16 of 16 images checked, 1 rendered again and the same; 0 faults"), "{said}");
+    let message = succeed(finish);
+    let message = String::from_utf8_lossy(&message.stderr);
+    assert!(message.contains("16 of 16 images checked, 1 rendered again and the same; 0 faults"), "{message}");
     same(&files(&folder), &whole_with(COUNT, &PACKS));
 }
 
@@ -120,22 +120,22 @@ fn start_heard(folder: &Path, disk: &Path) -> Child {
 
 /// Waits until a program prints a line, and returns it.
 fn line(child: &mut Child) -> String {
-    let mut said = Vec::new();
+    let mut message = Vec::new();
     let words = child.stderr.as_mut().unwrap();
     // Byte by byte, so that nothing after the line is consumed.
     let mut byte = [0];
     while words.read_exact(&mut byte).is_ok() && byte != *b"\n" {
-        said.push(byte[0]);
+        message.push(byte[0]);
     }
-    String::from_utf8(said).unwrap()
+    String::from_utf8(message).unwrap()
 }
 
 /// Waits for a program to end; returns its exit code and the rest of its standard error.
 fn ended(mut child: Child) -> (Option<i32>, String) {
     let status = end(&mut child);
-    let mut said = String::new();
-    child.stderr.as_mut().unwrap().read_to_string(&mut said).unwrap();
-    (status.code(), said)
+    let mut message = String::new();
+    child.stderr.as_mut().unwrap().read_to_string(&mut message).unwrap();
+    (status.code(), message)
 }
 
 /// Three runs of one shard in the same folder: first the third, which waits, is stopped, then the first, which works,
@@ -154,8 +154,11 @@ fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
     until("drawn", || !made(&folder).is_empty());
     let [mut second, mut third] = [(); 2].map(|()| start_heard(&folder, &disk));
     for waiting in [&mut second, &mut third] {
-        let said = line(waiting);
-        assert!(said.starts_with("warning: another run of shard 0/2 works in ") && said.contains("waits"), "{said}");
+        let message = line(waiting);
+        assert!(
+            message.starts_with("warning: another run of shard 0/2 works in ") && message.contains("waits"),
+            "{message}"
+        );
     }
     let command = format!("`trace dataset render {} --shard 0/2 --scratch {}`", path(&folder), path(&disk));
     // The waiting run is stopped first; otherwise it might start working before it handles its own signal.
@@ -163,13 +166,13 @@ fn runs_of_one_shard_in_one_place_work_one_after_the_other() {
         [("TERM", third, "while another run of shard 0/2 was at work"), ("USR1", first, "of 12 images are complete")]
     {
         send(signal, &child);
-        let (code, said) = ended(child);
-        assert_eq!(code, Some(75), "{said}");
-        assert!(said.starts_with(&format!("{}: stopped", path(&folder))), "{said}");
-        assert!(said.contains(words) && said.contains(&command) && !said.contains("-0-of-2"), "{said}");
+        let (code, message) = ended(child);
+        assert_eq!(code, Some(75), "{message}");
+        assert!(message.starts_with(&format!("{}: stopped", path(&folder))), "{message}");
+        assert!(message.contains(words) && message.contains(&command) && !message.contains("-0-of-2"), "{message}");
     }
-    let (code, said) = ended(second);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, message) = ended(second);
+    assert_eq!(code, Some(0), "{message}");
     drawn_once(&folder, COUNT / 2);
     assert_eq!(names(&disk), Vec::<String>::new());
     succeed(verb("render", &folder, &["--quiet"]));
@@ -218,7 +221,7 @@ fn scripts_name_the_nodes_own_folder() {
         (["--scheduler", "kubernetes", "--scratch", "/tmp/furrow"], "--scratch is for slurm and parallel"),
         (["--scheduler", "slurm", "--scratch", "a\nb"], "is not a folder"),
     ] {
-        let said = fail(verb("emit", &folder, &[&order[..], &["--shards", "2"]].concat()), 2);
-        assert!(said.contains(words), "{said}");
+        let message = fail(verb("emit", &folder, &[&order[..], &["--shards", "2"]].concat()), 2);
+        assert!(message.contains(words), "{message}");
     }
 }

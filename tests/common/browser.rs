@@ -31,10 +31,10 @@ pub fn probe(browser: &Path, folder: &Path, page: &Path, width: i64) -> Value {
         .arg(format!("file://{}", page.display()))
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    let console: Vec<&str> = said.lines().filter(|l| l.contains("CONSOLE")).collect();
+    let message = String::from_utf8_lossy(&output.stderr);
+    let console: Vec<&str> = message.lines().filter(|l| l.contains("CONSOLE")).collect();
     assert_eq!(console, Vec::<&str>::new(), "the browser's console");
     let dom = String::from_utf8_lossy(&output.stdout);
     let probe = dom.split("data-probe=\"").nth(1).and_then(|rest| rest.split('"').next());
-    serde_json::from_str(&probe.unwrap_or_else(|| panic!("{said}")).replace("&quot;", "\"")).unwrap()
+    serde_json::from_str(&probe.unwrap_or_else(|| panic!("{message}")).replace("&quot;", "\"")).unwrap()
 }

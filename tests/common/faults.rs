@@ -43,7 +43,7 @@ pub struct Ended {
 
 impl Ended {
     /// Returns the program's standard error output.
-    pub fn said(&self) -> String {
+    pub fn printed(&self) -> String {
         String::from_utf8_lossy(&self.output.stderr).into_owned()
     }
 }
@@ -51,15 +51,15 @@ impl Ended {
 /// Runs a command and makes its file operation number `at` below `folder` fail, and all later ones too if `lasts`; 0
 /// lets all succeed.
 pub fn run(mut command: Command, folder: &Path, at: u64, lasts: bool) -> Ended {
-    let told = tempfile::NamedTempFile::new().expect("a file");
-    command.env("LD_PRELOAD", library()).env("FAULT_FOLDER", folder).env("FAULT_COUNT", told.path());
+    let counts = tempfile::NamedTempFile::new().expect("a file");
+    command.env("LD_PRELOAD", library()).env("FAULT_FOLDER", folder).env("FAULT_COUNT", counts.path());
     command.env("FAULT_AT", at.to_string()).envs(AS_IT_BEGAN);
     if lasts {
         command.env("FAULT_LASTS", "1");
     }
     let output = command.output().expect("the program");
-    let told = std::fs::read_to_string(told.path()).expect("the count");
-    let (changes, failed) = told.trim().split_once(' ').unwrap_or(("0", "none"));
+    let counts = std::fs::read_to_string(counts.path()).expect("the count");
+    let (changes, failed) = counts.trim().split_once(' ').unwrap_or(("0", "none"));
     Ended { output, changes: changes.parse().expect("a number"), failed: failed.into() }
 }
 
@@ -86,12 +86,13 @@ pub fn moments(changes: u64, between: u64) -> Vec<u64> {
 /// behind.
 pub fn failed_well(ended: &Ended, folder: &Path, at: u64) {
     // Warnings may precede the error.
-    let said: Vec<String> = ended.said().lines().filter(|l| !l.starts_with("warning: ")).map(str::to_owned).collect();
-    let said = said.join("\n");
-    let what = format!("change {at}, {}: {said}", ended.failed);
+    let message: Vec<String> =
+        ended.printed().lines().filter(|l| !l.starts_with("warning: ")).map(str::to_owned).collect();
+    let message = message.join("\n");
+    let what = format!("change {at}, {}: {message}", ended.failed);
     assert_eq!(ended.output.status.code(), Some(1), "{what}");
-    assert!(said.starts_with("error: ") && said.matches("error: ").count() == 1, "{what}");
-    assert!(said.contains("\n help: "), "{what}");
+    assert!(message.starts_with("error: ") && message.matches("error: ").count() == 1, "{what}");
+    assert!(message.contains("\n help: "), "{what}");
     if folder.exists() {
         assert!(tree(folder).keys().all(|name| !name.contains(".furrow-")), "{what}");
     }
@@ -110,7 +111,7 @@ pub fn each_is_gone_on_from(
     let place = |out: &Path| within.map_or(out.to_path_buf(), |part| out.join(part));
     let (_keep, out) = scratch();
     let undisturbed = run(make(&out), &place(&out), 0, false);
-    assert!(undisturbed.output.status.success(), "{}", undisturbed.said());
+    assert!(undisturbed.output.status.success(), "{}", undisturbed.printed());
     assert!(undisturbed.changes > 4, "{} changes", undisturbed.changes);
     let whole = tree(&out);
     for at in moments(undisturbed.changes, between) {

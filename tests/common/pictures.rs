@@ -1,6 +1,6 @@
 //! Images that a failed test leaves in `target/test-failures/<name>/`: the result, the reference and their difference.
 
-use furrow_output::{Picture, write_png};
+use furrow_output::{ImageData, write_png};
 use std::path::{Path, PathBuf};
 
 /// Returns the folder for failures of this name.
@@ -25,7 +25,8 @@ pub fn keep(name: &str, width: u32, image: &[u32], reference: &[u32]) -> String 
     let difference: Vec<[u8; 3]> =
         image.iter().zip(reference).map(|(a, b)| if a == b { [0; 3] } else { [255; 3] }).collect();
     for (file, pixels) in [("image", paint(image)), ("reference", paint(reference)), ("difference", difference)] {
-        write_png(&folder.join(format!("{file}.png")), width, height, &Picture::Rgb(&pixels), name).expect("an image");
+        write_png(&folder.join(format!("{file}.png")), width, height, &ImageData::Rgb(&pixels), name)
+            .expect("an image");
     }
     folder.display().to_string()
 }

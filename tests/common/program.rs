@@ -7,7 +7,7 @@ use furrow_field::assemble::{self, Options};
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::film::Film;
 use furrow_render::integrator::{PathTracer, World};
-use furrow_render::render::{self, LabelMap, Settings, Watch};
+use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
@@ -73,7 +73,7 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
         let window = Window::full(scene.camera.width(), scene.camera.height());
         let settings = Settings { spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let stop = AtomicBool::new(false);
-        let watch = Watch { done: &|_| (), stop: &stop };
+        let watch = RenderMonitor { done: &|_| (), stop: &stop };
         let world = World { scene, geometry: &geometry };
         let film = render::render(&world, &PathTracer::default(), &settings, &watch).expect("a film");
         (film, render::label(&geometry, &scene.parts, &scene.camera, window))

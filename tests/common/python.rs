@@ -16,19 +16,19 @@ fn first(before: impl Iterator<Item = PathBuf>, probe: &str) -> Option<PathBuf> 
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/venv/bin/python");
     let named = std::env::var_os("FURROW_PYTHON").map(PathBuf::from);
     let candidates = [Some(own), named, Some("python3".into())];
-    let mut said = Vec::new();
+    let mut message = Vec::new();
     for candidate in before.chain(candidates.into_iter().flatten()) {
         match Command::new(&candidate).args(["-c", probe]).output() {
             Ok(output) if output.status.success() => return Some(candidate),
             Ok(output) => {
                 let words = String::from_utf8_lossy(&output.stderr);
                 let last = words.lines().last().map_or_else(|| output.status.to_string(), str::to_owned);
-                said.push(format!("{}: {last}", candidate.display()));
+                message.push(format!("{}: {last}", candidate.display()));
             }
-            Err(e) => said.push(format!("{}: {e}", candidate.display())),
+            Err(e) => message.push(format!("{}: {e}", candidate.display())),
         }
     }
-    let words = format!("no Python runs `{probe}`:\n{}", said.join("\n"));
+    let words = format!("no Python runs `{probe}`:\n{}", message.join("\n"));
     assert!(std::env::var_os("FURROW_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{words}");
     eprintln!("skipped: {words}");
     None

@@ -10,7 +10,7 @@ use furrow_render::accel::EmbreeAccel;
 use furrow_render::film::{Film, Filter};
 use furrow_render::integrator::{Integrator, World};
 use furrow_render::material::Material;
-use furrow_render::render::{self, Settings, Watch};
+use furrow_render::render::{self, RenderMonitor, Settings};
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Part, Scene};
 use std::sync::Arc;
@@ -84,11 +84,15 @@ pub fn shoot_with(scene: &Scene, integrator: &dyn Integrator, points: Points, sp
 }
 
 /// Calls `f` in a thread pool with a scene whose acceleration structure is built.
-pub fn with_world<T: Send>(scene: &Scene, threads: usize, f: impl FnOnce(&World<'_>, &Watch<'_>) -> T + Send) -> T {
+pub fn with_world<T: Send>(
+    scene: &Scene,
+    threads: usize,
+    f: impl FnOnce(&World<'_>, &RenderMonitor<'_>) -> T + Send,
+) -> T {
     render::pool(threads).expect("a pool").install(|| {
         let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
         let stop = AtomicBool::new(false);
-        f(&World { scene, geometry: &accel }, &Watch { done: &|_| (), stop: &stop })
+        f(&World { scene, geometry: &accel }, &RenderMonitor { done: &|_| (), stop: &stop })
     })
 }
 

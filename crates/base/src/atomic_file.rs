@@ -73,11 +73,11 @@ pub fn create_atomically(path: &Path, bytes: &[u8]) -> Result<bool> {
 /// All are complete under temporary names before the first is renamed. If the disk is full, the previous files stay and
 /// are never mixed with new ones. If a rename fails, the earlier renames are undone.
 #[derive(Default)]
-pub struct Together {
+pub struct FileSet {
     waiting: Vec<(TempPath, PathBuf)>,
 }
 
-impl Together {
+impl FileSet {
     /// Adds a file.
     pub fn add(&mut self, path: &Path, bytes: &[u8]) -> Result<()> {
         if path.is_dir() {
@@ -158,11 +158,11 @@ impl Replaced {
     }
 }
 
-/// Writes a set of files as [`Together`] does and returns their paths. `add` adds the files; it is called again if
+/// Writes a set of files as [`FileSet`] does and returns their paths. `add` adds the files; it is called again if
 /// another program removes temporary files.
-pub fn write_together(folder: &Path, add: impl Fn(&mut Together) -> Result<()>) -> Result<Vec<PathBuf>> {
+pub fn write_together(folder: &Path, add: impl Fn(&mut FileSet) -> Result<()>) -> Result<Vec<PathBuf>> {
     for _ in 0..MOST_AGAIN {
-        let mut files = Together::default();
+        let mut files = FileSet::default();
         add(&mut files)?;
         if let Some(paths) = files.finish()? {
             return Ok(paths);
@@ -317,7 +317,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [a, b, c] = ["a", "b", "c"].map(|name| folder.path().join(name));
         fs::write(&a, "old").unwrap();
-        let mut files = Together::default();
+        let mut files = FileSet::default();
         for path in [&a, &b, &c] {
             files.add(path, b"new").unwrap();
         }
@@ -331,7 +331,7 @@ mod tests {
     fn two_names_of_one_file_leave_nothing_beside_them() {
         let folder = tempfile::tempdir().unwrap();
         let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
-        let mut files = Together::default();
+        let mut files = FileSet::default();
         files.add(&a, b"x").unwrap();
         files.add_equal(&a, &b, b"x").unwrap();
         // Another program has given the same file its second name.

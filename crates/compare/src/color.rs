@@ -3,7 +3,7 @@
 //! Source: Sharma, Wu & Dalal 2005, "The CIEDE2000 Color-Difference Formula: Implementation Notes, Supplementary Test Data, and
 //! Mathematical Observations"; all weights 1.
 
-use super::picture::Picture;
+use super::raster_image::RasterImage;
 use palette::color_difference::Ciede2000;
 use palette::white_point::D65;
 use palette::{IntoColor, Lab, LinSrgb, Srgb};
@@ -32,7 +32,7 @@ pub(super) fn coded(value: f32) -> u8 {
 }
 
 /// Returns ΔE₀₀ of each pixel, in CIELAB relative to sRGB white, D65. Both images must have the same size.
-pub(super) fn map(a: &Picture, b: &Picture) -> Vec<f32> {
+pub(super) fn map(a: &RasterImage, b: &RasterImage) -> Vec<f32> {
     let lab = |[r, g, b]: [u8; 3]| -> Lab<D65, f64> { Srgb::new(r, g, b).into_format::<f64>().into_color() };
     let differ = |(a, b): (&[u8; 3], &[u8; 3])| if a == b { 0.0 } else { lab(*a).difference(lab(*b)) as f32 };
     a.rgb.par_iter().zip(&b.rgb).map(differ).collect()

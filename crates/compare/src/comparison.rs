@@ -1,10 +1,10 @@
 //! Comparison of two paths: finds pairs and measures them.
 
+use super::display_pair::{DisplayPair, worst};
 use super::figures::{Compared, figures, maps};
 use super::flip::PIXELS_PER_DEGREE;
 use super::pairs::{Pair, Pairs};
-use super::picture::{Picture, read_labels};
-use super::shot::{Shot, worst};
+use super::raster_image::{RasterImage, read_labels};
 use super::summary::{Summary, summaries};
 use furrow_base::{Error, Result};
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ pub struct Comparison {
     /// Means over the pairs, for each band and region.
     pub means: Vec<Summary>,
     /// Pairs for display, by decreasing FLIP.
-    pub shots: Vec<Shot>,
+    pub display_pairs: Vec<DisplayPair>,
 }
 
 /// Compares `b` with the reference `a`: two images, or two folders whose images are paired by name.
@@ -55,7 +55,7 @@ impl Comparison {
         }
         let shown = options.shown.min(found.pairs.len());
         let mut compared = Vec::with_capacity(found.pairs.len());
-        let mut shots = Vec::new();
+        let mut display_pairs = Vec::new();
         // One pair per thread at a time, so that few images for display are in memory.
         for some in found.pairs.chunks(rayon::current_num_threads()) {
             let measured = some.par_iter().map(|pair| {
@@ -65,14 +65,14 @@ impl Comparison {
             });
             // If several pairs fail, the first one by name is reported.
             for measured in measured.collect::<Vec<Result<_>>>() {
-                let (pair, shot) = measured?;
+                let (pair, display_pair) = measured?;
                 compared.push(pair);
-                shots.extend(shot);
+                display_pairs.extend(display_pair);
             }
-            worst(&mut shots, shown);
+            worst(&mut display_pairs, shown);
         }
         let means = summaries(&compared);
-        Ok(Self { found, pixels_per_degree: options.pixels_per_degree, pairs: compared, means, shots })
+        Ok(Self { found, pixels_per_degree: options.pixels_per_degree, pairs: compared, means, display_pairs })
     }
 }
 
@@ -91,13 +91,14 @@ fn check(pair: &Pair, found: &Pairs) -> Result<()> {
 
 /// Measures a pair. If `shown`, the number of pairs on the page, is not 0, the images for the page are returned as
 /// well.
-fn measure(pair: &Pair, pixels_per_degree: f32, shown: usize) -> Result<(Compared, Option<Shot>)> {
+fn measure(pair: &Pair, pixels_per_degree: f32, shown: usize) -> Result<(Compared, Option<DisplayPair>)> {
     let nir = pair.nir.as_ref();
-    let a = Picture::read(&pair.a, nir.map(|(a, _)| a.as_path()))?;
-    let b = Picture::read(&pair.b, nir.map(|(_, b)| b.as_path()))?;
+    let a = RasterImage::read(&pair.a, nir.map(|(a, _)| a.as_path()))?;
+    let b = RasterImage::read(&pair.b, nir.map(|(_, b)| b.as_path()))?;
     let labels = pair.labels.as_ref().map(|path| read_labels(path, a.size())).transpose()?;
     let maps = maps(&a, &b, pixels_per_degree)?;
     let figures = figures(&a, &b, labels.as_deref(), &maps)?;
-    let shot = (shown > 0).then(|| Shot::take(&pair.name, (&a, &b), &maps, &figures, shown)).transpose()?;
-    Ok((Compared { name: pair.name.clone(), width: a.width, height: a.height, figures }, shot))
+    let display_pair =
+        (shown > 0).then(|| DisplayPair::take(&pair.name, (&a, &b), &maps, &figures, shown)).transpose()?;
+    Ok((Compared { name: pair.name.clone(), width: a.width, height: a.height, figures }, display_pair))
 }

@@ -1,6 +1,6 @@
 //! Measures of one pair: error maps, and their means over the image and each class.
 
-use super::picture::Picture;
+use super::raster_image::RasterImage;
 use super::{color, flip, ssim};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
@@ -142,14 +142,14 @@ impl Figures {
 /// assert!((figures.all().mse - 0.04).abs() < 1e-12);
 /// # Ok::<(), furrow_base::Error>(())
 /// ```
-pub fn pair(a: &Picture, b: &Picture, labels: Option<&[u8]>, pixels_per_degree: f32) -> Result<Figures> {
+pub fn pair(a: &RasterImage, b: &RasterImage, labels: Option<&[u8]>, pixels_per_degree: f32) -> Result<Figures> {
     let maps = maps(a, b, pixels_per_degree)?;
     figures(a, b, labels, &maps)
 }
 
 /// Returns the error maps of `b` for a viewer with `pixels_per_degree`. Returns an error if the sizes differ or the
 /// images are empty.
-pub fn maps(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Maps> {
+pub fn maps(a: &RasterImage, b: &RasterImage, pixels_per_degree: f32) -> Result<Maps> {
     if a.size() != b.size() || a.rgb.is_empty() {
         return Err(Error::input(format!(
             "images of {} × {} and {} × {} pixels cannot be compared",
@@ -160,7 +160,7 @@ pub fn maps(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Maps> {
     let (flip, (ssim, ciede2000)) = rayon::join(
         || flip::map(a, b, pixels_per_degree),
         || {
-            let luma = |of: &Picture| of.rgb.iter().map(|p| ssim::luma(*p)).collect::<Vec<f64>>();
+            let luma = |of: &RasterImage| of.rgb.iter().map(|p| ssim::luma(*p)).collect::<Vec<f64>>();
             (ssim::map(a.width as usize, a.height as usize, &luma(a), &luma(b)), color::map(a, b))
         },
     );
@@ -168,7 +168,7 @@ pub fn maps(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Result<Maps> {
 }
 
 /// Computes the means of the error maps and the other measures.
-pub(super) fn figures(a: &Picture, b: &Picture, labels: Option<&[u8]>, maps: &Maps) -> Result<Figures> {
+pub(super) fn figures(a: &RasterImage, b: &RasterImage, labels: Option<&[u8]>, maps: &Maps) -> Result<Figures> {
     if labels.is_some_and(|labels| labels.len() != a.rgb.len()) {
         return Err(Error::misuse("there must be a label for each pixel"));
     }
@@ -196,7 +196,7 @@ pub(super) fn figures(a: &Picture, b: &Picture, labels: Option<&[u8]>, maps: &Ma
     let colors = |k: usize| a.rgb[k].into_iter().zip(b.rgb[k]).map(|(a, b)| squared(a, b)).sum::<f64>() / 3.0;
     add(Band::Rgb, &colors, &maps.ssim);
     if !a.nir.is_empty() && a.nir.len() == b.nir.len() {
-        let gray = |of: &Picture| of.nir.iter().map(|v| f64::from(*v) / 255.0).collect::<Vec<f64>>();
+        let gray = |of: &RasterImage| of.nir.iter().map(|v| f64::from(*v) / 255.0).collect::<Vec<f64>>();
         let ssim = ssim::map(width, a.height as usize, &gray(a), &gray(b));
         add(Band::Nir, &|k| squared(a.nir[k], b.nir[k]), &ssim);
     }

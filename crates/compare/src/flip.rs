@@ -5,7 +5,7 @@
 //! Source: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström & Fairchild 2020, "FLIP: A Difference Evaluator for
 //! Alternating Images", for low-dynamic-range images.
 
-use super::picture::Picture;
+use super::raster_image::RasterImage;
 use nv_flip::FlipImageRgb8;
 
 /// Default pixels per degree of visual angle: a screen 0.7 m wide with 3840 pixels, seen from 0.7 m. Source: the paper,
@@ -13,8 +13,8 @@ use nv_flip::FlipImageRgb8;
 pub const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
 /// Returns FLIP of each pixel, 0 (equal) to 1. Both images must have the same size.
-pub(super) fn map(a: &Picture, b: &Picture, pixels_per_degree: f32) -> Vec<f32> {
-    let image = |of: &Picture| FlipImageRgb8::with_data(of.width, of.height, of.rgb.as_flattened());
+pub(super) fn map(a: &RasterImage, b: &RasterImage, pixels_per_degree: f32) -> Vec<f32> {
+    let image = |of: &RasterImage| FlipImageRgb8::with_data(of.width, of.height, of.rgb.as_flattened());
     nv_flip::flip(image(a), image(b), pixels_per_degree).to_vec()
 }
 

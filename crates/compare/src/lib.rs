@@ -27,13 +27,13 @@
 
 mod color;
 mod comparison;
+mod display_pair;
 mod figures;
 mod flip;
 pub mod gap;
 mod page;
 mod pairs;
-mod picture;
-mod shot;
+mod raster_image;
 mod ssim;
 mod summary;
 mod table;
@@ -41,10 +41,10 @@ mod write;
 
 pub use color::ciede2000;
 pub use comparison::{Comparison, Options, folders};
+pub use display_pair::DisplayPair;
 pub use figures::{Band, Compared, Figures, Maps, Region, RegionFigures, maps, pair};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pairs::{Pair, Pairs};
-pub use picture::{Picture, read_labels};
-pub use shot::Shot;
+pub use raster_image::{RasterImage, read_labels};
 pub use summary::{Mean, Summary};
 pub use write::FILES;

@@ -1,8 +1,8 @@
 //! Self-contained HTML page with measures and pairs of images to alternate between, next to their error maps.
 
 use super::comparison::Comparison;
+use super::display_pair::{DisplayPair, MOST_DELTA_E};
 use super::figures::{Band, Region};
-use super::shot::{MOST_DELTA_E, Shot};
 use super::summary::Summary;
 use super::table::{MEASURES, cells, lead, mean_parts};
 use super::{flip, table};
@@ -77,7 +77,7 @@ fn means(of: &Comparison) -> Markup {
 
 /// Returns the pairs for display.
 fn pictures(of: &Comparison) -> Markup {
-    if of.shots.is_empty() {
+    if of.display_pairs.is_empty() {
         return html! {};
     }
     let stops: Vec<String> = flip::magma().iter().step_by(17).map(|rgb| color(*rgb)).collect();
@@ -87,36 +87,36 @@ fn pictures(of: &Comparison) -> Markup {
     };
     html! {
         p.reading {
-            @if of.shots.len() < of.pairs.len() { "The " (of.shots.len()) " pairs with the largest FLIP. " }
+            @if of.display_pairs.len() < of.pairs.len() { "The " (of.display_pairs.len()) " pairs with the largest FLIP. " }
             "Click an image to alternate between reference and test, or a map to enlarge it. For all images: "
             kbd { "F" } " alternates, " kbd { "1" } " reference, " kbd { "2" } " test, " kbd { "3" } " " kbd { "4" } " " kbd { "5" } " maps."
         }
         (legend([scale("FLIP", "1"), scale("1 − SSIM", "1"), scale("ΔE₀₀", &MOST_DELTA_E.to_string())]))
-        @for shot in &of.shots { (picture(of, shot)) }
+        @for display_pair in &of.display_pairs { (picture(of, display_pair)) }
     }
 }
 
-fn picture(of: &Comparison, shot: &Shot) -> Markup {
-    let (w, h) = (shot.width, shot.height);
+fn picture(of: &Comparison, display_pair: &DisplayPair) -> Markup {
+    let (w, h) = (display_pair.width, display_pair.height);
     let image = |class: Option<&str>, words: &str, jpeg: &[u8]| {
-        html! { img class=[class] src=(data_url("jpeg", jpeg)) width=(w) height=(h) alt={ (words) " of " (shot.name) }; }
+        html! { img class=[class] src=(data_url("jpeg", jpeg)) width=(w) height=(h) alt={ (words) " of " (display_pair.name) }; }
     };
-    let maps = [("flip", "FLIP"), ("ssim", "1 − SSIM"), ("delta", "ΔE₀₀")].into_iter().zip(&shot.maps);
-    let pair = of.pairs.iter().find(|pair| pair.name == shot.name);
+    let maps = [("flip", "FLIP"), ("ssim", "1 − SSIM"), ("delta", "ΔE₀₀")].into_iter().zip(&display_pair.maps);
+    let pair = of.pairs.iter().find(|pair| pair.name == display_pair.name);
     let values = pair.map(|pair| cells(pair.figures.all())).unwrap_or_default();
     html! {
         figure.pair.squares[w < NARROW] data-show="a" style={ "--ratio:" (f64::from(w) / f64::from(h)) } {
             figcaption {
-                b { (shot.name) }
+                b { (display_pair.name) }
                 @for (measure, value) in MEASURES.iter().zip(values).skip(1) {
                     @let (name, unit) = measure.split_once(", ").unwrap_or((measure, ""));
                     span { (name) " " (value) " " (unit) }
                 }
             }
             div.look {
-                button.stage type="button" aria-label={ "flip " (shot.name) } {
-                    (image(Some("a"), "reference", &shot.a))
-                    (image(Some("b"), "test", &shot.b))
+                button.stage type="button" aria-label={ "flip " (display_pair.name) } {
+                    (image(Some("a"), "reference", &display_pair.a))
+                    (image(Some("b"), "test", &display_pair.b))
                     span.badge {}
                 }
                 div.maps {

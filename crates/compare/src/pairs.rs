@@ -16,7 +16,7 @@ use std::path::{Component, Path, PathBuf};
 /// File name extensions of images.
 const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
 /// Largest number of names listed in a warning or error.
-const TOLD: usize = 3;
+const MOST_NAMES: usize = 3;
 
 /// Two images of the same scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -110,8 +110,8 @@ impl Pairs {
             return Err(Error::input(format!("no image of {} has a partner in {}", self.a, self.b)).help(format!(
                 "images are paired by their names below the folder, without the extension; \
                  the first has {}, the second {}",
-                told(&self.only_a),
-                told(&self.only_b)
+                name_list(&self.only_a),
+                name_list(&self.only_b)
             )));
         }
         match labels {
@@ -128,12 +128,16 @@ impl Pairs {
     pub fn warnings(&self) -> Vec<String> {
         let alone = |names: &[String], of: &str, other: &str| {
             let what = if names.len() == 1 { "is an image without a partner" } else { "are images without partners" };
-            (!names.is_empty()).then(|| format!("{} of {of} {what} in {other}: {}", names.len(), told(names)))
+            (!names.is_empty()).then(|| format!("{} of {of} {what} in {other}: {}", names.len(), name_list(names)))
         };
         let bare: Vec<String> =
             self.pairs.iter().filter(|pair| pair.labels.is_none()).map(|pair| pair.name.clone()).collect();
         let unlabelled = (!bare.is_empty() && bare.len() < self.pairs.len()).then(|| {
-            format!("pairs excluded from class means because they have no labels: {} ({})", bare.len(), told(&bare))
+            format!(
+                "pairs excluded from class means because they have no labels: {} ({})",
+                bare.len(),
+                name_list(&bare)
+            )
         });
         [alone(&self.only_a, &self.a, &self.b), alone(&self.only_b, &self.b, &self.a), unlabelled]
             .into_iter()
@@ -143,9 +147,9 @@ impl Pairs {
 }
 
 /// Returns the first names of a list.
-pub(super) fn told(names: &[String]) -> String {
-    let first = names.iter().take(TOLD).map(String::as_str).collect::<Vec<_>>().join(", ");
-    match names.len().saturating_sub(TOLD) {
+pub(super) fn name_list(names: &[String]) -> String {
+    let first = names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(MOST_NAMES) {
         0 => first,
         more => format!("{first} and {more} more"),
     }

@@ -20,7 +20,7 @@ struct Document<'a> {
     only_reference: &'a [String],
     only_test: &'a [String],
     means: Vec<Means>,
-    pairs: Vec<PairOf<'a>>,
+    pairs: Vec<PairRow<'a>>,
 }
 
 #[derive(Serialize)]
@@ -28,22 +28,22 @@ struct Means {
     band: Band,
     region: Region,
     pairs: u64,
-    mse: Bounded,
-    psnr_db: Option<Bounded>,
-    ssim: Option<Bounded>,
-    flip: Option<Bounded>,
-    ciede2000: Option<Bounded>,
+    mse: MeanInterval,
+    psnr_db: Option<MeanInterval>,
+    ssim: Option<MeanInterval>,
+    flip: Option<MeanInterval>,
+    ciede2000: Option<MeanInterval>,
 }
 
 #[derive(Serialize)]
-struct Bounded {
+struct MeanInterval {
     mean: f64,
     low: Option<f64>,
     high: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct PairOf<'a> {
+struct PairRow<'a> {
     name: &'a str,
     width: u32,
     height: u32,
@@ -64,7 +64,8 @@ struct Values {
 
 /// Returns all results as JSON; `null` is a missing value, or an infinite PSNR.
 pub(super) fn json(of: &Comparison) -> Result<String> {
-    let bounded = |m: Mean| Bounded { mean: m.mean, low: m.interval.map(|i| i.low), high: m.interval.map(|i| i.high) };
+    let bounded =
+        |m: Mean| MeanInterval { mean: m.mean, low: m.interval.map(|i| i.low), high: m.interval.map(|i| i.high) };
     let means = of.means.iter().map(|s| Means {
         band: s.band,
         region: s.region,
@@ -85,7 +86,7 @@ pub(super) fn json(of: &Comparison) -> Result<String> {
         flip: row.flip,
         ciede2000: row.ciede2000,
     };
-    let pairs = of.pairs.iter().map(|pair| PairOf {
+    let pairs = of.pairs.iter().map(|pair| PairRow {
         name: &pair.name,
         width: pair.width,
         height: pair.height,

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Embree.
 pub trait Filter: Send + Sync {
     /// Returns `true` if the surface exists at barycentric coordinates `u`, `v` of triangle `primitive`.
-    fn keeps(&self, primitive: u32, u: f32, v: f32) -> bool;
+    fn accepts(&self, primitive: u32, u: f32, v: f32) -> bool;
 }
 
 /// The filter that keeps every hit, for geometries without one.
@@ -22,7 +22,7 @@ pub trait Filter: Send + Sync {
 pub enum Everything {}
 
 impl Filter for Everything {
-    fn keeps(&self, _: u32, _: f32, _: f32) -> bool {
+    fn accepts(&self, _: u32, _: f32, _: f32) -> bool {
         true
     }
 }
@@ -226,11 +226,11 @@ unsafe extern "C" fn confirm<F: Filter>(arguments: *const sys::RTCFilterFunction
     for lane in 0..lanes.len() {
         let at = |field: usize| field * lanes.len() + lane;
         // SAFETY: hits are arrays with one value per lane: normal (3), u, v, primitive. Inactive lanes are not read.
-        let keeps = |hit: *mut c_void| unsafe {
+        let accepts = |hit: *mut c_void| unsafe {
             let (u, v) = (*hit.cast::<f32>().add(at(3)), *hit.cast::<f32>().add(at(4)));
-            filter.keeps(*hit.cast::<u32>().add(at(5)), u, v)
+            filter.accepts(*hit.cast::<u32>().add(at(5)), u, v)
         };
-        if lanes[lane] == -1 && !keeps(arguments.hit) {
+        if lanes[lane] == -1 && !accepts(arguments.hit) {
             lanes[lane] = 0;
         }
     }

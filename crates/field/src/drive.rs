@@ -167,7 +167,7 @@ pub struct Moment {
 
 /// Inputs of a drive that are not in its description.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Around {
+pub(super) struct DriveInputs {
     /// Direction of the crop rows, radians clockwise from north; `None` if the field has no rows.
     pub(super) rows: Option<f32>,
     /// Times (s) and poses read from the file that [`PathDesc::Poses`] names.
@@ -179,7 +179,7 @@ pub(super) struct Around {
 pub(super) fn captures(
     desc: Option<&DriveDesc>,
     cameras: &[(String, Camera)],
-    around: &Around,
+    around: &DriveInputs,
     stream: &mut Stream,
 ) -> Result<Vec<Capture>> {
     let still = Moment { time_s: 0.0, turn: Mat3::IDENTITY, way: Vec3::ZERO, velocity: Vec3::ZERO };
@@ -217,7 +217,7 @@ impl Moment {
 }
 
 /// Returns the vehicle's pose and velocity at each frame.
-fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &Around, stream: &mut Stream) -> Result<Vec<Moment>> {
+fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &DriveInputs, stream: &mut Stream) -> Result<Vec<Moment>> {
     let frames = desc.frames.get() as usize;
     let path = match &desc.path {
         PathDesc::Poses(file) => {
@@ -232,14 +232,14 @@ fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &Around, stream: &mut
             return Ok(flown(&around.poses[..frames], first.copied().unwrap_or_default()));
         }
         PathDesc::Straight { heading_deg, speed_m_s } => {
-            Way::straight(heading_deg.draw32(stream).to_radians(), speed_m_s.draw32(stream))
+            DrivenPath::straight(heading_deg.draw32(stream).to_radians(), speed_m_s.draw32(stream))
         }
         PathDesc::AlongRows { speed_m_s } => {
             let rows = around.rows.ok_or_else(|| {
                 Error::input("the field has no rows to drive along")
                     .help("give the field a crop, or write path: Straight(heading_deg: …)")
             })?;
-            Way::straight(rows, speed_m_s.draw32(stream))
+            DrivenPath::straight(rows, speed_m_s.draw32(stream))
         }
         PathDesc::Polyline { points_m, speed_m_s } => {
             let points: Vec<Vec2> = points_m.iter().map(|(x, y)| vec2(x.f32(), y.f32())).collect();
@@ -247,7 +247,7 @@ fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &Around, stream: &mut
                 return Err(Error::input("a path needs at least two points, and no point twice in a row")
                     .help("write points_m: [(0, 0), (0, 2)] for two metres to the north"));
             }
-            Way { points, speed: speed_m_s.draw32(stream) }
+            DrivenPath { points, speed: speed_m_s.draw32(stream) }
         }
     };
     let rate = desc.rate_hz.get();
@@ -266,12 +266,12 @@ fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &Around, stream: &mut
 }
 
 /// A path driven at constant speed.
-struct Way {
+struct DrivenPath {
     points: Vec<Vec2>,
     speed: f32,
 }
 
-impl Way {
+impl DrivenPath {
     /// Creates a straight path from the origin, practically endless (1000 km). `heading` is in radians clockwise from north.
     fn straight(heading: f32, speed: f32) -> Self {
         let ahead = vec2(heading.sin(), heading.cos());
@@ -355,7 +355,7 @@ mod tests {
         RonFile::of(text).parse::<CameraDesc>().unwrap().build(&mut stream()).unwrap()
     }
 
-    fn drive(text: &str, around: &Around) -> Result<Vec<Capture>> {
+    fn drive(text: &str, around: &DriveInputs) -> Result<Vec<Capture>> {
         let desc: DriveDesc = RonFile::of(text).parse().unwrap();
         let cameras = [("camera", "JaiAd130(height_m: 1)"), ("right", "JaiAd130(height_m: 1, at_m: (0.12, 0))")];
         let cameras = cameras.map(|(name, text)| (name.to_owned(), camera(text)));
@@ -369,7 +369,7 @@ mod tests {
     /// Expected: at 0.5 m/s and 10 Hz to the east, 50 mm per image; the vehicle's right is then south, and the top of the image east.
     #[test]
     fn a_vehicle_carries_its_cameras_along() {
-        let all = drive("(frames: 4, path: Straight(heading_deg: 90))", &Around::default()).unwrap();
+        let all = drive("(frames: 4, path: Straight(heading_deg: 90))", &DriveInputs::default()).unwrap();
         assert_eq!(all.len(), 8);
         let [left, right] = [&all[6], &all[7]];
         assert_eq!((left.name.as_str(), right.name.as_str(), left.frame), ("camera", "right", 3));
@@ -379,7 +379,7 @@ mod tests {
         // The camera's y axis points down in the image, so −y is the driving direction.
         close(left.camera.pose().axes.y_axis, Vec3::NEG_X);
         close(left.camera.motion().velocity, vec3(0.5, 0.0, 0.0));
-        let rows = Around { rows: Some(90.0_f32.to_radians()), ..Around::default() };
+        let rows = DriveInputs { rows: Some(90.0_f32.to_radians()), ..DriveInputs::default() };
         let along = drive("(frames: 4, path: AlongRows())", &rows).unwrap();
         close(along[6].camera.pose().position, left.camera.pose().position);
     }
@@ -388,14 +388,14 @@ mod tests {
     #[test]
     fn a_polyline_turns_and_ends() {
         let path = "(frames: 30, path: Polyline(points_m: [(0, 0), (0, 0.5), (0.5, 0.5)]))";
-        let all = drive(path, &Around::default()).unwrap();
+        let all = drive(path, &DriveInputs::default()).unwrap();
         let at = |frame: usize| all[2 * frame].camera;
         close(at(5).pose().position, vec3(0.0, 0.25, 1.0));
         close(at(15).pose().position, vec3(0.25, 0.5, 1.0));
         close(at(15).pose().axes.y_axis, Vec3::NEG_X);
         close(at(29).pose().position, vec3(0.5, 0.5, 1.0));
         assert_eq!(at(29).motion().velocity, Vec3::ZERO);
-        let wrong = drive("(frames: 3, path: Polyline(points_m: [(0, 0), (0, 0)]))", &Around::default());
+        let wrong = drive("(frames: 3, path: Polyline(points_m: [(0, 0), (0, 0)]))", &DriveInputs::default());
         assert!(wrong.unwrap_err().to_string().contains("no point twice"));
     }
 
@@ -429,7 +429,7 @@ mod tests {
             "timestamp,tx,ty,tz,qx,qy,qz,qw\n5.0,0,0,1,1,0,0,0 # looking down\n5.2,0.3,-0.2,1.4,{},{},{},{}\n",
             q[0], q[1], q[2], q[3]
         );
-        let around = Around { poses: poses::read(text.as_bytes()).unwrap(), ..Around::default() };
+        let around = DriveInputs { poses: poses::read(text.as_bytes()).unwrap(), ..DriveInputs::default() };
         let all = drive(r#"(frames: 2, path: Poses("x"))"#, &around).unwrap();
         close(all[0].camera.pose().position, vec3(0.0, 0.0, 1.0));
         close(all[2].camera.pose().position, turned.position);
@@ -450,7 +450,7 @@ mod tests {
         let moving = camera("JaiAd130(motion: (speed_m_s: 1))");
         let refused = |camera| {
             let cameras = [("camera".to_owned(), camera)];
-            captures(Some(&desc), &cameras, &Around::default(), &mut stream()).unwrap_err().to_string()
+            captures(Some(&desc), &cameras, &DriveInputs::default(), &mut stream()).unwrap_err().to_string()
         };
         assert!(refused(moving).contains("no speed of its own"));
         assert!(refused(camera("JaiAd130()")).contains("no rows"));

@@ -1,10 +1,10 @@
 //! Cache of all files that a scene file names: species, images, models, soil layers, environment maps. Each is read once.
 
 use super::desc::{ModelDesc, SpeciesDesc};
-use super::growing::Growing;
+use super::image_memory::{self, ImageMemory};
 use super::layer::Layer;
-use super::pictures::{self, Pictures};
 use super::poses;
+use super::scene_edit::SceneEdit;
 use super::shipped::species as shipped_species;
 use super::species_text::SpeciesFile;
 use furrow_base::error::{Kind, Place};
@@ -19,7 +19,7 @@ use furrow_optics::light::{Infrared, Table};
 use furrow_optics::optics::{Pigments, measured};
 use furrow_optics::sensor::Pose;
 use furrow_optics::texture::{ColorSpace, Header, Height, HeightFromBrightness, Maps, Texture, Wrap};
-use furrow_render::material::{LeafMaterial, Picture, Tones};
+use furrow_render::material::{LeafMaterial, LeafTexture, Tones};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,8 +30,8 @@ const MOST_POSES: u64 = 64 << 20;
 
 /// A leaf image with its opacity mask.
 #[derive(Clone)]
-pub(super) struct Cut {
-    picture: Arc<Picture>,
+pub(super) struct MaskedImage {
+    picture: Arc<LeafTexture>,
     mask: Option<Arc<AlphaMask>>,
     margin: Option<Arc<Margin>>,
 }
@@ -60,8 +60,8 @@ pub(super) struct Species {
     pub(super) desc: SpeciesDesc,
     /// Variants of each material, by the material's name.
     pub(super) materials: BTreeMap<String, Vec<Choice>>,
-    /// Images of its leaves, as counted by [`Pictures`].
-    pub(super) pictures: Vec<pictures::Picture>,
+    /// Images of its leaves, as counted by [`ImageMemory`].
+    pub(super) pictures: Vec<image_memory::ImageKey>,
 }
 
 /// Compares by address: two species read from the same path may differ, because the file may have changed in between.
@@ -78,22 +78,22 @@ pub(super) struct Library {
     scope: Scope,
     files: BTreeMap<PathBuf, [u8; 32]>,
     /// Leaf images by file and by the bits of `relief_range`, which scales the height map beside the image.
-    pictures: BTreeMap<(PathBuf, u32), Cut>,
+    pictures: BTreeMap<(PathBuf, u32), MaskedImage>,
     species: BTreeMap<PathBuf, Arc<Species>>,
     /// Models by file, by whether their z axis points up, and by whether they may name files outside their folder.
     models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
     layers: BTreeMap<(PathBuf, PathBuf), Arc<Layer>>,
     /// Resolved files of soil layers, by the paths of colour and height map in the scene file.
-    layer_files: BTreeMap<(PathBuf, PathBuf), pictures::Picture>,
+    layer_files: BTreeMap<(PathBuf, PathBuf), image_memory::ImageKey>,
     /// Memory that all these images take.
-    pub(super) counted: Pictures,
+    pub(super) counted: ImageMemory,
     environment_maps: BTreeMap<(PathBuf, Infrared), Arc<Table>>,
     /// Warnings about species files and models, by file: images that look wrong, and what a model loses.
-    told: BTreeMap<PathBuf, Vec<String>>,
+    file_warnings: BTreeMap<PathBuf, Vec<String>>,
     /// Built-in files, by the names that the scene file uses for them.
     shipped: BTreeMap<String, PathBuf>,
     /// Changes that an experiment makes to the descriptions of field and species.
-    pub(super) growing: Growing,
+    pub(super) growing: SceneEdit,
     /// Library of the previous field: its entries are reused if the contents of their files have not changed.
     before: Option<Arc<Library>>,
 }
@@ -174,7 +174,7 @@ impl Library {
 
     /// Returns the warnings about the species files and models that were read, in the order of their paths.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.told.values().flatten().cloned().collect()
+        self.file_warnings.values().flatten().cloned().collect()
     }
 
     /// Returns the SHA-256 of the contents of all files that were read, in hex. Paths are not hashed, so a moved project keeps its hash.
@@ -204,7 +204,7 @@ impl Library {
         let own = file.page();
         let mut desc: SpeciesDesc = own.parse_all()?;
         file.check_materials(&desc)?;
-        let (mut cuts, mut pictures): (Vec<Vec<Cut>>, Vec<pictures::Picture>) = (Vec::new(), Vec::new());
+        let (mut cuts, mut pictures): (Vec<Vec<MaskedImage>>, Vec<image_memory::ImageKey>) = (Vec::new(), Vec::new());
         for leaf in desc.materials.values() {
             let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
             let range = leaf.relief_range.f32();
@@ -214,14 +214,14 @@ impl Library {
                 pictures.push(picture);
                 // Calibrated images hold reflectances, as `trace texture` paints them, and need no check.
                 if !leaf.calibrated {
-                    self.told.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
+                    self.file_warnings.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
                 }
                 all.push(cut);
             }
             cuts.push(all);
         }
         let known = |before: &Self| {
-            let held = |cut: &Cut| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
+            let held = |cut: &MaskedImage| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
             cuts.iter().flatten().all(held).then(|| before.species.get(full).cloned())?
         };
         let files: Vec<&Path> = file.sources().iter().map(|source| source.path.as_path()).collect();
@@ -231,7 +231,7 @@ impl Library {
         let mut materials = BTreeMap::new();
         for ((name, leaf), cuts) in desc.materials.iter().zip(cuts) {
             let mut choices = Vec::new();
-            for Cut { picture, mask, margin } in cuts {
+            for MaskedImage { picture, mask, margin } in cuts {
                 let material = LeafMaterial::new(leaf, Some(picture));
                 choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
             }
@@ -248,7 +248,12 @@ impl Library {
     }
 
     /// Returns a leaf image, and its key among the counted images.
-    fn picture(&mut self, page: &RonFile, path: &str, relief_range: f32) -> Result<(Cut, pictures::Picture)> {
+    fn picture(
+        &mut self,
+        page: &RonFile,
+        path: &str,
+        relief_range: f32,
+    ) -> Result<(MaskedImage, image_memory::ImageKey)> {
         let full = self.need(page, path)?;
         // The height map is the file beside the image that ends in .height.png; without it the relief is derived from brightness.
         let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
@@ -275,7 +280,7 @@ impl Library {
         };
         let mask = color.alpha_mask().map(Arc::new);
         let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
-        let cut = Cut { picture: Arc::new(Picture { color, maps }), mask, margin };
+        let cut = MaskedImage { picture: Arc::new(LeafTexture { color, maps }), mask, margin };
         self.pictures.insert(key, cut.clone());
         Ok((cut, counted))
     }
@@ -297,7 +302,7 @@ impl Library {
             Arc::new(model.map_err(|e| at_its_place(page, path, MODEL_HELP, e))?)
         };
         let warnings = model.warnings.iter().map(|words| format!("{path}: {words}")).collect();
-        self.told.insert(full.clone(), warnings);
+        self.file_warnings.insert(full.clone(), warnings);
         // Hashes of the bytes that the model was loaded from: the files may have changed since.
         self.files.extend(model.files.iter().map(|(file, digest)| (file.clone(), *digest)));
         self.counted.note(counted_model(&key), model.pictures);
@@ -306,7 +311,7 @@ impl Library {
     }
 
     /// Returns the key under which the images of the model that `page` names are counted.
-    pub(super) fn model_pictures(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<pictures::Picture> {
+    pub(super) fn model_pictures(&mut self, page: &RonFile, desc: &ModelDesc) -> Result<image_memory::ImageKey> {
         self.model(page, desc)?;
         let full = self.need(page, &desc.file)?;
         Ok(counted_model(&(full, desc.up == Up::Z, desc.allow_outside)))
@@ -365,7 +370,7 @@ impl Library {
     }
 
     /// Resolves the texture files of a soil layer, counts them, and returns their key among the counted images.
-    pub(super) fn layer_pictures(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<pictures::Picture> {
+    pub(super) fn layer_pictures(&mut self, page: &RonFile, desc: &LayerDesc) -> Result<image_memory::ImageKey> {
         let key = (desc.albedo.clone(), desc.height.clone());
         if let Some(known) = self.layer_files.get(&key) {
             self.counted.again(std::slice::from_ref(known));
@@ -422,7 +427,7 @@ impl Library {
 }
 
 /// Returns the key under which the images of a model are counted.
-fn counted_model((file, z_up, outside): &(PathBuf, bool, bool)) -> pictures::Picture {
+fn counted_model((file, z_up, outside): &(PathBuf, bool, bool)) -> image_memory::ImageKey {
     (file.clone(), PathBuf::new(), u32::from(*z_up) + 2 * u32::from(*outside))
 }
 

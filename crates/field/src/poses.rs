@@ -123,10 +123,10 @@ fn names(text: &str) -> Vec<String> {
 
 /// Returns the error about unknown column names.
 fn refused(line: usize, names: &[String], wrong: &str) -> Error {
-    let told: Vec<String> = names.iter().take(REPEATED.0).map(|name| repeated(name)).collect();
+    let listed: Vec<String> = names.iter().take(REPEATED.0).map(|name| repeated(name)).collect();
     let more = if names.len() > REPEATED.0 { ", …" } else { "" };
     let order = ORDER.join(", ");
-    Error::input(format!("line {line} names the columns {}{more}: {wrong}", told.join(", "))).help(format!(
+    Error::input(format!("line {line} names the columns {}{more}: {wrong}", listed.join(", "))).help(format!(
         "name all of {order}, in any order, in metres and seconds (`time [ns]` for nanoseconds); without names, use this order"
     ))
 }
@@ -137,14 +137,14 @@ fn repeated(name: &str) -> String {
 }
 
 /// Content of a column.
-enum Held {
+enum ColumnContent {
     /// A number of the pose, by its index in [`ORDER`]; for a time also the unit in seconds, if the name has one.
     Number(usize, Option<f64>),
     /// A quantity that is not part of a pose.
     Other,
 }
 
-impl Held {
+impl ColumnContent {
     /// Parses the name of a column; `None` if it is unknown.
     fn of(name: &str) -> Option<Self> {
         let name = name.trim_matches(|c: char| c.is_whitespace() || c == '"').to_lowercase();
@@ -196,10 +196,10 @@ impl Columns {
         let mut at = [None; 8];
         let mut unit_s = None;
         for (place, name) in names.iter().enumerate() {
-            match Held::of(name) {
+            match ColumnContent::of(name) {
                 None => return Err(format!("`{}` is not a known name", repeated(name))),
-                Some(Held::Other) => {}
-                Some(Held::Number(number, unit)) => {
+                Some(ColumnContent::Other) => {}
+                Some(ColumnContent::Number(number, unit)) => {
                     if at[number].replace(place).is_some() {
                         return Err(format!("two columns are {}", ORDER[number]));
                     }

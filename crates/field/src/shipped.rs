@@ -140,9 +140,9 @@ mod tests {
     }
 
     #[test]
-    fn names_of_none_and_of_several_are_told() {
-        let told = |name| species(name).unwrap_err().to_string();
-        assert!(told("thistel").contains("did you mean"), "{}", told("thistel"));
-        assert!(told("grass").contains("barnyard grass or annual meadow-grass"), "{}", told("grass"));
+    fn unknown_and_ambiguous_names_are_reported() {
+        let message = |name| species(name).unwrap_err().to_string();
+        assert!(message("thistel").contains("did you mean"), "{}", message("thistel"));
+        assert!(message("grass").contains("barnyard grass or annual meadow-grass"), "{}", message("grass"));
     }
 }

@@ -78,19 +78,19 @@ impl Library {
     /// Inserts the rows of the table of leaves into the text, as `layers` of its stages.
     fn with_table(&mut self, own: Spliced) -> Result<Spliced> {
         let Some(at) = own.find(&[Step::Field("plant"), Step::Field("leaves")]) else { return Ok(own) };
-        let told = |error| own.locate(error);
-        own.page.check_syntax().map_err(told)?;
-        let name = literal(&own.page, &at, "leaves: \"capsella.csv\"").map_err(told)?;
-        let full = self.need(&own.page, &name).map_err(told)?;
+        let located = |error| own.locate(error);
+        own.page.check_syntax().map_err(located)?;
+        let name = literal(&own.page, &at, "leaves: \"capsella.csv\"").map_err(located)?;
+        let full = self.need(&own.page, &name).map_err(located)?;
         let page = RonFile::read_as(&full, ".csv")?;
         self.page_of(&full, &page.text);
         let table = LeafTable::read(&page)?;
-        let stages = stages(&own).map_err(told)?;
+        let stages = stages(&own).map_err(located)?;
         let codes: Vec<u32> = stages.iter().map(|(code, _)| *code).collect();
         let layers = table.layers(&codes)?.map_err(|NoRows(code)| {
             let place = stages.iter().find(|(known, _)| *known == code).map_or(0..1, |(_, place)| place.clone());
             let message = format!("the table of leaves has no row for BBCH {code}");
-            told(own.page.about_bytes(
+            located(own.page.about_bytes(
                 place.start..place.start + 1,
                 message,
                 "add its rows: the first stage must list all its leaves",
@@ -216,7 +216,7 @@ mod tests {
         folder
     }
 
-    fn told(files: &[(&str, &str)]) -> String {
+    fn message_of(files: &[(&str, &str)]) -> String {
         let folder = folder(files);
         let error = SpeciesDesc::read(&folder.path().join("own.ron")).unwrap_err();
         error.to_string().replace(&format!("{}/", folder.path().display()), "")
@@ -262,7 +262,7 @@ mod tests {
 
     /// Rationale: an error points at the faulty text, whichever file holds it. Expected: file, line and column.
     #[test]
-    fn mistakes_are_told_in_the_file_that_makes_them() {
+    fn errors_are_reported_in_the_file_that_has_them() {
         let own = format!("{OWN})");
         let other = BASE.replace("chlorophyll: 40", "chlorophyll: -40");
         for (files, begin) in [
@@ -297,7 +297,7 @@ mod tests {
                 "a/base.ron:1:15: `../own.ron` leads back to this file",
             ),
         ] {
-            let words = told(&files);
+            let words = message_of(&files);
             assert!(words.starts_with(begin), "{begin}: {words}");
         }
     }
@@ -306,18 +306,18 @@ mod tests {
     /// that the base file defines and this species does not use.
     #[test]
     fn a_material_that_nothing_is_made_of_is_refused() {
-        let told = |own: &str, base: &str| {
+        let message_of = |own: &str, base: &str| {
             let folder = folder(&[("own.ron", own), ("a/base.ron", base)]);
             let page = RonFile { path: folder.path().join("field.ron"), text: "Field()".to_owned() };
             let error = Library::default().species(&page, "own.ron").err().unwrap();
             error.to_string().replace(&format!("{}/", folder.path().display()), "")
         };
-        let words = told(&format!("{OWN}materials: {{\"leav\": Leaf(), \"stalk\": Leaf()}})"), BASE);
+        let words = message_of(&format!("{OWN}materials: {{\"leav\": Leaf(), \"stalk\": Leaf()}})"), BASE);
         let begin = "own.ron:1:81: no leaf, stem or flower is made of the material `leav`";
         assert!(words.starts_with(begin) && words.contains("did you mean `leaf`"), "{words}");
         let idle = BASE.replace("\"stalk\": Leaf()", "\"stalk\": Leaf(), \"petal\": Leaf()");
         // The only fault is the missing image file.
-        let words = told(&format!("{OWN})"), &idle);
+        let words = message_of(&format!("{OWN})"), &idle);
         assert!(words.contains("there is no file `a/../pictures/leaf.png`"), "{words}");
     }
 

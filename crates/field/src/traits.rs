@@ -70,17 +70,17 @@ pub struct Traits {
 /// An organ: its scene part, the mask coverage of each triangle, and for a blade the opaque area of each triangle, m².
 struct Organ<'a> {
     part: &'a Part,
-    shown: &'a [Shown],
+    shown: &'a [TriangleCoverage],
     areas: Vec<f64>,
 }
 
 /// Mask coverage of a triangle, and the opaque share of its area.
-type Shown = (Coverage, f64);
+type TriangleCoverage = (Coverage, f64);
 
 /// Addresses of a mesh and its mask; they identify parts that are instances of the same mesh.
-type Sheet = (usize, Option<usize>);
+type MeshKey = (usize, Option<usize>);
 
-fn sheet(part: &Part) -> Sheet {
+fn sheet(part: &Part) -> MeshKey {
     (Arc::as_ptr(&part.mesh).addr(), part.mask.as_ref().map(|mask| Arc::as_ptr(mask).addr()))
 }
 
@@ -103,10 +103,10 @@ impl Traits {
             .filter(|(part, _)| !measured || seen(part))
             .collect();
         // Evaluate the mask once per mesh, however many instances it has: a lookup for each triangle is expensive.
-        let sheets: BTreeMap<Sheet, &Part> = parts.iter().map(|(part, _)| (sheet(part), *part)).collect();
+        let sheets: BTreeMap<MeshKey, &Part> = parts.iter().map(|(part, _)| (sheet(part), *part)).collect();
         let sheets: Vec<&Part> = sheets.into_values().collect();
-        let looked: Vec<Vec<Shown>> = sheets.par_iter().map(|part| shown(part)).collect();
-        let shown: BTreeMap<Sheet, &[Shown]> =
+        let looked: Vec<Vec<TriangleCoverage>> = sheets.par_iter().map(|part| shown(part)).collect();
+        let shown: BTreeMap<MeshKey, &[TriangleCoverage]> =
             sheets.iter().map(|part| sheet(part)).zip(looked.iter().map(Vec::as_slice)).collect();
         let organs: Vec<Organ<'_>> =
             parts.into_par_iter().map(|(part, kind)| Organ::new(part, kind, shown[&sheet(part)])).collect();
@@ -182,7 +182,7 @@ impl Canopy {
 }
 
 /// Returns the mask coverage of each triangle of a part.
-fn shown(part: &Part) -> Vec<Shown> {
+fn shown(part: &Part) -> Vec<TriangleCoverage> {
     let of = |corners: &[u32; 3]| match &part.mask {
         Some(mask) => mask.share(corners.map(|k| part.mesh.uvs[k as usize])),
         None => (Coverage::Opaque, 1.0),
@@ -192,8 +192,9 @@ fn shown(part: &Part) -> Vec<Shown> {
 
 impl<'a> Organ<'a> {
     /// Creates the organ of a scene part.
-    fn new(part: &'a Part, kind: OrganKind, shown: &'a [Shown]) -> Self {
-        let area = |(i, (_, share)): (u32, &Shown)| 0.5 * f64::from(normal(part.corners(i)).length()) * share;
+    fn new(part: &'a Part, kind: OrganKind, shown: &'a [TriangleCoverage]) -> Self {
+        let area =
+            |(i, (_, share)): (u32, &TriangleCoverage)| 0.5 * f64::from(normal(part.corners(i)).length()) * share;
         let blade = matches!(kind, OrganKind::Blade | OrganKind::Cotyledon);
         let areas = if blade { (0..).zip(shown).map(area).collect() } else { Vec::new() };
         Self { part, shown, areas }

@@ -46,7 +46,7 @@ impl ExpectedPlants {
     }
 
     /// Returns the warning if there is one, otherwise the sentence.
-    pub fn told(&self) -> String {
+    pub fn message(&self) -> String {
         self.warning().map_or_else(|| self.words(), |words| format!("warning: {words}"))
     }
 
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_that_differ_much_are_told() {
+    fn a_wide_spread_of_plant_numbers_is_reported() {
         let even = ExpectedPlants::of((0..100).map(|k| 10.0 + 0.1 * f64::from(k)).collect()).unwrap();
         assert_eq!((even.low, even.median, even.high), (10.5, 15.0, 19.4));
         assert_eq!(even.warning(), None);

@@ -6,7 +6,7 @@ use furrow_base::{Error, Result};
 use furrow_field::ablation::Edit;
 use furrow_field::assemble::{Options, Stage};
 use furrow_optics::sensor::Lidar;
-use furrow_render::accel::{Before, EmbreeAccel};
+use furrow_render::accel::{EmbreeAccel, PreviousBuild};
 use furrow_render::integrator::World;
 use furrow_render::render::{self, Echo, LabelMap};
 use std::sync::{Arc, OnceLock};
@@ -76,7 +76,7 @@ impl Field {
             let begin = Instant::now();
             self.options.progress.enter(Stage::Bvh);
             let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
-            let build = |before: Option<&Before<'_>>| {
+            let build = |before: Option<&PreviousBuild<'_>>| {
                 EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)
             };
             let built = self.threads.install(|| match &self.options.preview {

@@ -12,7 +12,7 @@ use furrow_output::{Denoiser, Provenance, Spp};
 use furrow_render::accel;
 use furrow_render::film::Film;
 use furrow_render::integrator::{self, Integrator, World};
-use furrow_render::render::{self, LabelMap, Settings, Watch};
+use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
 use furrow_render::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ pub struct Request<'a> {
     /// Start of the time limit [`Quality::time`]; the time of the call if `None`.
     pub begin: Option<Instant>,
     /// Progress display and stop flag.
-    pub watch: Watch<'a>,
+    pub watch: RenderMonitor<'a>,
 }
 
 /// An opened render engine. Ray tracing kernels, graphics card and denoiser are found when it is opened, before any long work starts.
@@ -238,7 +238,7 @@ fn sample(
     integrator: &dyn Integrator,
     settings: &Settings,
     deadline: Option<Instant>,
-    watch: &Watch<'_>,
+    watch: &RenderMonitor<'_>,
 ) -> Result<Film> {
     match (quality.target_error, deadline) {
         (Some(error), deadline) => render::adaptive(world, integrator, settings, error, deadline, watch),

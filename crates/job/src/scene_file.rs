@@ -128,8 +128,8 @@ impl SceneFile {
 
     /// Builds fields for their records only: hash, files, warnings and plants do not change, but much of the ground is left out.
     #[must_use]
-    pub fn told_only(mut self) -> Self {
-        self.options.told_only = true;
+    pub fn records_only(mut self) -> Self {
+        self.options.records_only = true;
         self
     }
 
@@ -165,8 +165,8 @@ impl SceneFile {
 
     /// Returns the warnings of field `index` that can be found without building it. [`Field::warnings`](furrow_field::Field) of the built
     /// field repeats them.
-    pub fn foretold(&self, index: u64) -> Result<Vec<String>> {
-        self.source.foretold(&Options { index, ..self.options.clone() })
+    pub fn expected_warnings(&self, index: u64) -> Result<Vec<String>> {
+        self.source.expected_warnings(&Options { index, ..self.options.clone() })
     }
 
     /// Returns the cameras of field `index`, one for each image of a day in the order of the images, without building the field.

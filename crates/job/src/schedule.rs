@@ -30,14 +30,14 @@ pub enum ResultOrder {
 /// Items, and the results that wait for the consumer.
 pub struct Schedule<I, T> {
     order: ResultOrder,
-    inside: Mutex<Inside<I, T>>,
+    inside: Mutex<ScheduleState<I, T>>,
     changed: Condvar,
 }
 
 /// An item with its result.
 type Made<I, T> = (I, Result<T>);
 
-struct Inside<I, T> {
+struct ScheduleState<I, T> {
     /// Groups of items that no worker has taken.
     groups: Box<dyn Iterator<Item = Vec<I>> + Send>,
     /// Number of items that were started.
@@ -50,7 +50,7 @@ struct Inside<I, T> {
     left: bool,
 }
 
-impl<I, T> Inside<I, T> {
+impl<I, T> ScheduleState<I, T> {
     /// Starts the next item of a group, or of the next group; returns `None` if there is none.
     fn next(&mut self, group: &mut std::vec::IntoIter<I>) -> Option<(u64, I)> {
         while group.len() == 0 {
@@ -66,8 +66,13 @@ impl<I, T> Inside<I, T> {
 impl<I, T> Schedule<I, T> {
     /// Creates a schedule of these groups of items.
     pub fn new(groups: impl Iterator<Item = Vec<I>> + Send + 'static, order: ResultOrder) -> Self {
-        let inside =
-            Inside { groups: Box::new(groups), started: 0, results: BTreeMap::new(), closed: false, left: false };
+        let inside = ScheduleState {
+            groups: Box::new(groups),
+            started: 0,
+            results: BTreeMap::new(),
+            closed: false,
+            left: false,
+        };
         Self { order, inside: Mutex::new(inside), changed: Condvar::new() }
     }
 
@@ -109,7 +114,7 @@ impl<I, T> Schedule<I, T> {
     /// Waits for room, and returns the next item of the worker's group, or of a new group, with its number. Returns
     /// `None` if no item may be started.
     fn begin(&self, group: &mut std::vec::IntoIter<I>, stopped: impl Fn() -> bool) -> Option<(u64, I)> {
-        let full = |inside: &mut Inside<I, T>| match self.order {
+        let full = |inside: &mut ScheduleState<I, T>| match self.order {
             ResultOrder::AsFinished => false,
             ResultOrder::InOrder { ahead } => !inside.closed && inside.results.len() >= ahead,
         };
@@ -130,7 +135,7 @@ impl<I, T> Schedule<I, T> {
 
     /// Waits for the next result and returns it with its item; `None` after the last.
     pub fn take(&self) -> Option<(I, Result<T>)> {
-        let ready = |inside: &Inside<I, T>| {
+        let ready = |inside: &ScheduleState<I, T>| {
             let mut results = inside.results.iter();
             let next = match self.order {
                 ResultOrder::AsFinished => results.find(|(_, made)| made.is_some()),
@@ -138,7 +143,7 @@ impl<I, T> Schedule<I, T> {
             };
             next.map(|(number, _)| *number)
         };
-        let waits = |inside: &mut Inside<I, T>| {
+        let waits = |inside: &mut ScheduleState<I, T>| {
             !inside.left && ready(inside).is_none() && !(inside.closed && inside.results.is_empty())
         };
         let mut inside = self.changed.wait_while(self.lock(), waits).unwrap_or_else(PoisonError::into_inner);
@@ -157,7 +162,7 @@ impl<I, T> Schedule<I, T> {
         self.changed.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inside<I, T>> {
+    fn lock(&self) -> MutexGuard<'_, ScheduleState<I, T>> {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -25,12 +25,12 @@ pub use self::exr::{
     Geometry, Precision, decode_geometry, encode_geometry, encode_layers, encode_planes, half, read_geometry,
 };
 pub use self::png::{
-    Map, Picture, decode_gray, decode_gray16, decode_indexed, decode_numbers, decode_rgb, encode as encode_png, packed,
-    read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
+    ImageData, Map, decode_gray, decode_gray16, decode_indexed, decode_numbers, decode_rgb, encode as encode_png,
+    packed, read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
 pub use denoise::Denoiser;
 pub use furrow_base::atomic_file::{
-    Together, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
+    FileSet, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
     stream_atomically, write_atomically, write_together,
 };
 pub use lock::Lock;
@@ -129,7 +129,7 @@ impl Provenance {
 }
 
 /// Writes an image file atomically.
-pub fn write_png(path: &Path, width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<()> {
+pub fn write_png(path: &Path, width: u32, height: u32, picture: &ImageData<'_>, text: &str) -> Result<()> {
     write_atomically(path, &png::encode(width, height, picture, text)?)
 }
 
@@ -148,17 +148,17 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
     let rgb = photograph.rgb.as_chunks::<3>().0;
     let overlay = overlay::draw(rgb, labels);
     let mut files = vec![
-        ("rgb.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
-        ("nir.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("rgb.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
+        ("nir.png", png::encode(w, h, &ImageData::Gray(&photograph.nir), &text)?),
         ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
-        ("semantics.png", png::encode(w, h, &Picture::Indexed(&classes, &palette), &text)?),
-        ("plants.png", png::encode(w, h, &Picture::Numbers(&plants), &text)?),
-        ("leaves.png", png::encode(w, h, &Picture::Gray16(&leaves), &text)?),
-        ("overlay.png", png::encode(w, h, &Picture::Rgb(&overlay), &text)?),
+        ("semantics.png", png::encode(w, h, &ImageData::Indexed(&classes, &palette), &text)?),
+        ("plants.png", png::encode(w, h, &ImageData::Numbers(&plants), &text)?),
+        ("leaves.png", png::encode(w, h, &ImageData::Gray16(&leaves), &text)?),
+        ("overlay.png", png::encode(w, h, &ImageData::Rgb(&overlay), &text)?),
     ];
     if let Some(Deep { rgb, nir }) = &photograph.deep {
-        files.push(("rgb16.png", png::encode(w, h, &Picture::Rgb16(rgb.as_chunks::<3>().0), &text)?));
-        files.push(("nir16.png", png::encode(w, h, &Picture::Gray16(nir), &text)?));
+        files.push(("rgb16.png", png::encode(w, h, &ImageData::Rgb16(rgb.as_chunks::<3>().0), &text)?));
+        files.push(("nir16.png", png::encode(w, h, &ImageData::Gray16(nir), &text)?));
     }
     Ok(files)
 }
@@ -169,8 +169,8 @@ pub fn denoised_files(film: &Film, photograph: &Photograph, provenance: &Provena
     let text = provenance.photograph_text(true);
     let rgb = photograph.rgb.as_chunks::<3>().0;
     Ok(vec![
-        ("rgb_denoised.png", png::encode(w, h, &Picture::Rgb(rgb), &text)?),
-        ("nir_denoised.png", png::encode(w, h, &Picture::Gray(&photograph.nir), &text)?),
+        ("rgb_denoised.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
+        ("nir_denoised.png", png::encode(w, h, &ImageData::Gray(&photograph.nir), &text)?),
         ("denoised.exr", exr::encode_radiance(film, &text)?),
     ])
 }

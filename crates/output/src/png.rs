@@ -7,7 +7,7 @@ use png::{BitDepth, ColorType};
 use std::path::Path;
 
 /// Image data, row by row from the top.
-pub enum Picture<'a> {
+pub enum ImageData<'a> {
     /// 8-bit sRGB.
     Rgb(&'a [[u8; 3]]),
     /// 8-bit numbers, three per pixel, that are not colours.
@@ -32,40 +32,40 @@ fn failed(error: impl std::fmt::Display) -> Error {
 }
 
 /// Encodes an image; `text` is stored as its `Comment`.
-pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Result<Vec<u8>> {
+pub fn encode(width: u32, height: u32, picture: &ImageData<'_>, text: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     let data = match picture {
-        Picture::Rgb(pixels) => {
+        ImageData::Rgb(pixels) => {
             encoder.set_color(ColorType::Rgb);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
             pixels.as_flattened().to_vec()
         }
-        Picture::Linear(pixels) => {
+        ImageData::Linear(pixels) => {
             encoder.set_color(ColorType::Rgb);
             pixels.as_flattened().to_vec()
         }
-        Picture::Rgba(pixels) => {
+        ImageData::Rgba(pixels) => {
             encoder.set_color(ColorType::Rgba);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
             pixels.as_flattened().to_vec()
         }
-        Picture::Rgb16(pixels) => {
+        ImageData::Rgb16(pixels) => {
             encoder.set_color(ColorType::Rgb);
             encoder.set_depth(BitDepth::Sixteen);
             encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
             pixels.as_flattened().iter().flat_map(|p| p.to_be_bytes()).collect()
         }
-        Picture::Gray(pixels) => {
+        ImageData::Gray(pixels) => {
             encoder.set_color(ColorType::Grayscale);
             pixels.to_vec()
         }
-        Picture::Gray16(pixels) => {
+        ImageData::Gray16(pixels) => {
             encoder.set_color(ColorType::Grayscale);
             encoder.set_depth(BitDepth::Sixteen);
             pixels.iter().flat_map(|p| p.to_be_bytes()).collect()
         }
-        Picture::Numbers(numbers) => match numbers.iter().copied().max().unwrap_or(0) {
+        ImageData::Numbers(numbers) => match numbers.iter().copied().max().unwrap_or(0) {
             most if u16::try_from(most).is_ok() => {
                 encoder.set_color(ColorType::Grayscale);
                 encoder.set_depth(BitDepth::Sixteen);
@@ -77,7 +77,7 @@ pub fn encode(width: u32, height: u32, picture: &Picture<'_>, text: &str) -> Res
             }
             most => return Err(failed(format!("its numbers reach {most}, above the limit of {MOST_PLANTS}"))),
         },
-        Picture::Indexed(pixels, palette) => {
+        ImageData::Indexed(pixels, palette) => {
             encoder.set_color(ColorType::Indexed);
             encoder.set_palette(palette.as_flattened().to_vec());
             pixels.to_vec()
@@ -187,7 +187,7 @@ pub fn decode_gray16(path: &Path, bytes: &[u8]) -> Result<(u32, u32, Vec<u16>)> 
     Ok((w, h, bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()))
 }
 
-/// Reads a PNG of numbers, written as [`Picture::Numbers`]: width, height, numbers.
+/// Reads a PNG of numbers, written as [`ImageData::Numbers`]: width, height, numbers.
 pub fn read_numbers(path: &Path) -> Result<(u32, u32, Vec<u32>)> {
     decode_numbers(path, &whole(path)?)
 }
@@ -286,7 +286,7 @@ mod tests {
     use super::*;
 
     fn of(numbers: &[u32]) -> Result<Vec<u8>> {
-        encode(numbers.len() as u32, 1, &Picture::Numbers(numbers), "")
+        encode(numbers.len() as u32, 1, &ImageData::Numbers(numbers), "")
     }
 
     /// Rationale: datasets of fields with few plants keep their bytes. Expected: those of a 16-bit gray image up to the
@@ -295,7 +295,7 @@ mod tests {
     fn numbers_of_16_bits_are_gray() {
         for numbers in [vec![0], vec![0, 1, 65_535, 256]] {
             let short: Vec<u16> = numbers.iter().map(|n| *n as u16).collect();
-            let gray = encode(short.len() as u32, 1, &Picture::Gray16(&short), "").unwrap();
+            let gray = encode(short.len() as u32, 1, &ImageData::Gray16(&short), "").unwrap();
             assert_eq!(of(&numbers).unwrap(), gray);
             assert_eq!(decode_numbers(Path::new("a.png"), &gray).unwrap().2, numbers);
         }
@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(decode_rgb(path, &bytes).unwrap().2, [[0; 3], [0, 0, 1], [0x70, 0x11, 1], [255; 3]]);
         assert_eq!(decode_numbers(path, &bytes).unwrap(), (4, 1, numbers.to_vec()));
         assert!(of(&[MOST_PLANTS + 1]).is_err());
-        let eight = encode(1, 1, &Picture::Gray(&[7]), "").unwrap();
+        let eight = encode(1, 1, &ImageData::Gray(&[7]), "").unwrap();
         assert!(decode_numbers(path, &eight).unwrap_err().message().contains("16-bit gray or 8-bit RGB"));
     }
 }

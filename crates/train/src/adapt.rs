@@ -1,7 +1,7 @@
 //! Self-training of a trained network on photographs without labels: reads a run's folder and writes another.
 
 use super::data::{Augment, AugmentScale, Photos, Selection};
-use super::deploy::pictures::Picture;
+use super::deploy::input_images::InputImage;
 use super::fit::class_weights::ClassWeights;
 use super::fit::hyper::NormalizationMode;
 use super::fit::{Adaptation, Callbacks, Hyperparameters, Plan};
@@ -17,7 +17,7 @@ const EMA: f64 = 0.99;
 const CROP: (u32, u32) = (320, 256);
 
 /// Options of a self-training, as a user gives them.
-pub struct Asked<'a> {
+pub struct AdaptOptions<'a> {
     /// Folder of the run whose weights the training starts from.
     pub run: &'a Path,
     /// Labelled training images; if empty, the training set of the run.
@@ -40,7 +40,7 @@ pub struct Asked<'a> {
     pub threads: usize,
 }
 
-impl Asked<'_> {
+impl AdaptOptions<'_> {
     /// Returns the plan of the training, without its photographs ([`Plan::adaptation`]).
     fn plan(&self, card: &ModelCard) -> Result<Plan> {
         let path = self.run.join(run::PLAN);
@@ -96,7 +96,7 @@ impl Asked<'_> {
     /// interruption, the same call resumes.
     pub fn adapt(
         &self,
-        pictures: &[Picture],
+        pictures: &[InputImage],
         machine: &Machine,
         folder: &Path,
         callbacks: &Callbacks<'_>,

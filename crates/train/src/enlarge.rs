@@ -8,10 +8,10 @@
 /// at the border. Ties go to the lower class number.
 pub fn classes_at(scores: &[f32], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
     let plane = from.0 as usize * from.1 as usize;
-    let columns: Vec<Between> = (0..to.0).map(|x| Between::of(x, from.0, to.0)).collect();
+    let columns: Vec<LinearTap> = (0..to.0).map(|x| LinearTap::of(x, from.0, to.0)).collect();
     let mut classes = Vec::with_capacity(to.0 as usize * to.1 as usize);
     for y in 0..to.1 {
-        let row = Between::of(y, from.1, to.1);
+        let row = LinearTap::of(y, from.1, to.1);
         let (above, below) = (row.first * from.0 as usize, row.second * from.0 as usize);
         for column in &columns {
             let mut best = (0, f32::NEG_INFINITY);
@@ -29,14 +29,14 @@ pub fn classes_at(scores: &[f32], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
 }
 
 /// Linear interpolation of one output pixel between two neighbouring source pixels along one axis.
-struct Between {
+struct LinearTap {
     first: usize,
     second: usize,
     /// Weight of the second source pixel, 0 to 1.
     share: f32,
 }
 
-impl Between {
+impl LinearTap {
     /// Returns the source pixels and the weight for output pixel `i`; `from` and `to` are the source and output lengths in pixels.
     fn of(i: u32, from: u32, to: u32) -> Self {
         let place = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;

@@ -5,7 +5,7 @@
 
 use super::run::{self, ModelCard, TrainedModel};
 #[cfg(feature = "torch")]
-use super::torch::{Model, Where};
+use super::torch::{Model, Placement};
 use super::weights::{self, Array};
 use furrow_base::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ impl Ensemble {
 
     /// Returns the models, loaded on the device `place`. If all images are stretched to one size, that size is checked against the memory.
     #[cfg(feature = "torch")]
-    pub fn models(&self, place: Where) -> Result<Vec<Model>> {
+    pub fn models(&self, place: Placement) -> Result<Vec<Model>> {
         let ModelCard { network, input, classes, resize, .. } = &self.card;
         let model = |values| Model::with(*network, input.bands.len(), classes.len(), values, place);
         let models = self.members.iter().map(|values| model(values)).collect::<Result<Vec<_>>>()?;

@@ -18,7 +18,7 @@ use super::weights::{self, Array, Stored};
 use furrow_base::input::{below, shipped};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::classes::Classes;
-use furrow_output::{Together, write_atomically, write_together};
+use furrow_output::{FileSet, write_atomically, write_together};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
@@ -292,7 +292,7 @@ impl TrainedModel {
         let text = serde_json::to_string(&self.card).map_err(|e| failed(&e))?;
         let path = below(folder, &self.card.weights)?;
         let (values, card) = (weights::encode(&path, &self.values, &text, stored)?, json(&self.card)?);
-        let add_both = |files: &mut Together| {
+        let add_both = |files: &mut FileSet| {
             files.add(&path, &values)?;
             files.add(&folder.join(MODEL), &card)
         };
@@ -360,7 +360,7 @@ mod tests {
     /// Rationale: a field that has its default value is not written, and was once not compared. Expected: the error lists the
     /// difference, whichever of the two plans has the field.
     #[test]
-    fn what_differs_from_the_plan_of_a_folder_is_told_both_ways() {
+    fn differences_from_the_plan_of_a_folder_are_reported_both_ways() {
         let plain = Identity { plan: Plan::default(), train: Vec::new(), val: Vec::new() };
         let mut averaged = plain.clone();
         averaged.plan.hyper.ema = 0.9;
@@ -370,8 +370,8 @@ mod tests {
         ] {
             let folder = tempfile::tempdir().unwrap();
             there.claim(folder.path()).unwrap();
-            let said = here.claim(folder.path()).unwrap_err().to_string();
-            assert!(said.contains(words), "{said}");
+            let message = here.claim(folder.path()).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
         }
     }
 }

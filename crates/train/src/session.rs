@@ -12,7 +12,7 @@ use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
 use super::net::{Parameter, fitting, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
-use super::torch::{Model, Precision, Where, device, guarded, multiscale};
+use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
 use super::weights::{self, Array};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::split::Split;
@@ -43,9 +43,9 @@ impl Default for Machine {
 
 impl Machine {
     /// Finds the device, and parses `precision` (`f32`, `bf16` or `auto`) for it.
-    pub fn place(&self, precision: &str) -> Result<Where> {
+    pub fn place(&self, precision: &str) -> Result<Placement> {
         let device = device::find(&self.device)?;
-        Ok(Where { device, precision: Precision::named(precision, device).map_err(Error::input)? })
+        Ok(Placement { device, precision: Precision::named(precision, device).map_err(Error::input)? })
     }
 }
 
@@ -274,7 +274,7 @@ fn evaluate_here(
         Ok((size, example, inputs))
     };
     let (refine, bands) = (card.refine, &card.input.bands);
-    let pictures = multiscale::learnt_from(refine, store.len()).into_iter();
+    let pictures = multiscale::training_images(refine, store.len()).into_iter();
     let appearance = multiscale::learn(&models, refine, bands, pictures.map(|place| Ok(open(place)?.2)))?;
     for place in 0..store.len() {
         let (size, example, inputs) = open(place)?;

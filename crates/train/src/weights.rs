@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_come_back_and_damage_is_told() {
+    fn weights_come_back_and_damage_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("w.safetensors");
         write(&path, &arrays(), "{\"step\": 3}\nsecond line").unwrap();

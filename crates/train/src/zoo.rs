@@ -72,7 +72,7 @@ mod tests {
         for other in ["no-such-network", "./any-field", "networks/any-field", "src", "", ".."] {
             assert_eq!(folder(Path::new(other)), Path::new(other));
         }
-        let told = TrainedModel::open(Path::new("no-such-network")).unwrap_err().to_string();
-        assert!(told.contains("train zoo"), "{told}");
+        let message = TrainedModel::open(Path::new("no-such-network")).unwrap_err().to_string();
+        assert!(message.contains("train zoo"), "{message}");
     }
 }

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(out)?;
     let say = |text: String| {
         if !args.work.quiet {
-            furrow_cli::tell!("{text}");
+            furrow_cli::message!("{text}");
         }
     };
     let mut sets: Vec<Set> = Vec::new();
@@ -136,10 +136,10 @@ fn chosen(args: &Args) -> Result<Vec<&'static Edit>> {
                 .help("leave it out, or give other arguments"));
             }
             if !args.work.quiet {
-                furrow_cli::tell!("{} is left out: the full dataset is already rendered like this", edit.name);
+                furrow_cli::message!("{} is left out: the full dataset is already rendered like this", edit.name);
             }
         } else if let (false, Err(e)) = (named, possible(&options, &full)) {
-            furrow_cli::tell!("warning: {} is left out: {e}", edit.name);
+            furrow_cli::message!("warning: {} is left out: {e}", edit.name);
         } else {
             all.push(edit);
         }

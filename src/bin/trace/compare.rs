@@ -85,11 +85,11 @@ fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
     let gap = pool.install(|| gap::Gap::of(real, synthetic, &options, &start, &|| progress.add()))?;
     progress.finish();
     for warning in &gap.warnings {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     let paths = gap.write(&args.out)?;
     if !args.quiet {
-        furrow_cli::tell!("{}", gap.table().trim_end());
+        furrow_cli::message!("{}", gap.table().trim_end());
     }
     Ok(paths)
 }
@@ -97,7 +97,7 @@ fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
 fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
     let found = Pairs::find(a, b, args.labels.as_deref())?;
     for warning in found.warnings() {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(found.pairs.len() as u64);
@@ -107,7 +107,7 @@ fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
     progress.finish();
     let paths = comparison.write(&args.out)?;
     if !args.quiet {
-        furrow_cli::tell!("{}", comparison.table().trim_end());
+        furrow_cli::message!("{}", comparison.table().trim_end());
     }
     Ok(paths)
 }

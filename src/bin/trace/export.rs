@@ -72,9 +72,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join(args.format.name()));
     cli::check_folder(&out)?;
-    let tell = |words: &str| {
+    let note = |words: &str| {
         if !args.quiet {
-            furrow_cli::tell!("{words}");
+            furrow_cli::message!("{words}");
         }
     };
     if args.skins && !matches!(args.format, Format::Gltf) {
@@ -87,12 +87,12 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     }
     let density = args.density.unwrap_or(DENSITY);
     let threads = Threads::all()?;
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), tell)?;
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), note)?;
     let export = field.threads().install(|| args.format.write(&out, field.grown(), density))?;
     for warning in &export.warnings {
-        tell(&format!("warning: {warning}"));
+        note(&format!("warning: {warning}"));
     }
     let amount = export.amount.unwrap_or_else(|| format!("{} files", export.paths.len()));
-    tell(&format!("{}: {amount} in {}", args.field.path().display(), out.display()));
+    note(&format!("{}: {amount} in {}", args.field.path().display(), out.display()));
     Ok(export.paths)
 }

@@ -92,21 +92,21 @@ impl FieldArgs {
         self.scene.check()
     }
 
-    /// Builds the field with an edit and these scene options. Warnings are passed to `tell` as soon as they are known.
+    /// Builds the field with an edit and these scene options. Warnings are passed to `note` as soon as they are known.
     pub(crate) fn grow_as(
         &self,
         edit: &'static Edit,
         asked: impl FnOnce(SceneFile) -> SceneFile,
-        tell: impl Fn(&str),
+        note: impl Fn(&str),
     ) -> Result<Field> {
-        let tell = |warning: &String| tell(&format!("warning: {warning}"));
+        let note = |warning: &String| note(&format!("warning: {warning}"));
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
         let scene = asked(scene.day(self.day).memory(self.memory.bytes));
-        let foretold = scene.foretold(self.index)?;
-        foretold.iter().for_each(tell);
+        let expected_warnings = scene.expected_warnings(self.index)?;
+        expected_warnings.iter().for_each(note);
         let mut field = scene.field(self.index)?;
-        field.grown().warnings.iter().filter(|warning| !foretold.contains(warning)).for_each(tell);
+        field.grown().warnings.iter().filter(|warning| !expected_warnings.contains(warning)).for_each(note);
         let captures = &field.grown().captures;
         let place = captures.iter().position(|c| c.frame == self.frame && c.name == self.camera);
         let Some(place) = place else {

@@ -45,7 +45,7 @@ impl Line {
         let mut last = log.lock().unwrap_or_else(PoisonError::into_inner);
         if last.is_none_or(|last| last.elapsed() >= LOGGED) {
             *last = Some(Instant::now());
-            furrow_cli::tell!("{work}");
+            furrow_cli::message!("{work}");
         }
     }
 

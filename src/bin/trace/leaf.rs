@@ -2,7 +2,7 @@
 
 use furrow_base::Result;
 use furrow_cli::cli;
-use furrow_optics::texture::{Cutting, cut_out, doubts, draw};
+use furrow_optics::texture::{CutoutOptions, cut_out, doubts, draw};
 use furrow_output::{read_color_photo, write_atomically};
 use std::path::PathBuf;
 
@@ -47,18 +47,18 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     cli::check_png(&args.out, &args.photo)?;
     let (width, height, rgb) = read_color_photo(&args.photo)?;
     let grey = args.grey.map(|g| ([g.x0, g.y0, g.width(), g.height()], args.reflectance));
-    let cutting = Cutting { flip: args.flip, stalk: args.stalk, holes: args.holes, height: args.height, grey };
+    let cutting = CutoutOptions { flip: args.flip, stalk: args.stalk, holes: args.holes, height: args.height, grey };
     let leaf = cut_out(width, height, &rgb, &cutting).map_err(|e| e.in_file(&args.photo))?;
     for doubt in doubts(width, height, &rgb, args.flip) {
-        furrow_cli::tell!("warning: {}: {doubt}", args.photo.display());
+        furrow_cli::message!("warning: {}: {doubt}", args.photo.display());
     }
-    furrow_cli::tell!("{} × {} pixels; the blade's width/length is {:.2}", leaf.width, leaf.height, aspect(&leaf));
+    furrow_cli::message!("{} × {} pixels; the blade's width/length is {:.2}", leaf.width, leaf.height, aspect(&leaf));
     write_atomically(&args.out, &draw::encode(&leaf, "cut out of a photograph by furrow"))?;
     Ok(vec![args.out.clone()])
 }
 
 /// Ratio of width to length of the opaque part: `width_mm` divided by `blade_mm` in a species file.
-fn aspect(leaf: &draw::Drawn) -> f32 {
+fn aspect(leaf: &draw::GeneratedTexture) -> f32 {
     let (mut lo, mut hi) = ([u32::MAX; 2], [0; 2]);
     for (i, _) in leaf.rgba.chunks_exact(4).enumerate().filter(|(_, p)| p[3] > 127) {
         let at = [i as u32 % leaf.width, i as u32 / leaf.width];

@@ -16,7 +16,7 @@ pub(crate) fn species() -> Result<Vec<PathBuf>> {
     let mut rows = Vec::new();
     let (all, faults) = all_species()?;
     for (_, fault) in faults {
-        furrow_cli::tell!("warning: {fault}");
+        furrow_cli::message!("warning: {fault}");
     }
     for species in all {
         let desc = &species.desc;

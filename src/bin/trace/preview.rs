@@ -7,8 +7,8 @@ use crate::render::plants;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
 use furrow_job::{Renderer, Request, SceneFile, Threads};
-use furrow_output::Picture;
-use furrow_render::render::Watch;
+use furrow_output::ImageData;
+use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Quality, RenderOptions};
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -72,7 +72,7 @@ fn indices(text: &str) -> std::result::Result<Range<u64>, String> {
 }
 
 /// Image of one field.
-struct Shot {
+struct Thumbnail {
     words: String,
     width: usize,
     pixels: Vec<[u8; 3]>,
@@ -88,38 +88,38 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_png(&out, &args.scene)?;
     let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(args.spp)))?;
     let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).memory(args.memory.bytes);
-    let stop = signals.heed();
+    let stop = signals.catch();
     let scene = scene.threads(&Threads::new(args.threads)?).until(stop);
     if !args.quiet
         && let Some(plants) = scene.plants_in_view(MOST)
     {
-        furrow_cli::tell!("{}", plants.told());
+        furrow_cli::message!("{}", plants.message());
     }
-    let (mut shots, mut seed, mut told) = (Vec::new(), 0, BTreeSet::new());
+    let (mut thumbnails, mut seed, mut warned) = (Vec::new(), 0, BTreeSet::new());
     let mut warn = |words: &String| {
         // Most warnings are the same for all fields of a scene file.
-        if !args.quiet && told.insert(words.clone()) {
-            furrow_cli::tell!("warning: {words}");
+        if !args.quiet && warned.insert(words.clone()) {
+            furrow_cli::message!("warning: {words}");
         }
     };
     for index in args.indices.clone() {
-        scene.foretold(index)?.iter().for_each(&mut warn);
+        scene.expected_warnings(index)?.iter().for_each(&mut warn);
         let field = scene.field(index)?;
-        let request = Request { watch: Watch { done: &|_| (), stop }, ..Request::default() };
+        let request = Request { watch: RenderMonitor { done: &|_| (), stop }, ..Request::default() };
         let photograph = renderer.render(&field, &request)?.photograph();
         let grown = field.grown();
         seed = grown.seed;
         if !args.quiet {
-            furrow_cli::tell!("index {index}: {}", plants(grown.plants.len()));
+            furrow_cli::message!("index {index}: {}", plants(grown.plants.len()));
         }
         grown.warnings.iter().for_each(&mut warn);
-        shots.push(Shot {
+        thumbnails.push(Thumbnail {
             words: format!("index {index}"),
             width: photograph.width as usize,
             pixels: photograph.rgb.as_chunks::<3>().0.to_vec(),
         });
     }
-    let sheet = compose(&shots, args.columns as usize)?;
+    let sheet = compose(&thumbnails, args.columns as usize)?;
     let Range { start, end } = args.indices;
     let text = format!(
         "program: furrow {}\nseed: {seed}\nindices: {start}..{end}\nspp: {}",
@@ -130,36 +130,40 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         &out,
         sheet.width as u32,
         (sheet.pixels.len() / sheet.width) as u32,
-        &Picture::Rgb(&sheet.pixels),
+        &ImageData::Rgb(&sheet.pixels),
         &text,
     )?;
     Ok(vec![out])
 }
 
 /// An RGB image.
-struct Sheet {
+struct ContactSheet {
     width: usize,
     pixels: Vec<[u8; 3]>,
 }
 
 /// Arranges images in a grid, each below its text.
-fn compose(shots: &[Shot], columns: usize) -> Result<Sheet> {
-    let columns = columns.min(shots.len()).max(1);
-    let wide = shots.iter().map(|shot| shot.width.max(shot.words.len() * letters::PITCH * DOT)).max().unwrap_or(0);
-    let tall = shots.iter().map(|shot| shot.pixels.len() / shot.width.max(1)).max().unwrap_or(0);
+fn compose(thumbnails: &[Thumbnail], columns: usize) -> Result<ContactSheet> {
+    let columns = columns.min(thumbnails.len()).max(1);
+    let wide = thumbnails
+        .iter()
+        .map(|thumbnail| thumbnail.width.max(thumbnail.words.len() * letters::PITCH * DOT))
+        .max()
+        .unwrap_or(0);
+    let tall = thumbnails.iter().map(|thumbnail| thumbnail.pixels.len() / thumbnail.width.max(1)).max().unwrap_or(0);
     let width = GAP + columns * (wide + GAP);
-    let height = GAP + shots.len().div_ceil(columns) * (LINE + tall + GAP);
+    let height = GAP + thumbnails.len().div_ceil(columns) * (LINE + tall + GAP);
     if width * height > MOST_PIXELS {
         let help = "a smaller --width or fewer --indices";
         return Err(Error::misuse(format!("a sheet of {width} × {height} pixels is too large")).help(help));
     }
-    let mut sheet = Sheet { width, pixels: vec![PAPER; width * height] };
-    for (i, shot) in shots.iter().enumerate() {
+    let mut sheet = ContactSheet { width, pixels: vec![PAPER; width * height] };
+    for (i, thumbnail) in thumbnails.iter().enumerate() {
         let (x, y) = (GAP + i % columns * (wide + GAP), GAP + i / columns * (LINE + tall + GAP));
-        letters::draw(&mut sheet.pixels, width, &shot.words, (x, y), DOT, INK);
-        for (row, pixels) in shot.pixels.chunks_exact(shot.width).enumerate() {
+        letters::draw(&mut sheet.pixels, width, &thumbnail.words, (x, y), DOT, INK);
+        for (row, pixels) in thumbnail.pixels.chunks_exact(thumbnail.width).enumerate() {
             let start = (y + LINE + row) * width + x;
-            sheet.pixels[start..start + shot.width].copy_from_slice(pixels);
+            sheet.pixels[start..start + thumbnail.width].copy_from_slice(pixels);
         }
     }
     Ok(sheet)
@@ -179,8 +183,9 @@ mod tests {
 
     #[test]
     fn every_picture_stands_below_its_words() {
-        let shot = |n: u8| Shot { words: format!("index {n}"), width: 120, pixels: vec![[n, 0, 0]; 120 * 40] };
-        let sheet = compose(&[shot(1), shot(2), shot(3)], 2).unwrap();
+        let thumbnail =
+            |n: u8| Thumbnail { words: format!("index {n}"), width: 120, pixels: vec![[n, 0, 0]; 120 * 40] };
+        let sheet = compose(&[thumbnail(1), thumbnail(2), thumbnail(3)], 2).unwrap();
         assert_eq!(
             (sheet.width, sheet.pixels.len() / sheet.width),
             (GAP + 2 * (120 + GAP), GAP + 2 * (LINE + 40 + GAP))

@@ -11,7 +11,7 @@ use furrow_cli::cli::signal::Signals;
 use furrow_field::ablation::{Edit, FULL};
 use furrow_job::{Field, Image, Renderer, Request, Threads, View};
 use furrow_render::film::Film;
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Engine, Quality};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -78,10 +78,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let renderer = Renderer::open(&options)?;
     let threads = Threads::new(args.threads)?;
     let growing = Line::begin(args.quiet);
-    let tell = |words: &str| growing.pause(|| args.say(words));
-    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), tell)?;
+    let note = |words: &str| growing.pause(|| args.say(words));
+    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), note)?;
     if let Some(warning) = renderer.warning(&field) {
-        tell(&format!("warning: {warning}"));
+        note(&format!("warning: {warning}"));
     }
     let camera = &field.grown().scene.camera;
     let (width, height) = (camera.width(), camera.height());
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     if options.engine == Engine::Trace {
         field.geometry()?;
-        tell(&grown(args.field.path(), &field));
+        note(&grown(args.field.path(), &field));
     }
     growing.end();
     let sampled = AtomicU64::new(0);
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         sampled.fetch_add(samples, Ordering::Relaxed);
         bar.inc(samples);
     };
-    let watch = Watch { done: &done, stop: signals.heed() };
+    let watch = RenderMonitor { done: &done, stop: signals.catch() };
     let request = Request { window: args.crop, view: args.integrator, begin: Some(begin), watch };
     let image = renderer.render(&field, &request)?;
     bar.finish_and_clear();
@@ -124,7 +124,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 impl Args {
     fn say(&self, text: &str) {
         if !self.quiet {
-            furrow_cli::tell!("{text}");
+            furrow_cli::message!("{text}");
         }
     }
 }

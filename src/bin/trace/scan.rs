@@ -31,21 +31,21 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     args.field.check()?;
     let out = args.out.clone().unwrap_or_else(|| args.field.default_folder().join("scan"));
     cli::check_folder(&out)?;
-    let tell = |words: &str| {
+    let note = |words: &str| {
         if !args.quiet {
-            furrow_cli::tell!("{words}");
+            furrow_cli::message!("{words}");
         }
     };
     let threads = Threads::all()?;
     let named = args.lidar.as_deref().and_then(LidarDesc::named);
     let scanner = named.map_or(Scanner::OfScene, |lidar| Scanner::AtCamera(Box::new(lidar)));
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), tell)?;
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), note)?;
     let (lidar, echoes) = field.scan()?;
     if echoes.is_empty() {
-        tell("warning: there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
+        note("warning: there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }
     let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes)?;
     let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());
-    tell(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
+    note(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
     Ok(paths)
 }

@@ -1,7 +1,7 @@
 //! `trace sequence`: renders all images of a drive through one or several fields, or of several days, as a dataset.
 
-use crate::dataset::bill::{self, DryRunArgs};
-use crate::dataset::order::{ContentArgs, LookArgs, begin, formats};
+use crate::dataset::cost_estimate::{self, DryRunArgs};
+use crate::dataset::order::{ContentArgs, RenderingArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
 use furrow_base::{Error, Result};
@@ -37,7 +37,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     content: ContentArgs,
     #[command(flatten)]
-    look: LookArgs,
+    look: RenderingArgs,
     #[command(flatten)]
     memory: MemoryArgs,
     #[command(flatten)]
@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.labels_only = args.look.labels_only;
     args.content.enter(&mut order)?;
     if args.dry.dry_run {
-        return bill::run(&args.out, order, args.work.threads, args.work.quiet, signals);
+        return cost_estimate::run(&args.out, order, args.work.threads, args.work.quiet, signals);
     }
     let set = begin(&args.out, order, args.work.quiet, signals)?;
     generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;

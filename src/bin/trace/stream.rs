@@ -1,6 +1,6 @@
 //! `trace stream`: writes images with their labels to stdout for another program, as they are rendered.
 
-use crate::dataset::order::{ContentArgs, LookArgs};
+use crate::dataset::order::{ContentArgs, RenderingArgs};
 use crate::dataset::render::WorkArgs;
 use crate::field::{MemoryArgs, SceneArgs};
 use furrow_base::{Error, Result};
@@ -40,7 +40,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     content: ContentArgs,
     #[command(flatten)]
-    look: LookArgs,
+    look: RenderingArgs,
     /// Apply one edit to every field, by name; `trace ablate --list` lists them.
     #[arg(long, value_name = "NAME")]
     edit: Option<String>,
@@ -71,24 +71,24 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.scene.check()?;
     let stream = ImageStream::begin(&args.order()?, args.first)?;
     for warning in &stream.warnings {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     let begin = Instant::now();
     let (images, last) = (Cell::new(0_u64), Cell::new(begin));
-    let warn = |words: &str| furrow_cli::tell!("warning: {words}");
+    let warn = |words: &str| furrow_cli::message!("warning: {words}");
     let done = |index: u64| {
         images.set(images.get() + 1);
         if !args.work.quiet && last.get().elapsed() >= EVERY {
             last.set(Instant::now());
-            furrow_cli::tell!("image {} written; {}", Set::name(index), rate(images.get(), begin));
+            furrow_cli::message!("image {} written; {}", Set::name(index), rate(images.get(), begin));
         }
     };
-    let listener = Listener { warn: &warn, done: &done, stop: signals.heed() };
+    let listener = Listener { warn: &warn, done: &done, stop: signals.catch() };
     // A large buffer, because archives are written in small pieces.
     let out = BufWriter::with_capacity(1 << 20, io::stdout());
     let written = stream.write(&args.work.of(args.shard, args.memory.bytes), out, &listener);
     if !args.work.quiet {
-        furrow_cli::tell!(
+        furrow_cli::message!(
             "{} images in {:.1} s: {}",
             images.get(),
             begin.elapsed().as_secs_f64(),

@@ -5,9 +5,9 @@ use crate::machine::MachineArgs;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
-use furrow_train::adapt::Asked;
+use furrow_train::adapt::AdaptOptions;
 use furrow_train::data::Selection;
-use furrow_train::deploy::pictures;
+use furrow_train::deploy::input_images;
 use furrow_train::run::{self, TrainedModel};
 use furrow_train::torch::{Precision, device};
 use std::path::PathBuf;
@@ -57,9 +57,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let trained = TrainedModel::open(&args.run)?;
     cli::check_folder(&args.out)?;
-    let pictures = pictures::find(&args.images, &trained.card.input, &[])?;
+    let pictures = input_images::find(&args.images, &trained.card.input, &[])?;
     let precision = Precision::named(&args.machine.precision, device::find(&args.machine.machine().device)?);
-    let asked = Asked {
+    let asked = AdaptOptions {
         run: &args.run,
         sets: &args.sets,
         val: &args.val,
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         asked.adapt(&pictures, &args.machine.machine(), &args.out, callbacks)
     })?;
     if !args.quiet {
-        furrow_cli::tell!("{}: {}", args.out.display(), fit::in_words(&results));
+        furrow_cli::message!("{}: {}", args.out.display(), fit::in_words(&results));
     }
     let mut paths = [run::WEIGHTS, run::MODEL].map(|file| args.out.join(file)).to_vec();
     paths.extend(fit::write_page(&args.out)?);

@@ -42,19 +42,19 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let (width, height) = args.size;
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
-    let stop = signals.heed();
+    let stop = signals.catch();
     let (_, images) = args.set.open(Pick::All, 0)?;
     let rule = files::fit(args.kind, &args.from, 0, &shape, stop)?;
-    let mut shots = report::shots(images.len(), &Band::RGB, Classes::default().len());
+    let mut thumbnails = report::thumbnails(images.len(), &Band::RGB, Classes::default().len());
     let report = files::evaluate(&rule, &args.set, &shape, stop, &mut |example, predicted| {
-        shots.see(example, args.size, predicted)
+        thumbnails.see(example, args.size, predicted)
     })?;
     let json = args.out.join("baseline.json");
     run::write_json(&json, &rule)?;
     let title = format!("{} on {}", args.kind.name(), args.set.folder.display());
     let lead = "Scores of an ExG threshold; a network that scores lower has learned nothing about shape.";
-    let mut paths = report::write(&args.out, &title, lead, &report, &shots.kept(), &Classes::default().colors())?;
+    let mut paths = report::write(&args.out, &title, lead, &report, &thumbnails.kept(), &Classes::default().colors())?;
     paths.push(json);
-    furrow_cli::tell!("{}", report.summary().markdown().trim_end());
+    furrow_cli::message!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

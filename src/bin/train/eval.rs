@@ -49,10 +49,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let (machine, threads) = (args.machine.machine(), args.machine.threads());
     let card = &trained.card;
     let (_, images) = args.set.open(Pick::All, 0)?;
-    let mut shots = report::shots(images.len(), &card.input.bands, card.classes.len());
-    let mut see = |seen: &session::Predicted<'_>| shots.see(seen.example, seen.size, seen.predicted);
+    let mut thumbnails = report::thumbnails(images.len(), &card.input.bands, card.classes.len());
+    let mut see = |seen: &session::Predicted<'_>| thumbnails.see(seen.example, seen.size, seen.predicted);
     let report =
-        session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.heed(), &mut see)?;
+        session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.catch(), &mut see)?;
     let title = format!("{} on {}", args.run.display(), args.set);
     let lead = format!(
         "{}, {} parameters, {}{}{}.",
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) },
         if trained.size() > 1 { format!("; the mean of {} runs", trained.size()) } else { String::new() }
     );
-    let paths = report::write(&out, &title, &lead, &report, &shots.kept(), &card.classes.colors())?;
-    furrow_cli::tell!("{}", report.summary().markdown().trim_end());
+    let paths = report::write(&out, &title, &lead, &report, &thumbnails.kept(), &card.classes.colors())?;
+    furrow_cli::message!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

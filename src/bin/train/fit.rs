@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let plan = args.plan(*seed, &folder)?;
         let results = fit(&plan, args.init.as_deref(), &args.machine, &folder, args.quiet, signals)?;
         if !args.quiet {
-            furrow_cli::tell!("{}: {}", folder.display(), in_words(&results));
+            furrow_cli::message!("{}: {}", folder.display(), in_words(&results));
         }
         paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
         paths.extend(write_page(&folder)?);
@@ -150,15 +150,15 @@ pub(crate) fn shown(
             iou.join(", ")
         );
         if !quiet {
-            bar.suspend(|| furrow_cli::tell!("{line}"));
+            bar.suspend(|| furrow_cli::message!("{line}"));
         }
     };
     let warn = |words: &str| {
         if !quiet {
-            bar.suspend(|| furrow_cli::tell!("warning: {words}"));
+            bar.suspend(|| furrow_cli::message!("warning: {words}"));
         }
     };
-    let callbacks = Callbacks { step: &step, validation: &validation, warn: &warn, stop: signals.heed() };
+    let callbacks = Callbacks { step: &step, validation: &validation, warn: &warn, stop: signals.catch() };
     let results = work(&callbacks);
     bar.finish_and_clear();
     results

@@ -6,7 +6,7 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_train::data::Band;
-use furrow_train::deploy::pictures;
+use furrow_train::deploy::input_images;
 use furrow_train::deploy::predict::{self, Options, Predictions};
 use furrow_train::ensemble::Ensemble;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = Ensemble::open(&args.run)?;
     args.inference.apply(&mut trained.card)?;
     cli::check_folder(&args.out)?;
-    let pictures = pictures::find(&args.images, &trained.card.input, &args.bands)?;
+    let pictures = input_images::find(&args.images, &trained.card.input, &args.bands)?;
     let passes = predict::passes(&trained.card, pictures.len());
     let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
     let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         batch: args.batch.into(),
         pixel_mm: args.inference.pixel_mm(),
         done: &|done| bar.set_position(done as u64),
-        stop: signals.heed(),
+        stop: signals.catch(),
     };
     let predicted = predict::predict(&trained, &pictures, &args.out, &args.machine.machine(), &how);
     bar.finish_and_clear();
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     if !args.quiet && predicted.done > 0 {
         let each = predicted.seconds / predicted.done as f64;
         let pictures = if predicted.done == 1 { "image" } else { "images" };
-        furrow_cli::tell!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
+        furrow_cli::message!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
     }
     outcome(predicted, pictures.len())
 }

@@ -4,7 +4,7 @@ use furrow_base::Result;
 use furrow_output::write_files;
 use furrow_report::chart::{Chart, Curve};
 use furrow_train::data::Band;
-use furrow_train::figure::{Page, Shot, Shots, sheet};
+use furrow_train::figure::{Page, Thumbnail, Thumbnails, compose};
 use furrow_train::fit::checkpoint::History;
 use furrow_train::fit::log;
 use furrow_train::measure::Report;
@@ -20,8 +20,8 @@ const LARGEST: u32 = 360;
 
 /// Returns a collector for the images to show of a set of `images` images: the worst by mean I/U over `classes` classes, and some
 /// spread over the set.
-pub(crate) fn shots(images: usize, bands: &[Band], classes: usize) -> Shots {
-    Shots::new(images, SPREAD, LARGEST, bands).and_worst(WORST, classes)
+pub(crate) fn thumbnails(images: usize, bands: &[Band], classes: usize) -> Thumbnails {
+    Thumbnails::new(images, SPREAD, LARGEST, bands).and_worst(WORST, classes)
 }
 
 /// Writes `report.json`, `report.md`, `figure.png` and `report.html`; returns their paths.
@@ -30,7 +30,7 @@ pub(crate) fn write(
     title: &str,
     lead: &str,
     report: &Report,
-    shots: &[Shot],
+    thumbnails: &[Thumbnail],
     palette: &[[u8; 3]],
 ) -> Result<Vec<PathBuf>> {
     let tables: String = report.tables().iter().map(|t| t.markdown() + "\n").collect();
@@ -40,14 +40,14 @@ pub(crate) fn write(
         title,
         lead,
         report: Some(report),
-        shots,
+        thumbnails,
         palette,
         classes: &report.classes,
         ..Page::default()
     };
     let files = [
         ("report.html", page.html()?.into_bytes()),
-        ("figure.png", sheet(shots, palette, true).png()?),
+        ("figure.png", compose(thumbnails, palette, true).png()?),
         ("report.json", run::json(report)?),
         ("report.md", tables.into_bytes()),
     ];

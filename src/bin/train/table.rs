@@ -12,11 +12,13 @@ use furrow_dataset::model::classes::Classes;
 use furrow_output::write_atomically;
 use furrow_train::baseline::files;
 use furrow_train::data::{Band, Pick, Selection};
-use furrow_train::figure::sheet;
+use furrow_train::figure::compose;
 use furrow_train::fit::Plan;
 use furrow_train::measure::Report;
 use furrow_train::session::{self, Machine};
-use furrow_train::table::{self, Bound, Callbacks, Experiment, Only, Predictor, Real, State, TableOptions};
+use furrow_train::table::{
+    self, BoundExperiment, Callbacks, Experiment, Predictor, RealSet, State, TableOptions, WorkPart,
+};
 use furrow_train::torch::{Precision, device};
 use indicatif::HumanDuration;
 use std::path::{Path, PathBuf};
@@ -33,8 +35,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Folder of a real dataset of the experiment: a dataset, or a folder with images/ and labels/. May be given several times.
-    #[arg(long, value_name = "NAME=DIR", value_parser = Real::parse)]
-    real: Vec<Real>,
+    #[arg(long, value_name = "NAME=DIR", value_parser = RealSet::parse)]
+    real: Vec<RealSet>,
     /// Leave out the training and test sets that need this dataset. May be given several times.
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
@@ -46,7 +48,7 @@ pub(crate) struct Args {
     row: Shard,
     /// Do only one part of the work.
     #[arg(long, value_enum)]
-    only: Option<Part>,
+    only: Option<WorkPartArg>,
     /// Print the datasets and rows with their progress, and do nothing else. Invalid weights and missing real datasets are reported.
     #[arg(long)]
     dry_run: bool,
@@ -69,7 +71,7 @@ datasets first:
 
 /// A part of the work.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Part {
+enum WorkPartArg {
     /// Render and import the datasets.
     Sets,
     /// Write the tables of the results so far.
@@ -82,19 +84,19 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let experiment = Experiment::of(&page, args.scale.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| usual_folder(&args.page, args.scale.as_deref()));
     cli::check_folder(&out)?;
-    let bound = Bound::new(experiment, &args.real, &args.without, &out)?;
+    let bound = BoundExperiment::new(experiment, &args.real, &args.without, &out)?;
     for name in &bound.left_out {
-        furrow_cli::tell!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
+        furrow_cli::message!("warning: `{name}` is left out: --without {}", args.without.join(" --without "));
     }
-    if args.only != Some(Part::Tables) {
+    if args.only != Some(WorkPartArg::Tables) {
         table::check_pixel_sizes(&bound, &page)?;
     }
     if args.dry_run {
         for error in [bound.check(), table::check_weights(&bound)].into_iter().filter_map(Result::err) {
-            furrow_cli::tell!("warning: {error}");
+            furrow_cli::message!("warning: {error}");
         }
-        furrow_cli::tell!("{}\n", bound.listing()?.markdown().trim_end());
-        furrow_cli::tell!("{}", table::listing(&bound, &out)?.markdown().trim_end());
+        furrow_cli::message!("{}\n", bound.listing()?.markdown().trim_end());
+        furrow_cli::message!("{}", table::listing(&bound, &out)?.markdown().trim_end());
         return Ok(Vec::new());
     }
     let machine = args.machine.machine();
@@ -108,14 +110,14 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         page: &(scale + &page.text),
         shard: args.row,
         only: args.only.map(|part| match part {
-            Part::Sets => Only::Sets,
-            Part::Tables => Only::Tables,
+            WorkPartArg::Sets => WorkPart::Sets,
+            WorkPartArg::Tables => WorkPart::Tables,
         }),
         seconds: args.time.map(|t| t.as_secs()),
         threads: args.machine.threads(),
         precision,
     };
-    let stop = signals.heed();
+    let stop = signals.catch();
     let paths = table::run(
         &order,
         &Callbacks {
@@ -124,22 +126,24 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             evaluate: &|predictor, on, picture| evaluate(predictor, on, picture, &machine, stop),
             training: &|row: &str, state: &State| {
                 if !args.quiet {
-                    furrow_cli::tell!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
+                    furrow_cli::message!("training {} of {}: {row}{}", state.number, state.of, left(state.left));
                 }
             },
-            tell: &|words| {
+            message: &|words| {
                 if !args.quiet {
-                    furrow_cli::tell!("{words}");
+                    furrow_cli::message!("{words}");
                 }
             },
-            warn: &|words| furrow_cli::tell!("warning: {words}"),
+            warn: &|words| furrow_cli::message!("warning: {words}"),
             stop,
         },
     )?;
     if !args.quiet {
         let (tables, _) = table::tables(&bound, &out)?;
-        for (_, table) in tables.0.iter().filter(|(name, _)| *name != table::RUNS && args.only != Some(Part::Sets)) {
-            furrow_cli::tell!("\n{}", table.markdown().trim_end());
+        for (_, table) in
+            tables.0.iter().filter(|(name, _)| *name != table::RUNS && args.only != Some(WorkPartArg::Sets))
+        {
+            furrow_cli::message!("\n{}", table.markdown().trim_end());
         }
     }
     Ok(paths)
@@ -154,23 +158,24 @@ fn evaluate(
     stop: &AtomicBool,
 ) -> Result<Report> {
     let (_, images) = on.open(Pick::All, 0)?;
-    let (report, shots, palette) = match predictor {
+    let (report, thumbnails, palette) = match predictor {
         Predictor::Network(trained, precision, threads) => {
-            let mut shots = report::shots(images.len(), &trained.card.input.bands, trained.card.classes.len());
-            let mut see = |seen: &session::Predicted<'_>| shots.see(seen.example, seen.size, seen.predicted);
+            let mut thumbnails =
+                report::thumbnails(images.len(), &trained.card.input.bands, trained.card.classes.len());
+            let mut see = |seen: &session::Predicted<'_>| thumbnails.see(seen.example, seen.size, seen.predicted);
             let report =
                 session::evaluate(&(*trained).clone().into(), on, precision, *threads, machine, stop, &mut see)?;
-            (report, shots, trained.card.classes.colors())
+            (report, thumbnails, trained.card.classes.colors())
         }
         Predictor::Baseline(baseline, shape) => {
-            let mut shots = report::shots(images.len(), &Band::RGB, Classes::default().len());
+            let mut thumbnails = report::thumbnails(images.len(), &Band::RGB, Classes::default().len());
             let size = (shape.width, shape.height);
-            let mut see = |example: &_, predicted: &[u8]| shots.see(example, size, predicted);
+            let mut see = |example: &_, predicted: &[u8]| thumbnails.see(example, size, predicted);
             let report = files::evaluate(baseline, on, shape, stop, &mut see)?;
-            (report, shots, Classes::default().colors())
+            (report, thumbnails, Classes::default().colors())
         }
     };
-    write_atomically(picture, &sheet(&shots.kept(), &palette, true).png()?)?;
+    write_atomically(picture, &compose(&thumbnails.kept(), &palette, true).png()?)?;
     Ok(report)
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn run() -> Result<Vec<PathBuf>> {
     let mut damaged: Vec<_> = damaged.into_iter().filter_map(Result::err).collect();
     let Some(last) = damaged.pop() else { return Ok(Vec::new()) };
     for error in &damaged {
-        furrow_cli::tell!("error: {error}");
+        furrow_cli::message!("error: {error}");
     }
     Err(last)
 }

@@ -49,8 +49,8 @@ pub enum Outline {
 /// Deserializes an exponent and checks its range.
 fn exponent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
     let x = f64::deserialize(deserializer)?;
-    let told = || D::Error::custom(format!("{x:?} is out of range: it must be {EXPONENTS_IN_WORDS}"));
-    EXPONENTS.contains(&x).then_some(x as f32).ok_or_else(told)
+    let out_of_range = || D::Error::custom(format!("{x:?} is out of range: it must be {EXPONENTS_IN_WORDS}"));
+    EXPONENTS.contains(&x).then_some(x as f32).ok_or_else(out_of_range)
 }
 
 impl Outline {

@@ -126,7 +126,7 @@ impl RonFile {
         let fault = locate(&self.text, error);
         let path = path_at(&self.text, fault.start);
         let (depth, names) = known(&path);
-        let exists = |told: Error| told.see(more(&path[..depth]));
+        let exists = |error: Error| error.see(more(&path[..depth]));
         let help = decimal_comma(&self.text, &fault, &known).or_else(|| named_value(&self.text, &fault, &names));
         let fault = Fault { help: help.unwrap_or(fault.help.clone()), ..fault };
         let fault = unopened(&self.text, error).unwrap_or(fault);
@@ -233,8 +233,8 @@ impl RonFile {
 
     fn fault(&self, fault: &Fault) -> Error {
         let place = self.place_of(fault.start, fault.end);
-        let told = Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place);
-        told.see(more(&path_at(&self.text, fault.start)))
+        let located = Error::input(fault.message.as_str()).help(fault.help.as_str()).at(place);
+        located.see(more(&path_at(&self.text, fault.start)))
     }
 
     /// Place of a byte range in the file. If it spans several lines, only the first one is used.
@@ -393,7 +393,7 @@ mod tests {
     /// help suggests a decimal point where a single number is expected, after a colon or alone in a name's brackets,
     /// but not in a pair, a list or a distribution of two numbers.
     #[test]
-    fn a_decimal_comma_is_told_where_one_number_belongs() {
+    fn a_decimal_comma_is_reported_where_one_number_belongs() {
         #[derive(Debug, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         #[allow(dead_code)]
@@ -410,12 +410,12 @@ mod tests {
             Each(Vec<Vary<Positive>>),
             Both(Vary<Positive>, Vary<Positive>),
         }
-        let told = |text: &str| RonFile::of(text).parse_all::<Sheet>().unwrap_err().to_string();
+        let stated = |text: &str| RonFile::of(text).parse_all::<Sheet>().unwrap_err().to_string();
         for (text, words) in [
             ("Sheet(side: 0,85)", "decimals are written with a point: 0.85"),
             ("Sheet(side: 3,85)", "decimals are written with a point: 3.85"),
         ] {
-            assert!(told(text).contains(words), "{}", told(text));
+            assert!(stated(text).contains(words), "{}", stated(text));
         }
         for text in [
             "Sheet(size: (0,0))",
@@ -426,7 +426,7 @@ mod tests {
             "Sheet(step: Each([0,5]))",
             "Sheet(step: Both(0,5))",
         ] {
-            let words = told(text);
+            let words = stated(text);
             assert!(words.contains("out of range") && !words.contains("with a point"), "{words}");
         }
     }

@@ -153,7 +153,7 @@ pub(super) fn quoted(text: &str) -> Vec<Range<usize>> {
 }
 
 /// A name or a quoted string.
-pub(super) struct Word {
+pub(super) struct NameToken {
     /// Byte range, without quotes.
     pub(super) at: Range<usize>,
     /// `true` if a colon follows.
@@ -163,7 +163,7 @@ pub(super) struct Word {
 }
 
 /// Returns every name and every quoted string outside comments, in order.
-pub(super) fn words(text: &str) -> Vec<Word> {
+pub(super) fn words(text: &str) -> Vec<NameToken> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut all = Vec::new();
     let mut at = skip(text, 0);
@@ -173,10 +173,10 @@ pub(super) fn words(text: &str) -> Vec<Word> {
             next = quote_end(text, at);
             let closed = next > at + 1 && text[..next].ends_with('"');
             let inner = at + 1..if closed { next - 1 } else { next };
-            all.push(Word { at: inner, colon: text[skip(text, next)..].starts_with(':'), quoted: true });
+            all.push(NameToken { at: inner, colon: text[skip(text, next)..].starts_with(':'), quoted: true });
         } else if is_name(c) {
             next = text[at..].find(|c| !is_name(c)).map_or(text.len(), |i| at + i);
-            all.push(Word { at: at..next, colon: text[skip(text, next)..].starts_with(':'), quoted: false });
+            all.push(NameToken { at: at..next, colon: text[skip(text, next)..].starts_with(':'), quoted: false });
         }
         at = skip(text, next);
     }

@@ -310,15 +310,15 @@ mod tests {
     #[test]
     fn an_error_is_shown_where_its_words_were_written() {
         let all = file("own.ron", "Species(\n p: (x: [9]))").over(&file("base.ron", BASE), &["name"]);
-        let told = |path: &[Step<'_>]| {
+        let location = |path: &[Step<'_>]| {
             let error = all.locate(all.page.blame(path, Error::input("no")));
             let place = error.place().unwrap().clone();
             let span = place.span.unwrap();
             (place.file.display().to_string(), span.line, span.column, span.width)
         };
-        assert_eq!(told(&[Step::Field("p"), Step::Field("x")]), ("own.ron".into(), 2, 9, 3));
-        assert_eq!(told(&[Step::Field("p"), Step::Field("z")]), ("base.ron".into(), 4, 48, 1));
-        assert_eq!(told(&[Step::Field("m"), Step::Field("leaf"), Step::Field("b")]), ("base.ron".into(), 3, 29, 1));
+        assert_eq!(location(&[Step::Field("p"), Step::Field("x")]), ("own.ron".into(), 2, 9, 3));
+        assert_eq!(location(&[Step::Field("p"), Step::Field("z")]), ("base.ron".into(), 4, 48, 1));
+        assert_eq!(location(&[Step::Field("m"), Step::Field("leaf"), Step::Field("b")]), ("base.ron".into(), 3, 29, 1));
     }
 
     #[test]

@@ -152,7 +152,7 @@ impl<B: Bound> Vary<B> {
     }
 
     /// Checks a distribution. The error holds the position in it, the message and the help.
-    fn check(distribution: &Distribution) -> Result<(), Wrong> {
+    fn check(distribution: &Distribution) -> Result<(), PathError> {
         use Step::{Field, Item};
         let wrong = |at: &[Step<'static>], what: String, help: &str| Err((at.to_vec(), what, help.to_owned()));
         let within = |at: &[Step<'static>], name: &str, x: f64| {
@@ -253,7 +253,7 @@ impl<B: Bound> Vary<B> {
 const NOTHING: &str = "an empty choice: there is nothing to draw";
 
 /// Position in a distribution, message and help.
-type Wrong = (Vec<Step<'static>>, String, String);
+type PathError = (Vec<Step<'static>>, String, String);
 
 /// Rejection-samples until the value is within both ranges, which preserves the shape between the cuts. [`Vary::check`]
 /// guarantees that the centre is inside, so a hundred consecutive rejections happen only at the far end of a bound,
@@ -469,15 +469,15 @@ mod tests {
     /// Method: mistakes of users who know other formats. Expected: the help contains the exact text to write, and that
     /// text parses.
     #[test]
-    fn the_right_form_is_told() {
+    fn the_correct_syntax_is_suggested() {
         for (wrong, right) in [
             ("Normal(150, 20)", "Normal(mean: 150, sd: 20)"),
             ("LogNormal(3, 0.5, 1)", "LogNormal(median: 3, sigma: 0.5, min: 1)"),
             ("[100, 150]", "Uniform(100, 150)"),
             ("[1, 2, 3]", "Choice([1, 2, 3])"),
         ] {
-            let told = ron::from_str::<Vary<NonNegative>>(wrong).unwrap_err().to_string();
-            assert!(told.contains(&format!("write {right}")), "{told}");
+            let error_text = ron::from_str::<Vary<NonNegative>>(wrong).unwrap_err().to_string();
+            assert!(error_text.contains(&format!("write {right}")), "{error_text}");
             ron::from_str::<Vary<NonNegative>>(right).unwrap();
         }
         let usual = |text: &str| ron::from_str::<Vary<NonNegative>>(text).unwrap().usual();

@@ -17,12 +17,12 @@ use std::time::Duration;
 /// Writes a line to stderr like `eprintln!`, but ignores failures: a full disk or a closed pipe must not end hours of work.
 #[macro_export]
 #[doc(hidden)]
-macro_rules! tell {
-    ($($words:tt)*) => { $crate::cli::tell(format_args!($($words)*)) };
+macro_rules! message {
+    ($($words:tt)*) => { $crate::cli::print_message(format_args!($($words)*)) };
 }
 
-/// Implements [`tell!`](crate::tell).
-pub fn tell(words: fmt::Arguments<'_>) {
+/// Implements [`message!`](crate::message).
+pub fn print_message(words: fmt::Arguments<'_>) {
     // One write per line, so that lines of several threads do not interleave.
     let _ = io::stderr().write_all(format!("{words}\n").as_bytes());
 }
@@ -66,11 +66,11 @@ fn written(done: io::Result<()>) -> Result<bool> {
 
 /// Ends a program: prints the paths that it wrote to stdout, one per line for the next program in a pipe, or an error to stderr.
 pub fn end(done: Result<Vec<PathBuf>>) -> ExitCode {
-    let told = done.and_then(|paths| {
+    let outcome = done.and_then(|paths| {
         let lines: String = paths.iter().map(|path| path.display().to_string() + "\n").collect();
         print(&lines).map_err(|e| e.within("the files were written, but their paths are lost"))
     });
-    told.map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS)
+    outcome.map_or_else(|e| fail(&e), |_| ExitCode::SUCCESS)
 }
 
 /// Parses a duration with its unit, from one second to one year.
@@ -100,7 +100,7 @@ pub fn columns<const N: usize>(rows: &[[String; N]]) -> String {
 /// Prints an error to stderr and returns its exit code: 1 failed, 2 misused, 75 stopped cleanly (without the prefix `error:`).
 pub fn fail(error: &Error) -> ExitCode {
     let title = if error.kind() == Kind::Interrupted { "" } else { "error: " };
-    crate::tell!("{title}{error}");
+    crate::message!("{title}{error}");
     ExitCode::from(error.exit_code())
 }
 

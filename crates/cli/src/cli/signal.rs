@@ -1,7 +1,7 @@
 //! Signal handling: every signal that asks for a stop leads to a clean end with exit code 75.
 //!
 //! Terminals send INT and HUP; batch systems send USR1 (time is nearly up) and TERM (the node is needed). By default, each would end the
-//! process with a code that a scheduler takes for a failure. Until a verb [handles](Signals::heed) them, they end the process immediately
+//! process with a code that a scheduler takes for a failure. Until a verb [handles](Signals::catch) them, they end the process immediately
 //! with 75, which loses nothing because nothing has been written; from then on they set a flag. A second INT or TERM always ends the
 //! process immediately, because the user does not want to wait.
 
@@ -25,15 +25,15 @@ const PATIENT: [i32; 0] = [];
 pub struct Signals {
     stop: Arc<AtomicBool>,
     urgent: Arc<AtomicBool>,
-    unheeded: Arc<AtomicBool>,
+    uncaught: Arc<AtomicBool>,
 }
 
 impl Signals {
     /// Installs handlers for INT, TERM, HUP and USR1. Must be the first action of the program: earlier signals have their default effect.
     pub fn watch() -> Self {
-        let signals = Self { stop: Arc::default(), urgent: Arc::default(), unheeded: Arc::new(AtomicBool::new(true)) };
+        let signals = Self { stop: Arc::default(), urgent: Arc::default(), uncaught: Arc::new(AtomicBool::new(true)) };
         if let Err(e) = signals.install() {
-            crate::tell!("warning: cannot watch for signals: {e}");
+            crate::message!("warning: cannot watch for signals: {e}");
         }
         signals
     }
@@ -50,21 +50,21 @@ impl Signals {
             flag::register(signal, self.urgent.clone())?;
         }
         for signal in URGENT.into_iter().chain(PATIENT) {
-            flag::register_conditional_shutdown(signal, STOPPED, self.unheeded.clone())?;
+            flag::register_conditional_shutdown(signal, STOPPED, self.uncaught.clone())?;
             flag::register(signal, self.stop.clone())?;
         }
         Ok(())
     }
 
     /// Returns the flag that signals set from now on instead of ending the process.
-    pub fn heed(&self) -> &Arc<AtomicBool> {
-        self.unheeded.store(false, Ordering::SeqCst);
+    pub fn catch(&self) -> &Arc<AtomicBool> {
+        self.uncaught.store(false, Ordering::SeqCst);
         &self.stop
     }
 
     /// Returns two flags that signals set from now on instead of ending the process: every signal sets the first; only INT and TERM set
     /// the second, which means not to wait for the current work to finish.
-    pub fn heed_patiently(&self) -> (&Arc<AtomicBool>, &Arc<AtomicBool>) {
-        (self.heed(), &self.urgent)
+    pub fn catch_graceful(&self) -> (&Arc<AtomicBool>, &Arc<AtomicBool>) {
+        (self.catch(), &self.urgent)
     }
 }

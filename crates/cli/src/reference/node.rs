@@ -67,7 +67,7 @@ pub(super) fn tuple(schema: &Object) -> Option<Vec<&Value>> {
 }
 
 /// A field of a struct, or a variant.
-pub(super) struct Part<'a> {
+pub(super) struct Member<'a> {
     pub(super) name: &'a str,
     /// Schema of the field's value or of the variant's content; null for a unit variant.
     pub(super) schema: &'a Value,
@@ -80,7 +80,7 @@ pub(super) struct Part<'a> {
 }
 
 /// Returns the fields of a struct, required ones first, or the variants of an enum.
-pub(super) fn parts(schema: &Object) -> Vec<Part<'_>> {
+pub(super) fn parts(schema: &Object) -> Vec<Member<'_>> {
     fn words(of: &Value) -> Option<&str> {
         of.get("description").and_then(Value::as_str)
     }
@@ -92,7 +92,7 @@ pub(super) fn parts(schema: &Object) -> Vec<Part<'_>> {
         let rest = fields.iter().filter(|(name, _)| !required.contains(&name.as_str()));
         return first
             .chain(rest)
-            .map(|(name, schema)| Part {
+            .map(|(name, schema)| Member {
                 name,
                 schema,
                 required: Some(required.contains(&name.as_str())),
@@ -101,7 +101,7 @@ pub(super) fn parts(schema: &Object) -> Vec<Part<'_>> {
             })
             .collect();
     }
-    let bare = |name| Part { name, schema: &Value::Null, required: None, words: None, example: None };
+    let bare = |name| Member { name, schema: &Value::Null, required: None, words: None, example: None };
     if let Some(names) = schema.get("enum").and_then(Value::as_array) {
         return names.iter().filter_map(Value::as_str).map(bare).collect();
     }
@@ -109,12 +109,12 @@ pub(super) fn parts(schema: &Object) -> Vec<Part<'_>> {
     for variant in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
         let words = words(variant);
         if let Some(name) = variant.get("const").and_then(Value::as_str) {
-            all.push(Part { words, ..bare(name) });
+            all.push(Member { words, ..bare(name) });
         } else if let Some(names) = variant.get("enum").and_then(Value::as_array) {
-            all.extend(names.iter().filter_map(Value::as_str).map(|name| Part { words, ..bare(name) }));
+            all.extend(names.iter().filter_map(Value::as_str).map(|name| Member { words, ..bare(name) }));
         } else if let Some(inside) = variant.get("properties").and_then(Value::as_object) {
             let example = variant.get(EXAMPLE).and_then(Value::as_str);
-            all.extend(inside.iter().map(|(name, schema)| Part { name, schema, required: None, words, example }));
+            all.extend(inside.iter().map(|(name, schema)| Member { name, schema, required: None, words, example }));
         }
     }
     all

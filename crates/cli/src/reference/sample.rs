@@ -1,6 +1,6 @@
 //! Generates examples: a value in RON, and a whole file that contains it.
 
-use super::node::{BESIDE, EXAMPLE, FIRST, Part, Types, parts, tuple};
+use super::node::{BESIDE, EXAMPLE, FIRST, Member, Types, parts, tuple};
 use super::ron;
 use furrow_base::ron_file::{DRAWN, KIND, RANGE};
 use serde_json::Value;
@@ -9,7 +9,7 @@ use serde_json::Value;
 const KEY: &str = "leaf";
 
 /// Returns an example of a field with a value, or of a variant.
-pub(super) fn entry(types: &Types, part: &Part<'_>) -> String {
+pub(super) fn entry(types: &Types, part: &Member<'_>) -> String {
     if part.required.is_none() {
         return variant(types, part, &[]);
     }
@@ -74,7 +74,7 @@ pub(super) fn value(types: &Types, schema: &Value, path: &[&str]) -> String {
     plain(node.schema)
 }
 
-fn variant(types: &Types, part: &Part<'_>, path: &[&str]) -> String {
+fn variant(types: &Types, part: &Member<'_>, path: &[&str]) -> String {
     if let Some(example) = part.example.filter(|_| path.is_empty()) {
         return format!("{}{example}", part.name);
     }

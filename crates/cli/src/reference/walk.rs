@@ -1,6 +1,6 @@
 //! Builds the sections of a reference from a JSON schema, and finds sections by path.
 
-use super::node::{Node, Object, Part, Types, parts, tuple};
+use super::node::{Member, Node, Object, Types, parts, tuple};
 use super::ron;
 use super::sample;
 use super::section::{Entry, Section, prose, unit};
@@ -137,7 +137,7 @@ impl Reference {
     fn enter<'a>(
         &'a self,
         path: &str,
-        part: &Part<'a>,
+        part: &Member<'a>,
         met: &mut BTreeMap<&'a str, usize>,
         sections: &mut Vec<Section>,
     ) -> Option<String> {
@@ -156,11 +156,11 @@ impl Reference {
         Some(path.to_owned())
     }
 
-    fn entry(&self, part: &Part<'_>, section: Option<String>) -> Entry {
+    fn entry(&self, part: &Member<'_>, section: Option<String>) -> Entry {
         let inner = self.types.inner(part.schema).map(|(node, _)| node.schema);
         let words = part.words.or_else(|| inner.and_then(description)).map(prose).unwrap_or_default();
-        let told = || part.schema.get(DEFAULT).and_then(Value::as_str).map(str::to_owned);
-        let given = self.default(part.schema, section.is_some()).or_else(told);
+        let schema_default = || part.schema.get(DEFAULT).and_then(Value::as_str).map(str::to_owned);
+        let given = self.default(part.schema, section.is_some()).or_else(schema_default);
         let default = match part.required {
             Some(true) => None,
             None => Some(String::new()),

@@ -44,7 +44,7 @@ pub enum Step {
 /// Direction of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum ChangeDirection {
     /// To larger values.
     Raise,
     /// To smaller values.
@@ -57,15 +57,15 @@ pub enum Way {
     Change,
 }
 
-use Way::{Change, Lower, Raise};
+use ChangeDirection::{Change, Lower, Raise};
 
 /// Field to change, and the direction.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Turn {
+pub struct FieldChange {
     /// Path of the field, as accepted by `trace explain`.
     pub field: String,
     /// Direction of the change.
-    pub way: Way,
+    pub way: ChangeDirection,
 }
 
 /// Advice on one or several distances.
@@ -76,7 +76,7 @@ pub struct Advice {
     /// Sentence that states which quantity is too large or too small.
     pub words: String,
     /// Fields to change, the most likely first.
-    pub turns: Vec<Turn>,
+    pub turns: Vec<FieldChange>,
     /// Keys of the distances that it refers to.
     pub features: Vec<String>,
 }
@@ -94,10 +94,10 @@ struct Row {
 /// Advice if a feature is too large, or if it is too small.
 struct Side {
     words: &'static str,
-    turns: &'static [(&'static str, Way)],
+    turns: &'static [(&'static str, ChangeDirection)],
 }
 
-const fn side(words: &'static str, turns: &'static [(&'static str, Way)]) -> Side {
+const fn side(words: &'static str, turns: &'static [(&'static str, ChangeDirection)]) -> Side {
     Side { words, turns }
 }
 
@@ -264,9 +264,10 @@ fn all(of: &Gap) -> Vec<Advice> {
 
 /// Drops changes that contradict earlier advice, because following the earlier advice changes the later distance too.
 fn agreed(all: Vec<Advice>) -> Vec<Advice> {
-    let mut asked: Vec<Turn> = Vec::new();
+    let mut asked: Vec<FieldChange> = Vec::new();
     let keep = |mut advice: Advice| {
-        let other = |turn: &Turn| asked.iter().any(|before| before.field == turn.field && before.way != turn.way);
+        let other =
+            |turn: &FieldChange| asked.iter().any(|before| before.field == turn.field && before.way != turn.way);
         let before = advice.turns.len();
         advice.turns.retain(|turn| !other(turn));
         asked.extend(advice.turns.iter().cloned());
@@ -320,8 +321,8 @@ fn about(feature: Feature, real: &Pool, made: &Pool, distance: f64) -> Option<Ad
         let side = &SHADOWS[usize::from(!wide)];
         return Some(given(Step::Light, side.words, side, feature, keys));
     }
-    let (way, word) = if wide { (Way::Narrow, "more") } else { (Way::Widen, "less") };
-    let first = side.turns.first().map(|(field, _)| Turn { field: named(field, feature), way });
+    let (way, word) = if wide { (ChangeDirection::Narrow, "more") } else { (ChangeDirection::Widen, "less") };
+    let first = side.turns.first().map(|(field, _)| FieldChange { field: named(field, feature), way });
     let words = format!("{} has the right mean, but varies {word} than it should", feature.name());
     Some(Advice { step: row.step, words, turns: first.into_iter().collect(), features: keys })
 }
@@ -341,7 +342,7 @@ fn differences(real: &Pool, made: &Pool) -> Vec<f64> {
 }
 
 fn given(step: Step, words: &str, side: &Side, feature: Feature, features: Vec<String>) -> Advice {
-    let turn = |(field, way): &(&str, Way)| Turn { field: named(field, feature), way: *way };
+    let turn = |(field, way): &(&str, ChangeDirection)| FieldChange { field: named(field, feature), way: *way };
     let words = words.replace("PLANTS", plants(feature));
     Advice { step, words, turns: side.turns.iter().map(turn).collect(), features }
 }
@@ -354,7 +355,7 @@ fn plants(feature: Feature) -> &'static str {
     if feature.region() == Some(Region::Weed) { "weeds" } else { "crops" }
 }
 
-impl Way {
+impl ChangeDirection {
     /// Returns the direction as a verb.
     pub fn name(self) -> &'static str {
         match self {
@@ -367,7 +368,7 @@ impl Way {
     }
 }
 
-impl Turn {
+impl FieldChange {
     /// Returns the change as text, such as `raise sensor.exposure.Auto.level`.
     pub fn words(&self) -> String {
         format!("{} {}", self.way.name(), self.field)

@@ -29,7 +29,7 @@ struct Conditions {
 
 /// Data from the records of a set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Known {
+pub(super) struct SetRecords {
     /// Whether any image has a record of how it was rendered.
     pub(super) rendered: bool,
     /// Median side of a pixel on the ground, millimetres.
@@ -38,7 +38,7 @@ pub(super) struct Known {
     pub(super) sampling: Option<(f64, f64)>,
 }
 
-impl Known {
+impl SetRecords {
     /// Reads the records of some of the images.
     pub(super) fn of(photos: &[Photo]) -> Result<Self> {
         let mut records = Vec::new();

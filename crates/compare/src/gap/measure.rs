@@ -3,7 +3,7 @@
 use super::feature::{Feature, Sample, Samples};
 use super::{frequency, noise, outline, regions};
 use crate::color::{lab, linear};
-use crate::{Picture, Region};
+use crate::{RasterImage, Region};
 use furrow_report::{Bins, Histogram};
 
 /// Range and number of bins of L*, of a* and b*, of NDVI, of gradients in dB, of log₁₀ of areas.
@@ -26,7 +26,7 @@ const BLACK: f64 = 0.5 / 255.0 / 12.92;
 
 /// Measures an image, and its classes if it has labels, one per pixel. Spectra use tiles of `tile` pixels, which must
 /// fit into the image.
-pub(super) fn measure(picture: &Picture, labels: Option<&[u8]>, tile: Option<usize>) -> Samples {
+pub(super) fn measure(picture: &RasterImage, labels: Option<&[u8]>, tile: Option<usize>) -> Samples {
     let size = (picture.width as usize, picture.height as usize);
     let mut samples = Samples::new();
     let colors: Vec<[f32; 3]> = picture.rgb.iter().map(|rgb| lab(*rgb)).collect();
@@ -49,7 +49,7 @@ fn empty((from, to, bins): (f64, f64, usize)) -> Histogram {
 }
 
 /// Measures colours and NDVI of a region's pixels.
-fn pixels(samples: &mut Samples, region: Region, picture: &Picture, colors: &[[f32; 3]], labels: Option<&[u8]>) {
+fn pixels(samples: &mut Samples, region: Region, picture: &RasterImage, colors: &[[f32; 3]], labels: Option<&[u8]>) {
     let inside = |k: &usize| labels.is_none_or(|labels| region.holds(labels[*k]));
     let mut channels = [LIGHTNESS, CHROMA, CHROMA].map(empty);
     let mut ndvi = empty(NDVI);
@@ -71,7 +71,7 @@ fn pixels(samples: &mut Samples, region: Region, picture: &Picture, colors: &[[f
 }
 
 /// Measures features of luminance.
-fn light(samples: &mut Samples, picture: &Picture, (width, height): (usize, usize), tile: Option<usize>) {
+fn light(samples: &mut Samples, picture: &RasterImage, (width, height): (usize, usize), tile: Option<usize>) {
     let linear = linear();
     let weigh = |[r, g, b]: [f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let mut luminance: Vec<f32> = picture.rgb.iter().map(|c| weigh(c.map(|c| linear[usize::from(c)]))).collect();
@@ -151,12 +151,12 @@ mod tests {
     use furrow_base::sampling::rng::{Purpose, Stream};
 
     /// Returns a green square on brown ground, with labels.
-    fn scene() -> (Picture, Vec<u8>) {
+    fn scene() -> (RasterImage, Vec<u8>) {
         let inside = |k: usize| (20..36).contains(&(k % 80)) && (10..26).contains(&(k / 80));
         let labels: Vec<u8> = (0..80 * 64).map(|k| u8::from(inside(k))).collect();
         let rgb = labels.iter().map(|l| if *l == 1 { [60, 120, 40] } else { [100, 80, 60] }).collect();
         let nir = labels.iter().map(|l| if *l == 1 { 180 } else { 100 }).collect();
-        (Picture { width: 80, height: 64, rgb, nir }, labels)
+        (RasterImage { width: 80, height: 64, rgb, nir }, labels)
     }
 
     fn value(samples: &Samples, feature: Feature) -> f64 {
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn without_labels_and_near_infrared_only_pixels_are_measured() {
         let (picture, _) = scene();
-        let samples = measure(&Picture { nir: Vec::new(), ..picture }, None, None);
+        let samples = measure(&RasterImage { nir: Vec::new(), ..picture }, None, None);
         let known: Vec<Feature> = samples.into_keys().collect();
         assert_eq!(known, [Feature::Exposure, Feature::Color(Region::All), Feature::Gradient, Feature::Noise]);
     }
@@ -211,7 +211,7 @@ mod tests {
             let wave = |k: u32| ((k % 64) as f32 * 0.4).sin() * ((k / 64) as f32 * 0.7).cos();
             let mut y = |k: u32| 0.4 + 0.2 * wave(k) + 0.05 * stream.normal() as f32;
             let rgb = (0..64 * 64).map(|k| [code(scale * y(k)); 3]).collect();
-            measure(&Picture { width: 64, height: 64, rgb, nir: Vec::new() }, None, Some(64))
+            measure(&RasterImage { width: 64, height: 64, rgb, nir: Vec::new() }, None, Some(64))
         };
         let (bright, dark) = (picture(1.0), picture(0.5));
         let stops = value(&bright, Feature::Exposure) - value(&dark, Feature::Exposure);

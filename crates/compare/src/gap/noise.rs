@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn black_white_and_tiny_pictures_tell_nothing() {
+    fn black_white_and_tiny_images_have_no_noise_estimate() {
         assert_eq!(level(&[255.0; 64 * 64], (64, 64)), None);
         assert_eq!(level(&[90.0; 64], (8, 8)), None);
         assert_eq!(level(&[90.0; 64 * 64], (64, 64)), Some(0.0));

@@ -3,7 +3,7 @@
 //! A coarser camera over the same ground collects the light of several fine pixels in one, so linear values are
 //! averaged by area. A label is that of most of the area; in a tie, the lower one.
 
-use crate::Picture;
+use crate::RasterImage;
 use crate::color::{coded, linear};
 
 /// Pixel sizes whose ratio is smaller are considered equal.
@@ -33,14 +33,14 @@ pub(super) fn coarser_size((width, height): (u32, u32), factor: f64) -> (u32, u3
 }
 
 /// Downscales an image and its labels to [`coarser_size`].
-pub(super) fn coarsen(picture: Picture, labels: Option<Vec<u8>>, factor: f64) -> (Picture, Option<Vec<u8>>) {
+pub(super) fn coarsen(picture: RasterImage, labels: Option<Vec<u8>>, factor: f64) -> (RasterImage, Option<Vec<u8>>) {
     let (width, height) = coarser_size(picture.size(), factor);
     if (width, height) == picture.size() {
         return (picture, labels);
     }
     let (columns, rows) = (parts(picture.width, width), parts(picture.height, height));
     let curve = linear();
-    let mut coarse = Picture { width, height, rgb: Vec::new(), nir: Vec::new() };
+    let mut coarse = RasterImage { width, height, rgb: Vec::new(), nir: Vec::new() };
     let mut classes = Vec::new();
     for (row, column) in rows.iter().flat_map(|row| columns.iter().map(move |column| (row, column))) {
         let (mut light, mut votes) = ([0.0_f32; 4], [0.0_f32; 4]);
@@ -105,9 +105,9 @@ mod tests {
             assert!(filled.iter().all(|share| (share - each).abs() < 1e-5), "{filled:?}");
         }
         let rgb = vec![[0; 3], [255; 3], [10, 20, 30], [10, 20, 30], [255; 3], [0; 3], [10, 20, 30], [10, 20, 30]];
-        let picture = Picture { width: 4, height: 2, rgb, nir: vec![200; 8] };
+        let picture = RasterImage { width: 4, height: 2, rgb, nir: vec![200; 8] };
         let (coarse, labels) = coarsen(picture.clone(), Some(vec![0, 2, 255, 255, 2, 2, 255, 1]), 2.0);
-        assert_eq!(coarse, Picture { width: 2, height: 1, rgb: vec![[188; 3], [10, 20, 30]], nir: vec![200; 2] });
+        assert_eq!(coarse, RasterImage { width: 2, height: 1, rgb: vec![[188; 3], [10, 20, 30]], nir: vec![200; 2] });
         assert_eq!(labels, Some(vec![2, 255]));
         assert_eq!(coarsen(picture.clone(), Some(vec![1, 0, 0, 0, 1, 0, 0, 0]), 2.0).1, Some(vec![0, 0]));
         assert_eq!(coarsen(picture.clone(), None, 1.0), (picture, None));

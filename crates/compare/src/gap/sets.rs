@@ -1,7 +1,7 @@
 //! Comparison of two folders: from images to distances.
 
 use super::feature::{Feature, Pool, Samples};
-use super::known::Known;
+use super::known::SetRecords;
 use super::pixel::{PixelSizes, coarsen, coarser_size};
 use super::source::{Photo, photos, warnings};
 use super::window::Window;
@@ -99,7 +99,7 @@ impl Gap {
     ) -> Result<Self> {
         let (name, other) = pairs::names(real, synthetic);
         let (real, synthetic) = (photos(real, "--real")?, photos(synthetic, "--synthetic")?);
-        let known = [Known::of(&real)?, Known::of(&synthetic)?];
+        let known = [SetRecords::of(&real)?, SetRecords::of(&synthetic)?];
         let pixels = PixelSizes { real_mm: options.pixel_mm.or(known[0].pixel_mm), synthetic_mm: known[1].pixel_mm };
         let factors = pixels.factors();
         let mut least = u32::MAX;
@@ -117,7 +117,7 @@ impl Gap {
         if tile.is_none() {
             warned.push(format!("images with fewer than {} pixels on a side have no spectrum", frequency::TILES.1));
         }
-        let [take_real, take_synthetic] = factors.map(|factor| Take { factor, tile, shown: options.shown });
+        let [take_real, take_synthetic] = factors.map(|factor| MeasureSettings { factor, tile, shown: options.shown });
         let (of_real, real) = set(name, real, &take_real, done)?;
         let (_, synthetic) = set(other, synthetic, &take_synthetic, done)?;
         warned.extend(noisy(&known[1], &real, &synthetic, factors[1]));
@@ -152,7 +152,7 @@ fn unknown(pixels: &PixelSizes) -> Option<String> {
 }
 
 /// Returns a warning if the sampling noise of the synthetic images is significant, or unknown.
-fn noisy(known: &Known, real: &Set, synthetic: &Set, factor: f64) -> Option<String> {
+fn noisy(known: &SetRecords, real: &Set, synthetic: &Set, factor: f64) -> Option<String> {
     let values = |set: &Set, feature| match set.pools.get(&feature) {
         Some(Pool::Values(values)) => wasserstein::median(values.clone()),
         _ => None,
@@ -182,7 +182,7 @@ fn one_sided(real: &[Photo], synthetic: &[Photo]) -> Vec<String> {
 }
 
 /// Settings for measuring a set.
-struct Take {
+struct MeasureSettings {
     /// Downscaling factor along each axis.
     factor: f64,
     tile: Option<usize>,
@@ -190,7 +190,12 @@ struct Take {
 }
 
 /// Measures every image of a set.
-fn set(name: String, photos: Vec<Photo>, take: &Take, done: &(dyn Fn() + Sync)) -> Result<(Vec<Samples>, Set)> {
+fn set(
+    name: String,
+    photos: Vec<Photo>,
+    take: &MeasureSettings,
+    done: &(dyn Fn() + Sync),
+) -> Result<(Vec<Samples>, Set)> {
     let shown = take.shown.min(photos.len());
     // Evenly distributed over the names: the middle one of each part.
     let is_shown = |k: usize| (0..shown).any(|s| (2 * s + 1) * photos.len() / (2 * shown) == k);

@@ -6,8 +6,8 @@
 //!
 //! Images of a dataset in packs are read from its archives; files that a dataset omits are not read.
 
-use crate::pairs::{beside, beside_rgb, first, recipe_of, stem, told, walk};
-use crate::picture::{self, Picture};
+use crate::pairs::{beside, beside_rgb, first, name_list, recipe_of, stem, walk};
+use crate::raster_image::{self, RasterImage};
 use furrow_base::{Error, Result};
 use furrow_dataset::make::pack::refuse_archives;
 use furrow_dataset::model::image_files::photograph_in;
@@ -79,11 +79,11 @@ impl Photo {
     }
 
     /// Reads the image, and its labels if it has any.
-    pub(super) fn read(&self) -> Result<(Picture, Option<Vec<u8>>)> {
+    pub(super) fn read(&self) -> Result<(RasterImage, Option<Vec<u8>>)> {
         match &self.place {
             Place::Files { rgb, nir, labels } => {
-                let picture = Picture::read(rgb, nir.as_deref())?;
-                let labels = labels.as_ref().map(|path| picture::read_labels(path, picture.size())).transpose()?;
+                let picture = RasterImage::read(rgb, nir.as_deref())?;
+                let labels = labels.as_ref().map(|path| raster_image::read_labels(path, picture.size())).transpose()?;
                 Ok((picture, labels))
             }
             Place::Pack { set, nir, labels } => packed(&Image::of(set.as_ref(), &self.name), *nir, *labels),
@@ -107,21 +107,21 @@ impl Photo {
 }
 
 /// Reads an image of a dataset in packs, with near infrared and labels if it has them.
-fn packed(image: &Image<'_, Set>, nir: bool, labels: bool) -> Result<(Picture, Option<Vec<u8>>)> {
+fn packed(image: &Image<'_, Set>, nir: bool, labels: bool) -> Result<(RasterImage, Option<Vec<u8>>)> {
     let (width, height, rgb) = image.photograph()?;
     let near = if nir { image.band("nir")? } else { None };
     if let Some(near) = &near {
-        picture::same_size(&near.place, (near.width, near.height), (width, height))?;
+        raster_image::same_size(&near.place, (near.width, near.height), (width, height))?;
     }
     let labels = if labels {
         let (w, h, numbers) = image.indexed(LABELS)?;
         let place = image.place(LABELS);
-        picture::same_size(&place, (w, h), (width, height))?;
-        Some(picture::known(&place, numbers.into_iter().map(u16::from).collect())?)
+        raster_image::same_size(&place, (w, h), (width, height))?;
+        Some(raster_image::known(&place, numbers.into_iter().map(u16::from).collect())?)
     } else {
         None
     };
-    Ok((Picture { width, height, rgb, nir: near.map_or_else(Vec::new, |near| near.values) }, labels))
+    Ok((RasterImage { width, height, rgb, nir: near.map_or_else(Vec::new, |near| near.values) }, labels))
 }
 
 /// File name of the labels in a dataset's image.
@@ -194,7 +194,7 @@ pub(super) fn warnings(set: &str, photos: &[Photo]) -> Vec<String> {
     let some = |what: &str, has: &dyn Fn(&Photo) -> bool| {
         let without: Vec<String> = photos.iter().filter(|photo| !has(photo)).map(|photo| photo.name.clone()).collect();
         let mixed = !without.is_empty() && without.len() < photos.len();
-        mixed.then(|| format!("{} images of {set} have no {what}: {}", without.len(), told(&without)))
+        mixed.then(|| format!("{} images of {set} have no {what}: {}", without.len(), name_list(&without)))
     };
     let labels = some("labels", &|photo| photo.has_labels());
     [labels, some("near infrared", &|photo| photo.has_nir())].into_iter().flatten().collect()
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_without_pictures_are_told() {
+    fn folders_without_images_are_reported() {
         let empty = folder(&["labels/a.png"]);
         let missing = empty.path().join("nothing");
         for (path, words) in [(empty.path(), "there is no PNG or JPEG"), (&missing, "there is no such folder")] {

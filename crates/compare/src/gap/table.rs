@@ -1,6 +1,6 @@
 //! Distances as JSON and CSV for programs, and as text tables.
 
-use super::advice::{Advice, Turn};
+use super::advice::{Advice, FieldChange};
 use super::feature::Pool;
 use super::frequency;
 use super::sets::{Distance, Gap, Set};
@@ -12,8 +12,8 @@ use std::fmt::Write;
 #[derive(Serialize)]
 struct Document<'a> {
     furrow: &'static str,
-    real: About<'a>,
-    synthetic: About<'a>,
+    real: SetSummary<'a>,
+    synthetic: SetSummary<'a>,
     /// Centre frequencies of the bands of `spectrum`, cycles per pixel.
     frequencies: Vec<f64>,
     distances: Vec<DistanceRow>,
@@ -22,7 +22,7 @@ struct Document<'a> {
 }
 
 #[derive(Serialize)]
-struct About<'a> {
+struct SetSummary<'a> {
     name: &'a str,
     images: usize,
     labelled: usize,
@@ -44,7 +44,7 @@ struct DistanceRow {
     synthetic_mean: Vec<f64>,
 }
 
-impl<'a> About<'a> {
+impl<'a> SetSummary<'a> {
     fn of(set: &'a Set, pixel_mm: Option<f64>) -> Self {
         Self {
             name: &set.name,
@@ -78,8 +78,8 @@ fn means(set: &Set, distance: &Distance) -> Vec<f64> {
 pub(super) fn json(of: &Gap) -> Result<String> {
     let document = Document {
         furrow: env!("CARGO_PKG_VERSION"),
-        real: About::of(&of.real, of.pixels.real_mm),
-        synthetic: About::of(&of.synthetic, of.pixels.synthetic_mm),
+        real: SetSummary::of(&of.real, of.pixels.real_mm),
+        synthetic: SetSummary::of(&of.synthetic, of.pixels.synthetic_mm),
         frequencies: of.tile.map(frequency::frequencies).unwrap_or_default(),
         distances: rows(of),
         advice: &of.advice(),
@@ -96,7 +96,7 @@ pub(super) fn csv(of: &Gap) -> String {
     let advice = of.advice();
     let turned = |key: &String| {
         let about = advice.iter().filter(|one| one.features.contains(key));
-        about.flat_map(|one| &one.turns).map(Turn::words).collect::<Vec<_>>().join("; ")
+        about.flat_map(|one| &one.turns).map(FieldChange::words).collect::<Vec<_>>().join("; ")
     };
     let rows = rows(of).into_iter().zip(&of.distances).map(|(row, distance)| {
         let turn = turned(&row.key);

@@ -1,6 +1,6 @@
 //! Views of an image for the page: a part at full resolution, and the whole image downscaled by a constant factor.
 
-use crate::{Picture, Region};
+use crate::{RasterImage, Region};
 use furrow_base::Result;
 
 /// Largest size of the part in pixels; as wide as half a page.
@@ -27,7 +27,7 @@ pub struct Window {
 
 impl Window {
     /// Creates the views of an image.
-    pub(super) fn take(name: &str, picture: &Picture, labels: Option<&[u8]>) -> Result<Self> {
+    pub(super) fn take(name: &str, picture: &RasterImage, labels: Option<&[u8]>) -> Result<Self> {
         let size = (PART.0.min(picture.width), PART.1.min(picture.height));
         let (left, top) = place(picture.size(), size, labels);
         let start = |y: u32| (y * picture.width + left) as usize;

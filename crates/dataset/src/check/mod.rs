@@ -1,5 +1,5 @@
 //! Verification of a finished dataset.
 
 pub mod difference;
-pub mod listed;
+pub mod manifest_check;
 pub mod verify;

@@ -1,11 +1,11 @@
 //! Verification that a dataset is complete and consistent with its recipe and checksums.
 
 use crate::check::difference::Difference;
-use crate::check::listed::{Listed, listed};
+use crate::check::manifest_check::{ManifestCheck, check_manifest};
 use crate::make::finish::{lacks, ranges};
 use crate::make::pack::store;
 use crate::make::push;
-use crate::make::render::{LastField, RenderedSample, render, scene_file};
+use crate::make::render::{CachedField, RenderedSample, render, scene_file};
 use crate::make::task::{Task, remaining};
 use crate::make::timing_log;
 use crate::model::image_files::{NAMES, belongs};
@@ -20,7 +20,7 @@ use crate::{File, format};
 use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, Threads};
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicBool;
@@ -79,7 +79,7 @@ impl Findings {
 
 /// Settings for rendering images again.
 #[derive(Clone, Copy, Default)]
-pub struct Again<'a> {
+pub struct Rerender<'a> {
     /// Number of images to render.
     pub images: u64,
     /// The renderer; `None` for imported images.
@@ -92,7 +92,7 @@ pub struct Again<'a> {
 /// the index of each checked image; raising `stop` ends the verification with an error.
 pub fn verify(
     set: &Set,
-    again: &Again<'_>,
+    again: &Rerender<'_>,
     threads: &Threads,
     done: &(dyn Fn(u64) + Sync),
     stop: &AtomicBool,
@@ -105,11 +105,11 @@ pub fn verify(
             return Err(Error::stopped("stopped before all images were checked; nothing was changed"));
         }
         // The fault of a truncated archive is reported once, not for each image.
-        let looked = if store::lies_in(set, &cut, index) { Looked::MISSING } else { look(set, index)? };
+        let looked = if store::lies_in(set, &cut, index) { ImageCheck::MISSING } else { check_image(set, index)? };
         done(index);
         Ok(looked)
     };
-    let looked: Vec<Looked> = threads.install(|| in_parallel(0..count, look_at).collect::<Result<_>>())?;
+    let looked: Vec<ImageCheck> = threads.install(|| in_parallel(0..count, look_at).collect::<Result<_>>())?;
     let mut found = Findings { faults: threads.install(|| in_archives(set)), ..Findings::default() };
     for (index, looked) in (0..count).zip(&looked) {
         if looked.missing {
@@ -121,10 +121,10 @@ pub fn verify(
     }
     found.faults.extend(shared_between_splits(set, &looked));
     found.faults.extend(made_differently(set)?);
-    let Listed { mut faults, unchecked } = listed(set, &found.missing)?;
+    let ManifestCheck { mut faults, unchecked } = check_manifest(set, &found.missing)?;
     // Removes faults of archives that were already reported.
-    let told: BTreeSet<&String> = found.faults.iter().collect();
-    faults.retain(|fault| !told.contains(fault));
+    let known_faults: BTreeSet<&String> = found.faults.iter().collect();
+    faults.retain(|fault| !known_faults.contains(fault));
     // Faults of images come last, because only the first faults are printed.
     faults.append(&mut found.faults);
     found.faults = faults;
@@ -135,12 +135,12 @@ pub fn verify(
     let Some(renderer) = again.renderer.filter(|_| again.images > 0) else { return Ok(found) };
     found.kernels = OtherKernels::of(set, renderer)?;
     let scene = scene_file(set)?.memory(again.memory).threads(threads);
-    let mut kept = LastField::default();
+    let mut kept = CachedField::default();
     for index in drawn(count, again.images) {
         if found.missing.contains(&index) {
             continue;
         }
-        let made = render(set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
+        let made = render(set, &scene, index, renderer, RenderMonitor { done: &|_| (), stop }, &mut kept)?;
         let fault = match &mut found.kernels {
             None => other_bytes(set, &made)?,
             Some(kernels) => too_far(set, &made, kernels)?,
@@ -154,21 +154,21 @@ pub fn verify(
 }
 
 /// Result of checking one image.
-struct Looked {
+struct ImageCheck {
     missing: bool,
     faults: Vec<String>,
     /// SHA-256 of its colour image.
     photograph: Option<String>,
 }
 
-impl Looked {
+impl ImageCheck {
     const MISSING: Self = Self { missing: true, faults: Vec::new(), photograph: None };
 }
 
-fn look(set: &Set, index: u64) -> Result<Looked> {
+fn check_image(set: &Set, index: u64) -> Result<ImageCheck> {
     let name = Set::name(index);
     let Some(checksums) = set.checksums(index) else {
-        return Ok(Looked::MISSING);
+        return Ok(ImageCheck::MISSING);
     };
     let mut faults: Vec<String> =
         set.faults(&checksums).into_iter().map(|(path, fault)| format!("{path} {fault}")).collect();
@@ -189,7 +189,7 @@ fn look(set: &Set, index: u64) -> Result<Looked> {
     }
     let mut photographs = checksums.files.iter().filter(|(path, _)| native::is_photograph(path));
     let photograph = photographs.next().map(|(_, sum)| sum.sha256.clone());
-    Ok(Looked { missing, faults, photograph })
+    Ok(ImageCheck { missing, faults, photograph })
 }
 
 /// Returns a fault for each file of an image that the recipe omits; such files are never read.
@@ -216,7 +216,7 @@ fn in_archives(set: &Set) -> Vec<String> {
 }
 
 /// Returns a fault if identical colour images are in two splits.
-fn shared_between_splits(set: &Set, looked: &[Looked]) -> Vec<String> {
+fn shared_between_splits(set: &Set, looked: &[ImageCheck]) -> Vec<String> {
     let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
     for (index, looked) in looked.iter().enumerate() {
         if let Some(hash) = &looked.photograph {

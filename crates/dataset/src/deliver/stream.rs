@@ -7,7 +7,7 @@
 use crate::File;
 use crate::make::generate::{Shard, Work, fitting, together};
 use crate::make::plan::{Order, plan};
-use crate::make::render::{LastField, render, renderer, scene_file};
+use crate::make::render::{CachedField, render, renderer, scene_file};
 use crate::model::invariants;
 use crate::model::recipe::MOST_IMAGES;
 use crate::read::archive::append;
@@ -17,7 +17,7 @@ use furrow_base::error::Place;
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind, Write};
 use std::ops::Range;
@@ -77,17 +77,17 @@ impl ImageStream {
         let workers = self.workers(work, &scene)?;
         let images = self.wanted(work.shard).map(|index| vec![index]);
         let schedule = Arc::new(Schedule::new(images, ResultOrder::InOrder { ahead: 2 * workers.len() }));
-        let (tell, told) = channel();
+        let (sender, receiver) = channel();
         let to_write = Arc::clone(&schedule);
         // Not a scoped thread: the reader of a pipe may block it forever, and a stop must not wait for it.
         let write = move || {
-            let ended = supervised(|| archive(&to_write, out, &tell)).and_then(|ended| ended);
+            let ended = supervised(|| archive(&to_write, out, &sender)).and_then(|ended| ended);
             to_write.end();
-            let _ = tell.send(Said::Ended(ended));
+            let _ = sender.send(Message::Ended(ended));
         };
         std::thread::Builder::new().name("archive".into()).spawn(write).map_err(Error::no_thread)?;
         let source = Source { set, scene, renderer, stop: &stop };
-        let make = |index: &u64, threads: &Threads, kept: &mut LastField| {
+        let make = |index: &u64, threads: &Threads, kept: &mut CachedField| {
             let made = threads.install(|| source.image(*index, threads, kept)).map_err(|e| self.as_asked(e));
             made.inspect_err(|e| {
                 if e.is_of_one_field() {
@@ -97,7 +97,7 @@ impl ImageStream {
         };
         let stopped = || stop.load(Ordering::Relaxed);
         let Written { images, last, failures, ended } = schedule.run(&workers, stopped, make, || {
-            let written = listen(&told, listener, &schedule, &stop);
+            let written = listen(&receiver, listener, &schedule, &stop);
             // Interrupts the workers, whose images are no longer needed.
             stop.store(true, Ordering::Relaxed);
             written
@@ -156,8 +156,8 @@ struct Source<'a> {
 
 impl Source<'_> {
     /// Makes an image and returns its files as in a dataset.
-    fn image(&self, index: u64, threads: &Threads, kept: &mut LastField) -> Result<Vec<File>> {
-        let watch = Watch { done: &|_| (), stop: self.stop };
+    fn image(&self, index: u64, threads: &Threads, kept: &mut CachedField) -> Result<Vec<File>> {
+        let watch = RenderMonitor { done: &|_| (), stop: self.stop };
         let made = render(self.set, &self.scene.clone().threads(threads), index, &self.renderer, watch, kept)?;
         invariants::check(&self.set.recipe, &made.sample)?;
         native::files(&self.set.recipe, &made.sample, &made.text)
@@ -169,7 +169,7 @@ impl Source<'_> {
 pub const MOST_LEFT_OUT: usize = 20;
 
 /// Message of the writing thread.
-enum Said {
+enum Message {
     /// An image was written.
     Written(u64),
     /// An image could not be made.
@@ -208,7 +208,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Receives messages of the writing thread until it ends, or until [`PATIENCE`] has passed since a stop.
 fn listen(
-    told: &Receiver<Said>,
+    receiver: &Receiver<Message>,
     listener: &Listener<'_>,
     schedule: &Schedule<u64, Vec<File>>,
     stop: &AtomicBool,
@@ -216,13 +216,13 @@ fn listen(
     let mut written = Written::default();
     let mut stopped: Option<Instant> = None;
     loop {
-        match told.recv_timeout(EVERY) {
-            Ok(Said::Written(index)) => {
+        match receiver.recv_timeout(EVERY) {
+            Ok(Message::Written(index)) => {
                 (written.images, written.last) = (written.images + 1, Some(index));
                 (listener.done)(index);
             }
-            Ok(Said::Failed(index, error)) => drop(written.failures.insert(index, error)),
-            Ok(Said::Ended(ended)) => {
+            Ok(Message::Failed(index, error)) => drop(written.failures.insert(index, error)),
+            Ok(Message::Ended(ended)) => {
                 written.ended = Some(ended).filter(|_| stopped.is_none());
                 return written;
             }
@@ -243,14 +243,14 @@ fn listen(
 
 /// Writes the images as a tar archive until the last one, [`MOST_LEFT_OUT`] failures in a row, or an error that
 /// concerns more than one field.
-fn archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Sender<Said>) -> Result<End> {
-    write_archive(schedule, out, tell).or_else(|e| match e.kind() {
+fn archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, sender: &Sender<Message>) -> Result<End> {
+    write_archive(schedule, out, sender).or_else(|e| match e.kind() {
         ErrorKind::BrokenPipe => Ok(End::Left),
         _ => Err(Error::io(Path::new("stdout"))(e)),
     })
 }
 
-fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Sender<Said>) -> io::Result<End> {
+fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, sender: &Sender<Message>) -> io::Result<End> {
     let mut archive = tar::Builder::new(out);
     let mut left_out = 0;
     while let Some((index, made)) = schedule.take() {
@@ -260,7 +260,7 @@ fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Se
                 left_out += 1;
                 let ends = left_out == MOST_LEFT_OUT || !e.is_of_one_field();
                 // After a stop, nobody reads the reason.
-                let _ = tell.send(Said::Failed(index, e));
+                let _ = sender.send(Message::Failed(index, e));
                 if ends {
                     break;
                 }
@@ -272,7 +272,7 @@ fn write_archive(schedule: &Schedule<u64, Vec<File>>, out: impl Write, tell: &Se
             append(&mut archive, &file.path, &file.bytes)?;
         }
         archive.get_mut().flush()?;
-        let _ = tell.send(Said::Written(index));
+        let _ = sender.send(Message::Written(index));
     }
     archive.into_inner()?.flush()?;
     Ok(End::Last)
@@ -288,17 +288,17 @@ mod tests {
         let make = |index: &u64, _: &Threads, (): &mut ()| {
             make(*index).map(|()| vec![File { path: format!("images/{index:06}/rgb.png"), bytes: vec![7; 3] }])
         };
-        let (tell, told) = channel();
+        let (sender, receiver) = channel();
         let workers = Threads::divided(2, 2).unwrap();
-        let ended = schedule.run(&workers, || false, make, || archive(&schedule, io::sink(), &tell)).unwrap();
+        let ended = schedule.run(&workers, || false, make, || archive(&schedule, io::sink(), &sender)).unwrap();
         assert_eq!(ended.unwrap(), End::Last);
-        drop(tell);
+        drop(sender);
         let (mut written, mut failed) = (Vec::new(), Vec::new());
-        for said in told {
-            match said {
-                Said::Written(index) => written.push(index),
-                Said::Failed(index, _) => failed.push(index),
-                Said::Ended(_) => {}
+        for message in receiver {
+            match message {
+                Message::Written(index) => written.push(index),
+                Message::Failed(index, _) => failed.push(index),
+                Message::Ended(_) => {}
             }
         }
         (written, failed)

@@ -4,7 +4,7 @@
 //! `data.yaml` has no `path`: Ultralytics then uses the folder of the file, whereas it would search for a relative path
 //! elsewhere. Splits without images are not listed.
 
-use super::{Whole, picture};
+use super::{SetWriter, picture};
 use crate::File;
 use crate::format::labels::Labels;
 use crate::model::recipe::Recipe;
@@ -63,7 +63,7 @@ pub(super) fn warnings(recipe: &Recipe) -> Vec<String> {
 }
 
 /// Writes `data.yaml`, with `more` after the splits.
-pub(super) fn data(folder: &str, set: &Set, out: &mut Whole<'_>, more: &str) -> Result<()> {
+pub(super) fn data(folder: &str, set: &Set, out: &mut SetWriter<'_>, more: &str) -> Result<()> {
     out.file(&format!("{folder}/data.yaml"), |w| {
         for split in Split::ALL {
             if set.names(split).is_empty() {

@@ -15,15 +15,15 @@
 //! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (its evaluation supports street
 //! scenes only: this is the layout, not the benchmark).
 
-use super::{Format, Whole, picture};
+use super::{Format, SetWriter, picture};
 use furrow_base::Result;
 use crate::File;
 use crate::format::labels::Labels;
-use crate::model::recipe::{Made, Recipe};
+use crate::model::recipe::{ImageOrigin, Recipe};
 use crate::model::record::{Plant, Record};
 use crate::model::sample::Sample;
 use crate::read::set::Set;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ impl Format for Writer {
         let of_set = Labels::of(recipe)?;
         let classes = of_set.pixels(sample);
         let at = |kind: &str, suffix: &str| path(recipe, record, kind, suffix);
-        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &Picture::Gray(&classes));
+        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &ImageData::Gray(&classes));
         let numbers = numbers(&of_set, record);
         // A pixel can have another class than its plant if there are classes of organs.
         let instance = |(class, plant): (&u8, &u32)| match numbers.get(plant) {
@@ -55,12 +55,12 @@ impl Format for Writer {
             picture::photograph_as_png(sample, at("leftImg8bit", "leftImg8bit"))?,
             labels("gtFine_labelIds")?,
             labels("gtFine_labelTrainIds")?,
-            picture::file(sample, at("gtFine", "gtFine_instanceIds"), &Picture::Gray16(&instances))?,
-            picture::file(sample, at("gtFine", "gtFine_color"), &Picture::Rgb(&colors))?,
+            picture::file(sample, at("gtFine", "gtFine_instanceIds"), &ImageData::Gray16(&instances))?,
+            picture::file(sample, at("gtFine", "gtFine_color"), &ImageData::Rgb(&colors))?,
         ])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let labels = Labels::of(&set.recipe)?;
         out.file(&format!("{FOLDER}/label_colors.txt"), |w| {
             for (class, [r, g, b]) in labels.classes().iter().zip(labels.colors()) {
@@ -91,8 +91,8 @@ fn path(recipe: &Recipe, record: &Record, kind: &str, suffix: &str) -> String {
 /// `_` would end it.
 fn city(recipe: &Recipe) -> String {
     let name = match &recipe.made {
-        Made::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),
-        Made::Imported { from, .. } => Some(from.as_str()),
+        ImageOrigin::Rendered(rendering) => rendering.scene.rsplit('/').next().and_then(|file| file.split('.').next()),
+        ImageOrigin::Imported { from, .. } => Some(from.as_str()),
     };
     let letters: String = name.unwrap_or_default().chars().filter(char::is_ascii_alphanumeric).collect();
     if letters.is_empty() { "field".into() } else { letters.to_ascii_lowercase() }
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn a_city_has_no_underscore() {
         let of = |from: &str| Recipe {
-            made: Made::Imported { from: from.into(), source_sha256: String::new(), nir: None },
+            made: ImageOrigin::Imported { from: from.into(), source_sha256: String::new(), nir: None },
             ..Recipe::of_species(Vec::new())
         };
         assert_eq!(city(&of("Pheno_Bench 2")), "phenobench2");

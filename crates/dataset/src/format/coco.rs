@@ -24,7 +24,7 @@
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
 use super::videos::Videos;
-use super::{Format, Whole, picture};
+use super::{Format, SetWriter, picture};
 use crate::format::labels::Labels;
 use crate::model::recipe::Recipe;
 use crate::model::record::{Keypoint, Plant, PointState, Record, Seen};
@@ -46,7 +46,7 @@ impl Format for Writer {
         Ok(vec![picture::photograph(sample, &format!("{FOLDER}/images/{}/{name}", split.name()))?])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let labels = Labels::of(&set.recipe)?;
         let videos = Videos::of(set)?;
         for split in Split::ALL {
@@ -181,11 +181,11 @@ fn annotations<'a>(
             (Some(videos), Some(capture)) => Some(videos.id(capture)?),
             _ => None,
         };
-        let told = |(annotation, identity): (Annotation, Option<u32>)| match video {
+        let with_identity = |(annotation, identity): (Annotation, Option<u32>)| match video {
             Some(video) => annotation.in_video(video, identity),
             None => annotation,
         };
-        Ok(of_image(set, labels, &record).into_iter().map(told).collect())
+        Ok(of_image(set, labels, &record).into_iter().map(with_identity).collect())
     };
     let of_image = move |record: Result<Record>| match record.and_then(of_record) {
         Ok(all) => all.into_iter().map(Ok).collect(),

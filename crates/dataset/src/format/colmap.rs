@@ -11,8 +11,8 @@
 //!
 //! Source: COLMAP documentation, "Output Format"; `src/colmap/sensor/models.h`.
 
-use super::Whole;
-use super::drives::{self, OfFields, Taken};
+use super::SetWriter;
+use super::drives::{self, OfFields, DriveImage};
 use furrow_base::Result;
 use furrow_optics::sensor::CameraRecord;
 use crate::read::set::Set;
@@ -35,7 +35,7 @@ impl OfFields for Writer {
         true
     }
 
-    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
         out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;
         out.file(&format!("{folder}/images.txt"), |w| w.put(poses(set, images)))?;
@@ -44,7 +44,7 @@ impl OfFields for Writer {
 }
 
 /// Returns one row per camera, numbered from 1 in the order of their names.
-fn cameras(images: &[Taken]) -> String {
+fn cameras(images: &[DriveImage]) -> String {
     let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
     for (number, of) in (1..).zip(drives::by_camera(images).values()) {
         let c = &of[0].camera;
@@ -64,7 +64,7 @@ fn model(c: &CameraRecord) -> String {
 }
 
 /// Returns two rows per image: its pose, and an empty row for its points.
-fn poses(set: &Set, images: &[Taken]) -> String {
+fn poses(set: &Set, images: &[DriveImage]) -> String {
     let numbers: Vec<&str> = drives::by_camera(images).into_keys().collect();
     let mut text = "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n".to_owned();
     for image in images {

@@ -8,11 +8,11 @@ use furrow_optics::light::LightRecord;
 
 /// Summary of light, soil and camera of an image. Values are `None` if the scene file does not define them, and for
 /// imported images.
-pub(super) struct Brief<'a> {
+pub(super) struct ConditionsSummary<'a> {
     conditions: Option<&'a Conditions>,
 }
 
-impl<'a> Brief<'a> {
+impl<'a> ConditionsSummary<'a> {
     pub(super) fn of(record: &'a Record) -> Self {
         Self { conditions: record.conditions.as_ref() }
     }

@@ -19,8 +19,8 @@
 //! Source: Steininger et al. 2023, "The CropAndWeed Dataset", and its repository, `cnw/utilities/datasets.py`,
 //! `cnw/map_dataset.py`.
 
-use super::conditions::Brief;
-use super::{Format, Whole, picture};
+use super::conditions::ConditionsSummary;
+use super::{Format, SetWriter, picture};
 use crate::format::labels;
 use crate::model::photo::Photo;
 use crate::model::recipe::Recipe;
@@ -29,7 +29,7 @@ use crate::model::sample::Sample;
 use crate::read::set::Set;
 use crate::model::split::Split;
 use crate::File;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_base::{Error, Result};
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -98,12 +98,12 @@ impl Format for Writer {
         Ok(vec![
             picture::photograph_as_jpeg(sample, format!("{FOLDER}/images/{name}.jpg"), QUALITY)?,
             File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows },
-            picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &Picture::Gray(&map))?,
+            picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &ImageData::Gray(&map))?,
             File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).csv()? },
         ])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         for split in Split::ALL {
             let of_split = (0..set.recipe.count).filter(|k| set.recipe.split_of(*k) == split);
             let names: String = of_split.map(|k| name(k) + "\n").collect();
@@ -114,7 +114,7 @@ impl Format for Writer {
         let labels = Labels::of(&set.recipe)?;
         out.file(&format!("{FOLDER}/labels.json"), |w| {
             w.put("{\n\"labels\": [")?;
-            w.items(labels.told(&set.recipe).into_iter().map(Ok))?;
+            w.items(labels.entries(&set.recipe).into_iter().map(Ok))?;
             w.put("],\n\"params\": ")?;
             w.json(&Params::ABOUT)?;
             w.put("\n}\n")
@@ -126,7 +126,7 @@ impl Format for Writer {
         let photographs = "images are JPEG, as its scripts expect; the other formats have lossless images";
         let labels = "its labels are CropAndWeed's own, independent of --classes";
         let all = [(lossless, photographs), (recipe.labelling.classes.is_some(), labels)];
-        all.into_iter().filter(|(told, _)| *told).map(|(_, words)| words.to_owned()).collect()
+        all.into_iter().filter(|(applies, _)| *applies).map(|(_, words)| words.to_owned()).collect()
     }
 }
 
@@ -166,18 +166,18 @@ impl Labels {
     }
 
     /// Returns the descriptions of all labels.
-    fn told(&self, recipe: &Recipe) -> Vec<serde_json::Value> {
+    fn entries(&self, recipe: &Recipe) -> Vec<serde_json::Value> {
         let mut all = vec![json!({ "label": 0, "name": "soil" })];
         for (species, label) in recipe.species.iter().zip(&self.0) {
             let whose = if OWN.contains(&u16::from(*label)) { "this dataset" } else { "CropAndWeed" };
             let (name, eppo, class) = (&species.name, &species.eppo, species.class.name());
-            let mut tell = |label: u8, name: &str| {
+            let mut add_label = |label: u8, name: &str| {
                 all.push(json!({ "label": label, "name": name, "eppo": eppo, "class": class, "of": whose }));
             };
-            tell(*label, name);
+            add_label(*label, name);
             if STAGED.contains(&eppo.as_str()) {
                 for (k, (_, stage)) in (1..).zip(STAGES) {
-                    tell(label + k, &format!("{name}, {stage}"));
+                    add_label(label + k, &format!("{name}, {stage}"));
                 }
             }
         }
@@ -203,7 +203,7 @@ impl Params {
     ];
 
     fn of(record: &Record) -> Self {
-        let brief = Brief::of(record);
+        let brief = ConditionsSummary::of(record);
         let step = |value: f64, bounds: [f64; 2]| bounds.iter().filter(|bound| value >= **bound).count() as u8;
         Self([
             ("moisture", brief.moisture().map(|m| step(m, [1.0 / 3.0, 2.0 / 3.0]))),

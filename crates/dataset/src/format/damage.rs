@@ -15,7 +15,7 @@ use crate::File;
 use crate::model::recipe::Recipe;
 use crate::model::sample::Sample;
 use furrow_render::material::Damage;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 
 pub(super) struct Writer;
 
@@ -39,7 +39,7 @@ impl Format for Writer {
         let map = |(map, share): (&str, Share)| {
             let values: Vec<u8> = damage.iter().map(|at| (share(at).clamp(0.0, 1.0) * 255.0).round() as u8).collect();
             let path = format!("{FOLDER}/{}/{map}/{}.png", record.split.name(), record.name);
-            picture::file(sample, path, &Picture::Gray(&values))
+            picture::file(sample, path, &ImageData::Gray(&values))
         };
         MAPS.into_iter().map(map).collect()
     }

@@ -1,6 +1,6 @@
 //! Images of a field with their cameras, from which formats for poses and tracks are made.
 
-use super::{Format, Whole};
+use super::{Format, SetWriter};
 use crate::model::recipe::Recipe;
 use crate::model::record::{CaptureRecord, Record};
 use crate::read::set::Set;
@@ -11,7 +11,7 @@ use furrow_optics::sensor::CameraRecord;
 use std::collections::BTreeMap;
 
 /// One image of a field.
-pub(super) struct Taken {
+pub(super) struct DriveImage {
     pub(super) record: Record,
     pub(super) camera: CameraRecord,
     pub(super) capture: CaptureRecord,
@@ -25,7 +25,7 @@ pub(super) trait OfFields: Sync {
     }
 
     /// Writes the files of the field with this name.
-    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()>;
+    fn field(&self, set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()>;
 
     /// See [`Format::names_photographs`].
     fn names_photographs(&self) -> bool {
@@ -59,7 +59,7 @@ impl<T: OfFields> Format for T {
         OfFields::has_one_pose(self)
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let fields = set.recipe.count.div_ceil(set.recipe.captures());
         for field in 0..fields {
             let (name, images) = (Set::name(field), images(set, field)?);
@@ -81,13 +81,13 @@ impl<T: OfFields> Format for T {
 }
 
 /// Returns the images of a field that are in the dataset, in order.
-fn images(set: &Set, field: u64) -> Result<Vec<Taken>> {
+fn images(set: &Set, field: u64) -> Result<Vec<DriveImage>> {
     let captures = set.recipe.captures();
     let (begin, end) = (field * captures, ((field + 1) * captures).min(set.recipe.count));
     (begin..end).map(|index| taken(set.record(index)?)).collect()
 }
 
-fn taken(mut record: Record) -> Result<Taken> {
+fn taken(mut record: Record) -> Result<DriveImage> {
     let camera = record.conditions.take().map(|conditions| conditions.camera).ok_or_else(|| {
         Error::misuse(format!("image {} was imported and has no camera data", record.name))
             .help("formats with poses need rendered images")
@@ -99,12 +99,12 @@ fn taken(mut record: Record) -> Result<Taken> {
         camera: FIRST.into(),
         time_s: 0.0,
     });
-    Ok(Taken { record, camera, capture })
+    Ok(DriveImage { record, camera, capture })
 }
 
 /// Groups images by the name of their camera.
-pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
-    let mut all: BTreeMap<&str, Vec<&Taken>> = BTreeMap::new();
+pub(super) fn by_camera(images: &[DriveImage]) -> BTreeMap<&str, Vec<&DriveImage>> {
+    let mut all: BTreeMap<&str, Vec<&DriveImage>> = BTreeMap::new();
     for image in images {
         all.entry(image.capture.camera.as_str()).or_default().push(image);
     }
@@ -112,7 +112,7 @@ pub(super) fn by_camera(images: &[Taken]) -> BTreeMap<&str, Vec<&Taken>> {
 }
 
 /// Returns the path of the colour image, relative to `images/`.
-pub(super) fn photograph(set: &Set, image: &Taken) -> String {
+pub(super) fn photograph(set: &Set, image: &DriveImage) -> String {
     format!("{}/rgb.{}", image.record.name, set.recipe.photo().ending())
 }
 

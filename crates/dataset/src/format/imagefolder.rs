@@ -8,18 +8,18 @@
 //! Source: Hugging Face datasets documentation, "Create an image dataset", ImageFolder with metadata, and "Dataset
 //! cards"; read with datasets 5.2.0, which preserves the numbers in 16-bit masks and in masks of three bytes.
 
-use super::conditions::Brief;
-use super::{Format, Whole, picture};
+use super::conditions::ConditionsSummary;
+use super::{Format, SetWriter, picture};
 use furrow_base::Result;
 use crate::File;
-use crate::model::keep::Omitted;
+use crate::model::optional_maps::OmittableMap;
 use crate::format::labels::Labels;
 use crate::model::recipe::Recipe;
 use crate::model::record::Record;
 use crate::model::sample::Sample;
 use crate::read::set::{Set, Stream};
 use crate::model::split::Split;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_report::markdown::{code, plain};
 use furrow_render::scene::tag::Class;
 use serde_json::{Value, json};
@@ -33,20 +33,20 @@ impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
         let below = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}", split.name());
-        let file = |kind: &str, picture: &Picture<'_>| picture::file(sample, below(kind) + ".png", picture);
+        let file = |kind: &str, picture: &ImageData<'_>| picture::file(sample, below(kind) + ".png", picture);
         let mut files = vec![
             picture::photograph(sample, &below("images"))?,
             // Grey values instead of palette indices, which a reader that converts images to RGB would lose.
-            file("masks", &Picture::Gray(&Labels::of(recipe)?.pixels(sample)))?,
+            file("masks", &ImageData::Gray(&Labels::of(recipe)?.pixels(sample)))?,
         ];
-        if !recipe.omits(Omitted::Plants) {
-            files.push(file("plants", &Picture::Numbers(&sample.plants))?);
+        if !recipe.omits(OmittableMap::Plants) {
+            files.push(file("plants", &ImageData::Numbers(&sample.plants))?);
         }
-        if !recipe.omits(Omitted::Leaves) {
-            files.push(file("leaves", &Picture::Gray16(&sample.leaves))?);
+        if !recipe.omits(OmittableMap::Leaves) {
+            files.push(file("leaves", &ImageData::Gray16(&sample.leaves))?);
         }
-        if !sample.species.is_empty() && !recipe.omits(Omitted::Species) {
-            files.push(file("species", &Picture::Gray(&sample.species))?);
+        if !sample.species.is_empty() && !recipe.omits(OmittableMap::Species) {
+            files.push(file("species", &ImageData::Gray(&sample.species))?);
         }
         if !sample.nir.is_empty() {
             files.push(picture::near_infrared(sample, &below("nir"))?);
@@ -54,7 +54,7 @@ impl Format for Writer {
         Ok(files)
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let splits: Vec<Split> = Split::ALL.into_iter().filter(|s| !set.names(*s).is_empty()).collect();
         let known = known(set, &splits)?;
         for split in &splits {
@@ -93,18 +93,18 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
         let below = format!("{kind}/{name}.{ending}");
         set.folder.join(FOLDER).join(split.name()).join(&below).is_file().then_some(below)
     };
-    let label_map = |map: Omitted, kind: &str| (!set.recipe.omits(map)).then(|| format!("{kind}/{name}.png"));
+    let label_map = |map: OmittableMap, kind: &str| (!set.recipe.omits(map)).then(|| format!("{kind}/{name}.png"));
     let pixels = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels);
     let count = |class: Class| record.seen().filter(|p| p.class == class).count();
     let species: BTreeSet<&str> = record.seen().filter_map(|p| set.recipe.species_name(p.kind)).collect();
-    let brief = Brief::of(record);
+    let brief = ConditionsSummary::of(record);
     // Texts are never null, since an empty text has a type.
     let list = |words: Vec<&str>| json!(words.join(", "));
     vec![
         ("file_name", json!(format!("images/{name}.{photo}"))),
         ("mask_file_name", json!(format!("masks/{name}.png"))),
-        ("plants_file_name", json!(label_map(Omitted::Plants, "plants"))),
-        ("leaves_file_name", json!(label_map(Omitted::Leaves, "leaves"))),
+        ("plants_file_name", json!(label_map(OmittableMap::Plants, "plants"))),
+        ("leaves_file_name", json!(label_map(OmittableMap::Leaves, "leaves"))),
         ("species_file_name", json!(file("species", "png"))),
         ("nir_file_name", json!(file("nir", photo))),
         ("index", json!(record.index)),
@@ -178,8 +178,8 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
     }
     let labels = Labels::of(recipe)?;
     let classes = labels.classes().iter().enumerate().map(|(i, class)| format!("{i} {}", plain(&class.name)));
-    w.put(columns_told(recipe).replace("{classes}", &classes.collect::<Vec<_>>().join(", ")))?;
-    if recipe.omits(Omitted::Species) {
+    w.put(describe_columns(recipe).replace("{classes}", &classes.collect::<Vec<_>>().join(", ")))?;
+    if recipe.omits(OmittableMap::Species) {
         return Ok(());
     }
     w.put("\n`species` numbers:\n\n| number | species | EPPO code | class |\n|---|---|---|---|\n| 0 | none | | |\n")?;
@@ -191,9 +191,9 @@ fn card(set: &Set, splits: &[Split], w: &mut Stream<'_>) -> Result<()> {
 }
 
 /// Returns the description of the columns, without omitted label maps.
-fn columns_told(recipe: &Recipe) -> String {
+fn describe_columns(recipe: &Recipe) -> String {
     let there = |line: &&str| {
-        !Omitted::NAMED.iter().any(|(name, map, _)| recipe.omits(*map) && line.starts_with(&format!("| `{name}` |")))
+        !OmittableMap::NAMED.iter().any(|(name, map, _)| recipe.omits(*map) && line.starts_with(&format!("| `{name}` |")))
     };
     COLUMNS.split_inclusive('\n').filter(there).collect()
 }
@@ -220,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_licence_is_told_in_the_words_of_the_hub() {
+    fn a_licence_has_the_identifier_of_the_hub() {
         assert_eq!(licence("CC-BY-4.0"), "license: cc-by-4.0\n");
         assert_eq!(licence("not stated"), "license: unknown\n");
         assert_eq!(licence("ask \"me\": first"), "license: other\nlicense_name: \"ask \\\"me\\\": first\"\n");

@@ -14,7 +14,7 @@
 //! Source: OpenEXR file layout; Cryptomatte specification 1.2.0. Read with OpenEXR 3.5.3 and cryptomatte-api 1.0.0.
 
 use super::Format;
-use crate::model::recipe::{Made, Recipe};
+use crate::model::recipe::{ImageOrigin, Recipe};
 use crate::model::sample::Sample;
 use crate::File;
 use furrow_base::{Error, Result};
@@ -42,10 +42,10 @@ impl Format for Writer {
 fn provenance(recipe: &Recipe, index: u64) -> String {
     let program = format!("program: furrow {}", recipe.furrow);
     match &recipe.made {
-        Made::Rendered(made) => format!(
+        ImageOrigin::Rendered(made) => format!(
             "{program}\nscene: sha256 {}\nseed: {}\nindex: {index}\nspp: {}\nkernels: {}",
             made.scene_sha256, made.seed, made.spp, made.kernels
         ),
-        Made::Imported { .. } => program,
+        ImageOrigin::Imported { .. } => program,
     }
 }

@@ -4,10 +4,10 @@
 //! further changes.
 
 use crate::File;
-use crate::model::keep::Kept;
+use crate::model::optional_maps::OptionalMap;
 use crate::model::recipe::Recipe;
 use crate::model::sample::Sample;
-use crate::read::set::{Set, Whole};
+use crate::read::set::{Set, SetWriter};
 use furrow_base::{Error, Result};
 
 /// A file format for datasets. Paths of files are relative to the dataset's folder and start with the format's name.
@@ -22,8 +22,8 @@ pub trait Format: Sync {
         true
     }
 
-    /// Writes the files that belong to all images, with [`Whole::file`]. Called when every image is complete.
-    fn whole(&self, _set: &Set, _out: &mut Whole<'_>) -> Result<()> {
+    /// Writes the files that belong to all images, with [`SetWriter::file`]. Called when every image is complete.
+    fn write_set(&self, _set: &Set, _out: &mut SetWriter<'_>) -> Result<()> {
         Ok(())
     }
 
@@ -34,7 +34,7 @@ pub trait Format: Sync {
     }
 
     /// Returns the maps of images that the format needs.
-    fn needs_maps(&self) -> &'static [Kept] {
+    fn needs_maps(&self) -> &'static [OptionalMap] {
         &[]
     }
 
@@ -181,7 +181,7 @@ pub fn check_maps(recipe: &Recipe) -> Result<()> {
             )));
         }
         let lacks = writer.needs_maps().iter().find(|map| !recipe.keeps(**map));
-        if let Some((name, ..)) = lacks.and_then(|map| Kept::NAMED.iter().find(|(_, kept, _)| kept == map)) {
+        if let Some((name, ..)) = lacks.and_then(|map| OptionalMap::NAMED.iter().find(|(_, kept, _)| kept == map)) {
             return Err(Error::misuse(format!("--format {format} holds {name}, which these images do not keep"))
                 .help(format!("create a dataset with {name} in --keep, or omit --format {format}")));
         }

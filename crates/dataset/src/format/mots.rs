@@ -6,8 +6,8 @@
 //!
 //! Source: Voigtlaender et al. 2019, "MOTS: Multi-object tracking and segmentation"; mots_tools, "txt format".
 
-use super::Whole;
-use super::drives::{self, OfFields, Taken};
+use super::SetWriter;
+use super::drives::{self, OfFields, DriveImage};
 use furrow_base::Result;
 use crate::format::labels::Labels;
 use crate::read::set::Set;
@@ -18,7 +18,7 @@ pub(super) struct Writer;
 const FOLDER: &str = "mots";
 
 impl OfFields for Writer {
-    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()> {
         let labels = Labels::of(&set.recipe)?;
         for (camera, of) in drives::by_camera(images) {
             let mut text = String::new();

@@ -10,8 +10,8 @@
 //!
 //! Source: nerfstudio documentation, "Data conventions".
 
-use super::Whole;
-use super::drives::{self, OfFields, Taken};
+use super::SetWriter;
+use super::drives::{self, OfFields, DriveImage};
 use crate::model::recipe::json;
 use furrow_base::Result;
 use crate::read::set::Set;
@@ -34,7 +34,7 @@ impl OfFields for Writer {
         true
     }
 
-    fn field(&self, set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()> {
         let mut all = images.first().map(intrinsics).unwrap_or_default();
         all.insert("frames".into(), images.iter().map(|image| frame(set, image)).collect());
         let text = json(&all)?;
@@ -42,7 +42,7 @@ impl OfFields for Writer {
     }
 }
 
-fn intrinsics(image: &Taken) -> Map<String, Value> {
+fn intrinsics(image: &DriveImage) -> Map<String, Value> {
     let c = &image.camera;
     let mut all = json!({
         "camera_model": "OPENCV",
@@ -56,7 +56,7 @@ fn intrinsics(image: &Taken) -> Map<String, Value> {
     if let Value::Object(all) = all { all } else { Map::new() }
 }
 
-fn frame(set: &Set, image: &Taken) -> Value {
+fn frame(set: &Set, image: &DriveImage) -> Value {
     let (axes, place) = drives::camera_to_world(&image.camera);
     // Rows of the matrix; OpenGL's y and z axes have the opposite direction.
     let row = |i: usize| [axes.x_axis[i], -axes.y_axis[i], -axes.z_axis[i], place[i]];

@@ -15,7 +15,7 @@
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
 use super::videos::Videos;
-use super::{Format, Whole, coco, picture};
+use super::{Format, SetWriter, coco, picture};
 use crate::format::labels::Labels;
 use crate::model::recipe::{Recipe, json};
 use crate::model::record::Record;
@@ -24,7 +24,7 @@ use crate::model::sample::{IGNORE, Sample};
 use crate::read::set::Set;
 use crate::model::split::Split;
 use crate::File;
-use furrow_output::{Picture, packed};
+use furrow_output::{ImageData, packed};
 use furrow_render::scene::tag::MOST_PLANTS;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
@@ -48,13 +48,13 @@ impl Format for Writer {
             picture::file(
                 sample,
                 format!("{FOLDER}/annotations/panoptic_{split}/{name}.png"),
-                &Picture::Linear(&colors),
+                &ImageData::Linear(&colors),
             )?,
             File { path: segments_path(split, name), bytes: json(&segments)? },
         ])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let videos = Videos::of(set)?;
         for split in Split::ALL {
             if set.names(split).is_empty() {

@@ -4,13 +4,13 @@
 //! Values are 8-bit indices with a palette; `parts/names.json` names them. 0 is the sky. Models that the scene file
 //! names are numbered from 101, in the order of their names in the file.
 
-use super::{Format, Whole, picture};
+use super::{Format, SetWriter, picture};
 use crate::model::recipe::Recipe;
 use crate::model::annotate::part_numbers;
 use crate::model::sample::Sample;
 use crate::read::set::Set;
 use crate::File;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_field::PartKind;
 use furrow_base::Result;
 use std::collections::BTreeMap;
@@ -24,10 +24,10 @@ impl Format for Writer {
         let record = &sample.record;
         let path = format!("{FOLDER}/{}/{}.png", record.split.name(), record.name);
         let palette = PartKind::palette(recipe.models().len());
-        Ok(vec![picture::file(sample, path, &Picture::Indexed(&numbers(FOLDER, sample)?, &palette))?])
+        Ok(vec![picture::file(sample, path, &ImageData::Indexed(&numbers(FOLDER, sample)?, &palette))?])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let known = PartKind::NUMBERED.map(|(number, name, ..)| (number, name.to_owned())).into_iter();
         let named = |(place, name): (u8, &String)| (PartKind::Named(place).number(), format!("model:{name}"));
         let names: BTreeMap<u8, String> = known.chain((0..=u8::MAX).zip(set.recipe.models()).map(named)).collect();

@@ -3,25 +3,25 @@
 use crate::model::photo::Jpegs;
 use crate::{File, Sample};
 use furrow_base::Result;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 
 /// Returns an image of a sample's size as a PNG file.
-pub(super) fn file(sample: &Sample, path: String, picture: &Picture<'_>) -> Result<File> {
+pub(super) fn file(sample: &Sample, path: String, picture: &ImageData<'_>) -> Result<File> {
     let (width, height) = sample.size();
     Ok(File { path, bytes: furrow_output::encode_png(width, height, picture, "")? })
 }
 
 /// Returns the colour image as it is stored in `images/`, PNG or JPEG; `path` has no extension.
 pub(super) fn photograph(sample: &Sample, path: &str) -> Result<File> {
-    stored(sample, path, |jpeg| &jpeg.rgb, &Picture::Rgb(&sample.rgb))
+    stored(sample, path, |jpeg| &jpeg.rgb, &ImageData::Rgb(&sample.rgb))
 }
 
 /// Returns the near-infrared image in the same way.
 pub(super) fn near_infrared(sample: &Sample, path: &str) -> Result<File> {
-    stored(sample, path, |jpeg| &jpeg.nir, &Picture::Gray(&sample.nir))
+    stored(sample, path, |jpeg| &jpeg.nir, &ImageData::Gray(&sample.nir))
 }
 
-fn stored(sample: &Sample, path: &str, of: impl Fn(&Jpegs) -> &Vec<u8>, picture: &Picture<'_>) -> Result<File> {
+fn stored(sample: &Sample, path: &str, of: impl Fn(&Jpegs) -> &Vec<u8>, picture: &ImageData<'_>) -> Result<File> {
     match &sample.jpeg {
         Some(jpeg) => Ok(File { path: format!("{path}.jpg"), bytes: of(jpeg).clone() }),
         None => file(sample, format!("{path}.png"), picture),
@@ -30,7 +30,7 @@ fn stored(sample: &Sample, path: &str, of: impl Fn(&Jpegs) -> &Vec<u8>, picture:
 
 /// Returns the colour image as PNG, for readers that support nothing else.
 pub(super) fn photograph_as_png(sample: &Sample, path: String) -> Result<File> {
-    file(sample, path, &Picture::Rgb(&sample.rgb))
+    file(sample, path, &ImageData::Rgb(&sample.rgb))
 }
 
 /// Returns the colour image as JPEG: as it is stored if it is a JPEG, otherwise encoded with this quality.

@@ -15,7 +15,7 @@
 //! Source: Turk 1994, "The PLY Polygon File Format".
 
 use super::{Format, parts};
-use crate::model::keep::Kept;
+use crate::model::optional_maps::OptionalMap;
 use crate::model::recipe::Recipe;
 use crate::model::sample::Sample;
 use crate::File;
@@ -53,8 +53,8 @@ impl Format for Writer {
         Ok(vec![File { path, bytes: cloud.file(&recipe.furrow) }])
     }
 
-    fn needs_maps(&self) -> &'static [Kept] {
-        &[Kept::Nir]
+    fn needs_maps(&self) -> &'static [OptionalMap] {
+        &[OptionalMap::Nir]
     }
 
     fn needs_film(&self) -> bool {

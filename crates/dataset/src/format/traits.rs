@@ -8,11 +8,11 @@
 //! Cells of unknown values (models, imported images) are empty. The first row names the columns; the first columns
 //! identify the image of a row (`index/origin.rs`).
 
-use super::{Format, Whole};
+use super::{Format, SetWriter};
 use crate::index::leaves;
 use crate::index::origin::Origin;
 use crate::model::recipe::Recipe;
-use crate::model::record::{Grown, Leaf, Plant, Record};
+use crate::model::record::{PlantAttributes, Leaf, Plant, Record};
 use crate::read::set::{Set, Stream};
 use furrow_render::scene::tag::Class;
 use furrow_base::{Error, Result};
@@ -83,7 +83,7 @@ impl Format for Writer {
         false
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         table::<PlantRow<'_>>(set, out, "plants.csv", |record, origin, table| {
             record.plants.iter().try_for_each(|plant| table.row(origin, PlantRow::of(plant)))
         })?;
@@ -123,7 +123,7 @@ fn columns<T: Serialize + Default>() -> Result<Vec<u8>> {
 /// Writes a table of rows `T`: the names of its columns, then the rows of all records.
 fn table<T: Serialize + Default>(
     set: &Set,
-    out: &mut Whole<'_>,
+    out: &mut SetWriter<'_>,
     name: &str,
     rows: impl Fn(&Record, &Origin<'_>, &mut Table<'_, '_>) -> Result<()>,
 ) -> Result<()> {
@@ -175,7 +175,7 @@ impl<'a> PlantRow<'a> {
 impl<'a> LeafRow<'a> {
     fn of(plant: &'a Plant, leaf: &Leaf) -> Self {
         let traits = leaf.traits;
-        let species = plant.grown.as_ref().map(|Grown { species, .. }| species.as_str());
+        let species = plant.grown.as_ref().map(|PlantAttributes { species, .. }| species.as_str());
         Self {
             plant: plant.number,
             leaf: leaf.number,

@@ -6,8 +6,8 @@
 //!
 //! Source: Sturm et al. 2012, "A benchmark for the evaluation of RGB-D SLAM systems"; its page "File formats".
 
-use super::Whole;
-use super::drives::{self, OfFields, Taken};
+use super::SetWriter;
+use super::drives::{self, OfFields, DriveImage};
 use furrow_base::Result;
 use crate::read::set::Set;
 use std::fmt::Write;
@@ -21,7 +21,7 @@ impl OfFields for Writer {
         true
     }
 
-    fn field(&self, _set: &Set, name: &str, images: &[Taken], out: &mut Whole<'_>) -> Result<()> {
+    fn field(&self, _set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()> {
         for (camera, of) in drives::by_camera(images) {
             let mut text = "# time_s x_m y_m z_m qx qy qz qw\n".to_owned();
             for image in of {

@@ -8,7 +8,7 @@
 //! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and
 //! 5; colours are those of its `VOClabelcolormap`.
 
-use super::{Format, Whole, picture};
+use super::{Format, SetWriter, picture};
 use crate::format::labels::Labels;
 use crate::model::photo::Photo;
 use crate::model::recipe::Recipe;
@@ -17,7 +17,7 @@ use crate::model::sample::{IGNORE, Sample};
 use crate::read::set::Set;
 use crate::model::split::Split;
 use crate::File;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_base::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -75,12 +75,12 @@ impl Format for Writer {
         Ok(vec![
             picture::photograph_as_jpeg(sample, path("JPEGImages", "jpg"), QUALITY)?,
             File { path: path("Annotations", "xml"), bytes: text.into_bytes() },
-            picture::file(sample, path("SegmentationClass", "png"), &Picture::Indexed(&classes, &colors))?,
-            picture::file(sample, path("SegmentationObject", "png"), &Picture::Indexed(&objects, &colors))?,
+            picture::file(sample, path("SegmentationClass", "png"), &ImageData::Indexed(&classes, &colors))?,
+            picture::file(sample, path("SegmentationObject", "png"), &ImageData::Indexed(&objects, &colors))?,
         ])
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let lists: [(&str, &[Split]); 4] = [
             ("train", &[Split::Train]),
             ("val", &[Split::Val]),

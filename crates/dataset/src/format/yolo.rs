@@ -12,7 +12,7 @@
 //! 0.31.2.
 
 use super::outline::{Corner, Mask};
-use super::{Format, Whole, boxes};
+use super::{Format, SetWriter, boxes};
 use crate::format::labels::Labels;
 use crate::model::recipe::{Recipe, json};
 use crate::model::record::{Plant, Record};
@@ -54,7 +54,7 @@ impl Format for Writer {
         Ok(files)
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         boxes::data(FOLDER, set, out, "")?;
         out.file(&format!("{FOLDER}/loss.json"), |w| {
             let mut sum = Sum::default();
@@ -66,7 +66,7 @@ impl Format for Writer {
                 },
             ))?;
             w.put("],\n\"summary\": ")?;
-            w.json(&sum.told())?;
+            w.json(&sum.to_json())?;
             w.put("\n}\n")
         })
     }
@@ -107,17 +107,17 @@ impl Sum {
     /// Adds a plant, and returns its entry in `loss.json`.
     fn add(&mut self, split: Split, name: &str, loss: &Loss) -> serde_json::Value {
         let Loss { plant, iou } = *loss;
-        let told = serde_json::json!({ "image": name, "split": split.name(), "plant": plant, "iou": iou });
+        let entry = serde_json::json!({ "image": name, "split": split.name(), "plant": plant, "iou": iou });
         if self.worst.is_none() || iou < self.least {
-            (self.worst, self.least) = (Some(told.clone()), iou);
+            (self.worst, self.least) = (Some(entry.clone()), iou);
         }
         self.plants += 1;
         self.exact += u64::from(iou == 1.0);
         self.iou += iou;
-        told
+        entry
     }
 
-    fn told(&self) -> serde_json::Value {
+    fn to_json(&self) -> serde_json::Value {
         let mean = (self.plants > 0).then(|| self.iou / self.plants as f64);
         serde_json::json!({ "plants": self.plants, "exact": self.exact, "mean_iou": mean, "worst": self.worst })
     }

@@ -6,7 +6,7 @@
 //!
 //! Source: Ultralytics documentation, "Object Detection Datasets Overview".
 
-use super::{Format, Whole, boxes};
+use super::{Format, SetWriter, boxes};
 use furrow_base::Result;
 use crate::File;
 use crate::format::labels::Labels;
@@ -31,7 +31,7 @@ impl Format for Writer {
         boxes::warnings(recipe)
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         boxes::data(FOLDER, set, out, "")
     }
 }

@@ -7,7 +7,7 @@
 //!
 //! Source: Ultralytics documentation, "Pose Estimation Datasets Overview"; its pretrained networks have 17 keypoints.
 
-use super::{Format, Whole, boxes};
+use super::{Format, SetWriter, boxes};
 use furrow_base::Result;
 use crate::File;
 use crate::format::labels::Labels;
@@ -31,7 +31,7 @@ impl Format for Writer {
             let Some(bounds) = plant.seen.bounds else { continue };
             let mut row = boxes::row(sample, boxes::number(&labels, class), bounds);
             for point in points(plant) {
-                let (place, seen) = told(point);
+                let (place, seen) = encode_keypoint(point);
                 boxes::shares(&mut row, sample, [place]);
                 row.push_str(seen);
             }
@@ -40,7 +40,7 @@ impl Format for Writer {
         boxes::files(FOLDER, sample, &rows)
     }
 
-    fn whole(&self, set: &Set, out: &mut Whole<'_>) -> Result<()> {
+    fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let count = 1 + TIPS;
         let list = |of: &dyn Fn(u16) -> String| (0..count).map(of).collect::<Vec<_>>().join(", ");
         // Leaves keep their numbers when an image is mirrored.
@@ -65,7 +65,7 @@ fn points(plant: &Plant) -> impl Iterator<Item = Option<Keypoint>> + '_ {
 }
 
 /// Returns a keypoint's position, and the text of its visibility in a row.
-fn told(point: Option<Keypoint>) -> ((f64, f64), &'static str) {
+fn encode_keypoint(point: Option<Keypoint>) -> ((f64, f64), &'static str) {
     let seen = match point.map(|point| point.state) {
         Some(PointState::Visible) => " 2",
         Some(PointState::Hidden) => " 1",

@@ -1,6 +1,6 @@
 //! Matching of the files of a source by the stems of their names, within each split.
 
-use super::Listed;
+use super::SourceImage;
 use crate::model::split::Split;
 use furrow_base::{Error, Result};
 use furrow_output::Photo;
@@ -43,18 +43,18 @@ pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, P
 }
 
 /// Returns the image files of the split folders in `folder`, or of `folder` itself if it has none.
-pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<Listed, PathBuf>> {
+pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<SourceImage, PathBuf>> {
     let mut all = BTreeMap::new();
     for (name, split) in SPLITS {
         let below = folder.join(name);
         if below.is_dir() {
             let found = pictures(&below, suffix)?;
-            all.extend(found.into_iter().map(|(name, path)| (Listed { split: Some(split), name }, path)));
+            all.extend(found.into_iter().map(|(name, path)| (SourceImage { split: Some(split), name }, path)));
         }
     }
     if all.is_empty() {
         let found = pictures(folder, suffix)?;
-        all.extend(found.into_iter().map(|(name, path)| (Listed { split: None, name }, path)));
+        all.extend(found.into_iter().map(|(name, path)| (SourceImage { split: None, name }, path)));
     }
     Ok(all)
 }

@@ -61,12 +61,12 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
     let shared = numbers
         .keys()
         .filter(|(plant, class)| *class == Class::Weed as u8 && numbers.contains_key(&(*plant, Class::Crop as u8)));
-    let told = [
+    let notes = [
         (lost[0], "pixels of plants are soil or unlabelled and were removed from the plants"),
         (lost[1], "pixels of leaves are on no plant and were removed from the leaves"),
         (shared.count() as u64, "numbers are used for a crop plant and a weed; each becomes two plants"),
     ];
-    all.warnings.extend(told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")));
+    all.warnings.extend(notes.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")));
     Ok(all)
 }
 
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn contradictions_are_mended_and_told() {
+    fn contradictions_are_mended_and_reported() {
         // Plant 3 is crop and weed and extends into soil and unlabelled pixels; leaf 5 is on both plants and beside
         // them.
         let all = of(&[1, 2, 0, 255, 1], &[3, 3, 3, 3, 0], &[5, 5, 0, 0, 5]);

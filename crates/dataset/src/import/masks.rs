@@ -2,7 +2,7 @@
 
 use super::classes::{Colors, Names};
 use super::files::{length, listed, photograph, same_size, unread};
-use super::{Labelled, Listed, Source};
+use super::{Labelled, Source, SourceImage};
 use crate::model::sample::IGNORE;
 use furrow_base::{Error, Result};
 use furrow_output::Map;
@@ -75,7 +75,7 @@ struct Files {
 /// A source of images with masks.
 pub struct Masks {
     folders: Folders,
-    images: Vec<Listed>,
+    images: Vec<SourceImage>,
     files: Vec<Files>,
     words: String,
     warnings: Vec<String>,
@@ -130,7 +130,7 @@ fn ending(suffix: &str) -> String {
     if suffix.is_empty() { String::new() } else { format!(" whose name ends in `{suffix}`") }
 }
 
-fn lacks(image: &Path, what: &str, folder: &Path, suffix: &str, one: &Listed) -> Error {
+fn lacks(image: &Path, what: &str, folder: &Path, suffix: &str, one: &SourceImage) -> Error {
     let split = one.split.map(|s| format!("{}/", s.name())).unwrap_or_default();
     Error::input(format!("its {what} is missing: {}/{split}{}{suffix}.png", folder.display(), one.name))
         .in_file(image)
@@ -145,7 +145,7 @@ impl Source for Masks {
         "masks"
     }
 
-    fn images(&self) -> &[Listed] {
+    fn images(&self) -> &[SourceImage] {
         &self.images
     }
 

@@ -25,7 +25,7 @@ use crate::make::task::{Task, task};
 use crate::model::annotate;
 use crate::model::invariants;
 use crate::model::labelling::Labelling;
-use crate::model::recipe::{FILE, Made, Recipe};
+use crate::model::recipe::{FILE, ImageOrigin, Recipe};
 use crate::model::record::{Keypoint, Record};
 use crate::model::sample::Sample;
 use crate::model::split::{Shares, Split};
@@ -45,7 +45,7 @@ pub trait Source: Sync {
     fn name(&self) -> &'static str;
 
     /// Returns the images, sorted by split and name. Either all images have a split or none has.
-    fn images(&self) -> &[Listed];
+    fn images(&self) -> &[SourceImage];
 
     /// Returns a text that determines the contents of the import: options, names and lengths of files. It contains no
     /// absolute path, so it is equal on all machines.
@@ -67,7 +67,7 @@ pub trait Source: Sync {
 
 /// An image of a source.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Listed {
+pub struct SourceImage {
     /// Its split; `None` if the source has no splits.
     pub split: Option<Split>,
     /// Its name in the source.
@@ -150,7 +150,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &ImportSettings) -> Result<S
     let split = if counts == [0; 3] { order.split } else { Shares(counts) };
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
-        made: Made::Imported {
+        made: ImageOrigin::Imported {
             from: source.name().into(),
             source_sha256: hex::encode(Sha256::digest(source.words())),
             nir: Some(source.has_nir()),
@@ -184,7 +184,7 @@ fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
 }
 
 /// Converts an image that was read into a [`Sample`].
-fn sample(recipe: &Recipe, listed: &Listed, index: u64, read: Labelled) -> Sample {
+fn sample(recipe: &Recipe, listed: &SourceImage, index: u64, read: Labelled) -> Sample {
     let (width, height) = read.size;
     let mut sample = Sample {
         record: Record {

@@ -7,7 +7,7 @@
 
 use super::files::{length, photograph, pictures, same_size};
 use super::instances::instances;
-use super::{Labelled, Listed, Source};
+use super::{Labelled, Source, SourceImage};
 use crate::model::sample::IGNORE;
 use crate::model::split::Split;
 use furrow_base::{Error, Result};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// A PhenoBench folder.
 pub struct PhenoBench {
     root: PathBuf,
-    images: Vec<Listed>,
+    images: Vec<SourceImage>,
     paths: Vec<PathBuf>,
     words: String,
     warnings: Vec<String>,
@@ -52,7 +52,7 @@ impl PhenoBench {
                 for kind in LABELS.iter().filter(|k| folder.join(k).is_dir()) {
                     lengths.push(length(&folder.join(kind).join(format!("{name}.png")))?);
                 }
-                let one = Listed { split: Some(split), name };
+                let one = SourceImage { split: Some(split), name };
                 let _ = writeln!(all.words, "{one:?} {lengths:?}");
                 all.images.push(one);
                 all.paths.push(path);
@@ -72,7 +72,7 @@ impl Source for PhenoBench {
         "phenobench"
     }
 
-    fn images(&self) -> &[Listed] {
+    fn images(&self) -> &[SourceImage] {
         &self.images
     }
 
@@ -85,7 +85,7 @@ impl Source for PhenoBench {
     }
 
     fn read(&self, place: usize) -> Result<Labelled> {
-        let Listed { split, name } = &self.images[place];
+        let SourceImage { split, name } = &self.images[place];
         let folder = self.root.join(split.unwrap_or(Split::Train).name());
         let photo = photograph(furrow_output::open_photo(&self.paths[place])?);
         let numbers = |kind: &str| -> Result<Vec<u32>> {

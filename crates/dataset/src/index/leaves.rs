@@ -3,12 +3,12 @@
 use super::origin::Origin;
 use super::table::{Row, Table};
 use crate::model::record::{Leaf, Plant, Record, Seen};
-use crate::read::set::{Set, Whole};
+use crate::read::set::{Set, SetWriter};
 use furrow_base::Result;
 use furrow_render::scene::tag::Class;
 
 /// Writes the table of a dataset whose images are complete to `path`.
-pub(crate) fn write(set: &Set, out: &mut Whole<'_>, path: &str) -> Result<()> {
+pub(crate) fn write(set: &Set, out: &mut SetWriter<'_>, path: &str) -> Result<()> {
     out.file(path, |out| {
         let seen = Seen::default;
         let leaf = Leaf { number: 0, id: None, seen: seen(), base: None, tip: None, traits: None };

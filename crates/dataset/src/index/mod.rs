@@ -11,7 +11,7 @@ mod table;
 use crate::model::record::{Plant, PointState, Record, Seen};
 use crate::read::native;
 use crate::read::packs::Packing;
-use crate::read::set::{Set, Whole};
+use crate::read::set::{Set, SetWriter};
 use furrow_base::Result;
 use furrow_base::math::Spectrum;
 use furrow_optics::light::LightRecord;
@@ -26,7 +26,7 @@ pub const IMAGES: &str = "images.parquet";
 pub const PLANTS: &str = "plants.parquet";
 
 /// Writes both tables of a dataset whose images are complete.
-pub(crate) fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
+pub(crate) fn write(set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
     let mut records = set.all().peekable();
     if let Some(Ok(first)) = records.peek() {
         let like = of_image(set, first);
@@ -72,9 +72,9 @@ fn joined<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
 /// Returns the mean number of samples per pixel of a path-traced image: that of the film or, if the record has none (as
 /// for one sample), the requested number.
 fn spp(set: &Set, record: &Record) -> Option<f64> {
-    let told = record.sampling.as_ref().map(|sampling| sampling.spp);
+    let recorded_spp = record.sampling.as_ref().map(|sampling| sampling.spp);
     let traced = || set.recipe.rendering().ok().filter(|rendering| rendering.engine == Engine::Trace);
-    told.or_else(|| record.exposure.and_then(|_| Some(f64::from(traced()?.spp))))
+    recorded_spp.or_else(|| record.exposure.and_then(|_| Some(f64::from(traced()?.spp))))
 }
 
 fn of_image(set: &Set, record: &Record) -> Row {

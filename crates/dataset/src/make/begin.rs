@@ -4,9 +4,9 @@
 use crate::File;
 use crate::format;
 use crate::make::pack;
-use crate::model::keep::Kept;
+use crate::model::optional_maps::OptionalMap;
 use crate::model::photo::Photo;
-use crate::model::recipe::{FILE, Made, Recipe};
+use crate::model::recipe::{FILE, ImageOrigin, Recipe};
 use crate::read::checksum_record::write_files;
 use crate::read::links;
 use furrow_base::{Error, Result};
@@ -50,9 +50,9 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
     recipe.labelling = recipe.labelling.over(&before.labelling);
     recipe.pack = recipe.pack.or(before.pack);
     match (&mut recipe.made, &before.made) {
-        (Made::Rendered(now), Made::Rendered(then)) => {
+        (ImageOrigin::Rendered(now), ImageOrigin::Rendered(then)) => {
             now.parts = then.parts;
-            if now.keep == Kept::usual(now.labels_only) {
+            if now.keep == OptionalMap::usual(now.labels_only) {
                 now.keep.clone_from(&then.keep);
             }
             if !named {
@@ -63,7 +63,7 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
             }
         }
         // Recipes of older versions lack this value; adding it would change the fingerprint that their images have.
-        (Made::Imported { nir, .. }, Made::Imported { nir: None, .. }) => *nir = None,
+        (ImageOrigin::Imported { nir, .. }, ImageOrigin::Imported { nir: None, .. }) => *nir = None,
         _ => {}
     }
     before.check_goes_on(folder, &recipe)?;

@@ -4,14 +4,14 @@ use crate::format::labels::LeftOut;
 use crate::make::pack::store;
 use crate::make::push;
 use crate::make::task::{Task, remaining};
-use crate::model::recipe::{FILE, MANIFEST, Made, Recipe};
+use crate::model::recipe::{FILE, ImageOrigin, MANIFEST, Recipe};
 use crate::model::warnings::Totals;
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native::{Files, is_native};
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
-use crate::read::set::{Set, Stream, Whole, in_parallel};
+use crate::read::set::{Set, SetWriter, Stream, in_parallel};
 use crate::{format, index, report};
 use furrow_base::error::Kind;
 use furrow_base::{Error, Result};
@@ -73,16 +73,16 @@ fn written(set: &Set) -> Result<Vec<PathBuf>> {
         // Fails if the folder is not empty, which is intended.
         let _ = std::fs::remove_dir(folder.join("images"));
     }
-    let mut whole = Whole::new(folder);
+    let mut whole = SetWriter::new(folder);
     for (_, format) in format::all(recipe)? {
-        format.whole(set, &mut whole)?;
+        format.write_set(set, &mut whole)?;
     }
     index::write(set, &mut whole)?;
     report::write(set, &mut whole)?;
     let mut files = own_files(folder, recipe)?;
     files.append(&mut whole.files.clone());
     let mut paths: Vec<PathBuf> = whole.files.keys().map(|p| folder.join(p)).collect();
-    let mut last = Whole::new(folder);
+    let mut last = SetWriter::new(folder);
     last.file(MANIFEST, |out| manifest(set, &files, out))?;
     paths.push(folder.join(MANIFEST));
     Ok(paths)
@@ -120,7 +120,7 @@ pub fn ranges(numbers: &[u64]) -> String {
 /// for a rendered dataset.
 pub fn dropped(set: &Set) -> Result<Vec<String>> {
     let mut totals = Totals::default();
-    if matches!(set.recipe.made, Made::Imported { .. }) {
+    if matches!(set.recipe.made, ImageOrigin::Imported { .. }) {
         for record in set.all() {
             totals.add(&record?.warnings);
         }

@@ -8,10 +8,10 @@
 use crate::make::meter;
 use crate::make::pack::store;
 use crate::make::push::{Push, Unit};
-use crate::make::render::{LastField, Times, render, renderer, scene_file};
+use crate::make::render::{CachedField, Times, render, renderer, scene_file};
 use crate::make::task::{Task, in_format, task};
 use crate::make::time_left::TimeLeft;
-use crate::make::timing_log::{Began, End, Ended, ImageFailure, ImageTiming, Row, TimingLog, now};
+use crate::make::timing_log::{End, ImageFailure, ImageTiming, Row, RunEnd, RunStart, TimingLog, now};
 use crate::read::checksum_record::{ChecksumRecord, write_files_beside};
 use crate::read::native;
 use crate::read::packs::Id;
@@ -23,7 +23,7 @@ use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
 use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -197,10 +197,10 @@ pub(crate) fn generate_for(
     };
     let cpu_before = meter::cpu();
     if !tasks.is_empty() {
-        run.timing_log.add(&Row::Began(Began { began_s: now(), images: tasks.len(), at_once, threads }))?;
+        run.timing_log.add(&Row::RunStart(RunStart { began_s: now(), images: tasks.len(), at_once, threads }))?;
     }
     let (mut made, mut failures) = (0, BTreeMap::new());
-    let make = |(index, task): &(u64, Task), threads: &Threads, kept: &mut LastField| {
+    let make = |(index, task): &(u64, Task), threads: &Threads, kept: &mut CachedField| {
         threads.install(|| run.image(*index, *task, threads, kept))?;
         if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) }
     };
@@ -247,13 +247,13 @@ pub(crate) fn interrupted(folder: &Path, there: usize, wanted: usize) -> Error {
 }
 
 /// Largest number of failed images that are listed in an error message.
-const MOST_TOLD: usize = 20;
+const MOST_LISTED: usize = 20;
 
 /// Combines the errors of a run, by image, into one: an error that ended the run alone, or else the list of errors of
 /// single fields.
 pub(crate) fn together(failures: BTreeMap<u64, Error>) -> Error {
     let mut words = Vec::new();
-    let more = failures.len().saturating_sub(MOST_TOLD);
+    let more = failures.len().saturating_sub(MOST_LISTED);
     let mut input = true;
     for (index, error) in failures {
         let image = format!("image {}", Set::name(index));
@@ -267,7 +267,7 @@ pub(crate) fn together(failures: BTreeMap<u64, Error>) -> Error {
             words.push(format!("{image}: {error}"));
         }
     }
-    words.truncate(MOST_TOLD);
+    words.truncate(MOST_LISTED);
     if more > 0 {
         words.push(format!("{more} more images were not made; correct these errors and run the same command again"));
     }
@@ -338,7 +338,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Makes one image, or only its formats, and writes its checksum record.
-    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut LastField) -> Result<()> {
+    fn image(&self, index: u64, task: Task, threads: &Threads, kept: &mut CachedField) -> Result<()> {
         let begin = Instant::now();
         let Set { folder, recipe, .. } = self.set;
         // Another run may have made the image in the meantime.
@@ -350,7 +350,7 @@ impl Run<'_> {
             (derived(self.set, index)?, Times::default())
         } else {
             let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
-            let watch = Watch { done: &|_| (), stop: self.callbacks.now };
+            let watch = RenderMonitor { done: &|_| (), stop: self.callbacks.now };
             let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
             crate::model::invariants::check(recipe, &made.sample)?;
             let mut files = native::files(recipe, &made.sample, &made.text)?;
@@ -393,7 +393,7 @@ impl Run<'_> {
     /// memory.
     fn ended(&self, end: End, cpu_before: Option<Duration>) -> Result<()> {
         let taken = meter::cpu().zip(cpu_before).map(|(now, before)| now.saturating_sub(before));
-        self.timing_log.add(&Row::Ended(Ended {
+        self.timing_log.add(&Row::RunEnd(RunEnd {
             ended_s: now(),
             end,
             cpu_s: taken.map(|taken| taken.as_secs_f64()),
@@ -433,7 +433,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_that_lasts_is_told_alone_and_faults_of_fields_together() {
+    fn a_lasting_cause_is_reported_alone_and_faults_of_fields_together() {
         let field = |index| (index, Error::input("no sun").help("wait"));
         let all = together(BTreeMap::from([field(1), field(4)]));
         assert_eq!(all.to_string(), "image 000001: no sun\n help: wait\nerror: image 000004: no sun\n help: wait");
@@ -442,8 +442,8 @@ mod tests {
         assert_eq!(with(Error::damaged("image 3: x")).kind(), Kind::Damaged);
         for lasting in [Error::failed("cannot encode a PNG"), Error::missing("no denoiser")] {
             let (kind, words) = (lasting.kind(), format!("image 000003: {lasting}"));
-            let told = with(lasting);
-            assert_eq!((told.kind(), told.to_string()), (kind, words));
+            let combined = with(lasting);
+            assert_eq!((combined.kind(), combined.to_string()), (kind, words));
         }
         let full = with(Error::io("a/b.png".as_ref())(std::io::ErrorKind::StorageFull.into()));
         assert!(full.to_string().starts_with("a/b.png: "), "{full}");

@@ -1,17 +1,17 @@
 //! Makes a whole dataset in one call: plans it, renders the images, writes the files of the whole dataset.
 
 pub mod begin;
-pub mod bill;
+pub mod cost_estimate;
 pub mod damage;
 pub mod finish;
 pub mod flow;
-pub mod gather;
 pub mod generate;
 pub mod meter;
 pub mod pack;
 pub mod plan;
 pub mod push;
 pub mod render;
+pub mod scene_files;
 pub mod status;
 pub mod task;
 pub mod time_left;

@@ -3,15 +3,15 @@
 
 use crate::format::labels::Labels;
 use crate::make::begin::begin;
-use crate::make::gather::{Gathered, gather};
 use crate::make::generate::interrupted;
 use crate::make::pack;
+use crate::make::scene_files::{SceneFiles, collect_files};
 use crate::make::status::images_there;
 use crate::model::classes::Classes;
-use crate::model::keep::{self, Kept, Omitted};
 use crate::model::labelling::Labelling;
+use crate::model::optional_maps::{self, OmittableMap, OptionalMap};
 use crate::model::photo::Photo;
-use crate::model::recipe::{FILE, Made, Recipe, Rendering};
+use crate::model::recipe::{FILE, ImageOrigin, Recipe, Rendering};
 use crate::model::split::Shares;
 use crate::read::checksum_record;
 use crate::read::links;
@@ -48,10 +48,10 @@ pub struct Order {
     /// Classes of the formats, and limits below which plants and leaves are omitted from them.
     pub labelling: Labelling,
     /// Maps that are stored in addition to the image, labels and record.
-    pub keep: Vec<Kept>,
+    pub keep: Vec<OptionalMap>,
     /// Label maps that are not stored, since the record contains the same information. `None` omits none in a new
     /// dataset and keeps the choice of an existing one.
-    pub omit: Option<Vec<Omitted>>,
+    pub omit: Option<Vec<OmittableMap>>,
     /// Encoding of the images; with the default, PNG, an existing dataset keeps its encoding.
     pub photo: Photo,
     /// Whether only labels are made, without lighting and without rendered images.
@@ -86,7 +86,7 @@ impl Order {
             height: None,
             formats: Vec::new(),
             labelling: Labelling::default(),
-            keep: Kept::USUAL.to_vec(),
+            keep: OptionalMap::USUAL.to_vec(),
             omit: None,
             photo: Photo::default(),
             labels_only: false,
@@ -151,11 +151,12 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         return Err(Error::input("the images of a dataset need a fixed number of samples")
             .help("give --spp instead of --target-error or --time"));
     }
-    let keep = if order.labels_only { labels_alone(order, &options)? } else { keep::checked(order.keep.clone())? };
+    let keep =
+        if order.labels_only { labels_alone(order, &options)? } else { optional_maps::checked(order.keep.clone())? };
     // Opening the renderer first reports missing hardware or libraries before a field is built.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
     let source = opened(&order.scene, order)?.until(stop);
-    let first = source.clone().told_only().field(0)?;
+    let first = source.clone().records_only().field(0)?;
     let field = first.grown();
     if field.species.len() > MOST_SPECIES {
         return Err(Error::input(format!(
@@ -165,14 +166,14 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         .in_file(&order.scene)
         .help("split it into two scene files"));
     }
-    let Gathered { files, scene, rewritten } = gather(&field.files, &field.shipped, &order.scene)?;
+    let SceneFiles { files, scene, rewritten } = collect_files(&field.files, &field.shipped, &order.scene)?;
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene, stop)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
     order.photo.check_size(camera.width(), camera.height())?;
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
-        made: Made::Rendered(Box::new(Rendering {
+        made: ImageOrigin::Rendered(Box::new(Rendering {
             scene,
             scene_sha256,
             seed: field.seed,
@@ -189,7 +190,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
             models: field.models.clone(),
             keep,
-            omit: keep::in_order(order.omit.clone().unwrap_or_default()),
+            omit: optional_maps::in_order(order.omit.clone().unwrap_or_default()),
             labels_only: order.labels_only,
             photo: Some(order.photo),
             kernels,
@@ -206,16 +207,16 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     Labels::of(&recipe)?;
     format::check_maps(&recipe)?;
     pack::check(&recipe)?;
-    let mut told = field.warnings.clone();
-    told.extend(warnings(&recipe)?);
-    told.extend(rolling(&recipe, camera)?);
+    let mut all_warnings = field.warnings.clone();
+    all_warnings.extend(warnings(&recipe)?);
+    all_warnings.extend(rolling(&recipe, camera)?);
     let scene_sha256 = field.hash.clone();
-    Ok(Draft { recipe, files, warnings: told, scene: source, scene_sha256 })
+    Ok(Draft { recipe, files, warnings: all_warnings, scene: source, scene_sha256 })
 }
 
 /// Returns the maps to store for images without rendering (`labels_only`). Returns an error for options that need
 /// rendering.
-fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
+fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<OptionalMap>> {
     let refused = |what: &str| Err(Error::misuse(what).help("leave out --labels-only or this option"));
     if options.engine != Engine::Trace {
         return refused("--engine raster renders labels together with the image, and --labels-only renders no image");
@@ -226,7 +227,7 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<Kept>> {
     if order.photo != Photo::default() {
         return refused("--photo sets the encoding of images, and --labels-only renders none");
     }
-    keep::checked(keep::of_labels(&order.keep)?)
+    optional_maps::checked(optional_maps::of_labels(&order.keep)?)
 }
 
 /// Opens a scene file with the edit, seed, days, size and limits of an order.
@@ -241,7 +242,7 @@ fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
 fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicBool>) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
-    let first = opened(&folder.path().join(scene), order)?.until(stop).told_only().field(0)?;
+    let first = opened(&folder.path().join(scene), order)?.until(stop).records_only().field(0)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {
         None => Ok(field.hash.clone()),

@@ -54,7 +54,7 @@ pub struct Push {
 const DIR: &str = "{dir}";
 
 /// Number of bytes at the end of a command's output that an error message may contain.
-const TOLD: u64 = 2000;
+const MOST_OUTPUT: u64 = 2000;
 
 /// Polling interval for a running command.
 const EVERY: Duration = Duration::from_millis(20);
@@ -87,7 +87,7 @@ impl Unit {
         }
     }
 
-    fn note(self, folder: &Path) -> PathBuf {
+    fn record_path(self, folder: &Path) -> PathBuf {
         folder.join("pushed").join(format!("{}.json", self.name()))
     }
 
@@ -129,14 +129,14 @@ impl Unit {
     }
 
     /// Returns the record of its push if it was pushed with the contents that have this hash.
-    fn noted(self, set: &Set, hash: &str) -> Option<Note> {
-        let bytes = furrow_base::input::contents(&self.note(&set.folder)).ok()?;
-        serde_json::from_slice(&bytes).ok().filter(|note: &Note| note.sha256 == hash)
+    fn noted(self, set: &Set, hash: &str) -> Option<PushRecord> {
+        let bytes = furrow_base::input::contents(&self.record_path(&set.folder)).ok()?;
+        serde_json::from_slice(&bytes).ok().filter(|note: &PushRecord| note.sha256 == hash)
     }
 
     /// Returns `true` if its local files were removed after it was pushed.
     pub(crate) fn is_freed(self, set: &Set) -> bool {
-        if !self.note(&set.folder).is_file() {
+        if !self.record_path(&set.folder).is_file() {
             return false;
         }
         let hash = self.contents(set).ok().flatten().map(|(_, hash)| hash);
@@ -148,7 +148,7 @@ impl Unit {
 pub(crate) fn freed(set: &Set) -> BTreeSet<String> {
     let Ok(entries) = std::fs::read_dir(set.folder.join("pushed")) else { return BTreeSet::new() };
     let notes = entries.filter_map(|entry| furrow_base::input::contents(&entry.ok()?.path()).ok());
-    let notes = notes.filter_map(|bytes| serde_json::from_slice::<Note>(&bytes).ok());
+    let notes = notes.filter_map(|bytes| serde_json::from_slice::<PushRecord>(&bytes).ok());
     notes.filter(|note| note.freed).map(|note| note.unit).collect()
 }
 
@@ -167,7 +167,7 @@ pub(crate) fn refuse_freed(set: &Set) -> Result<()> {
 
 /// Record of a pushed unit, stored in `pushed/UNIT.json`.
 #[derive(Serialize, Deserialize)]
-struct Note {
+struct PushRecord {
     unit: String,
     /// Hash of the unit's checksum record, or of its files if it has none.
     sha256: String,
@@ -234,11 +234,11 @@ impl Push {
     /// Pushes a finished unit, unless it was already pushed with its current contents. Ignores unfinished units.
     pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: &AtomicBool) -> Result<()> {
         let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
-        let note = |freed| Note { unit: unit.name(), sha256: hash.clone(), freed };
-        let path = unit.note(&set.folder);
+        let note = |freed| PushRecord { unit: unit.name(), sha256: hash.clone(), freed };
+        let path = unit.record_path(&set.folder);
         refuse_links(&set.folder, Path::new("pushed"))?;
         match unit.noted(set, &hash) {
-            Some(Note { freed: true, .. }) => return Ok(()),
+            Some(PushRecord { freed: true, .. }) => return Ok(()),
             Some(_) => {}
             None => {
                 match self.send(set, unit, &files, stop) {
@@ -365,10 +365,10 @@ impl Push {
         })?;
         let filled = filled(command, place);
         // The output goes to a file, because a full pipe would block the command.
-        let mut said = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
-        let words = |said: &std::fs::File| said.try_clone().map_err(Error::io(&std::env::temp_dir()));
+        let mut captured = tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()))?;
+        let words = |captured: &std::fs::File| captured.try_clone().map_err(Error::io(&std::env::temp_dir()));
         let mut shell = Command::new("sh");
-        shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&said)?).stderr(words(&said)?);
+        shell.arg("-c").arg(&filled).stdin(Stdio::null()).stdout(words(&captured)?).stderr(words(&captured)?);
         // A separate process group, so that child processes can be ended with the command.
         let mut child = shell.process_group(0).spawn().map_err(Error::io(Path::new("sh")))?;
         let begin = Instant::now();
@@ -390,9 +390,9 @@ impl Push {
             return Ok(None);
         }
         let mut text = Vec::new();
-        let length = said.stream_position().unwrap_or(0);
-        let _ = said.seek(std::io::SeekFrom::Start(length.saturating_sub(TOLD)));
-        let _ = said.take(TOLD).read_to_end(&mut text);
+        let length = captured.stream_position().unwrap_or(0);
+        let _ = captured.seek(std::io::SeekFrom::Start(length.saturating_sub(MOST_OUTPUT)));
+        let _ = captured.take(MOST_OUTPUT).read_to_end(&mut text);
         let text = String::from_utf8_lossy(&text);
         let last = text.trim().lines().last().unwrap_or("it printed nothing");
         Ok(Some(format!(
@@ -495,11 +495,11 @@ mod tests {
     fn the_folder_is_one_word_wherever_it_stands() {
         for dir in ["/a b/c", "/it's", "/$HOME `x` \"y\" \\ z", "/plain"] {
             for command in ["printf %s {dir}", "printf %s '{dir}'", "printf %s \"{dir}\"", "printf %s \"\"{dir}"] {
-                let said = Command::new("sh").arg("-c").arg(filled(command, dir)).output().unwrap();
-                assert_eq!(String::from_utf8(said.stdout).unwrap(), dir, "{command}");
+                let captured = Command::new("sh").arg("-c").arg(filled(command, dir)).output().unwrap();
+                assert_eq!(String::from_utf8(captured.stdout).unwrap(), dir, "{command}");
             }
-            let said = Command::new("sh").arg("-c").arg(filled(r"printf %s \'{dir}", dir)).output().unwrap();
-            assert_eq!(String::from_utf8(said.stdout).unwrap(), format!("'{dir}"));
+            let captured = Command::new("sh").arg("-c").arg(filled(r"printf %s \'{dir}", dir)).output().unwrap();
+            assert_eq!(String::from_utf8(captured.stdout).unwrap(), format!("'{dir}"));
         }
     }
 }

@@ -4,10 +4,10 @@ use crate::format;
 use crate::make::damage;
 use crate::make::flow;
 use crate::model::annotate::{self, keypoint, of_255};
-use crate::model::keep::{self, Kept};
+use crate::model::optional_maps::{self, OptionalMap};
 use crate::model::photo;
 use crate::model::recipe::{self, Recipe};
-use crate::model::record::{CaptureRecord, Exposure, Grown, Leaf, Plant, Record, Seen};
+use crate::model::record::{CaptureRecord, Exposure, Leaf, Plant, PlantAttributes, Record, Seen};
 use crate::model::sample::{Rendered, Sample};
 use crate::read::set::Set;
 use furrow_base::math::Vec3;
@@ -16,7 +16,7 @@ use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
 use furrow_field::traits::{PlantTraits, Traits};
 use furrow_job::{Field, Image, Renderer, Request, SceneFile};
-use furrow_render::render::{self, LabelMap, Watch};
+use furrow_render::render::{self, LabelMap, RenderMonitor};
 use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -88,14 +88,14 @@ fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
 
 /// The field that was built last, reused for further images of it.
 #[derive(Default)]
-pub struct LastField {
+pub struct CachedField {
     field: Option<Field>,
     /// Traits that were measured for the previous image of this field.
     traits: Option<Traits>,
 }
 
 /// The field of an image, set to the image's camera and frame.
-pub(crate) struct Last<'a> {
+pub(crate) struct FieldAtCamera<'a> {
     pub(crate) field: &'a Field,
     /// Traits that were measured for the previous image of this field; `None` for the first.
     traits: &'a mut Option<Traits>,
@@ -103,9 +103,9 @@ pub(crate) struct Last<'a> {
     pub(crate) grow: Duration,
 }
 
-impl LastField {
+impl CachedField {
     /// Returns the field of an image of a dataset, and builds it if it is not the previous one.
-    pub(crate) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<Last<'_>> {
+    pub(crate) fn at(&mut self, set: &Set, scene_file: &SceneFile, index: u64) -> Result<FieldAtCamera<'_>> {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
@@ -125,7 +125,7 @@ impl LastField {
         field.geometry()?;
         let (grow, build) = field.times();
         let grow = if new { grow + build } else { Duration::ZERO };
-        Ok(Last { field: self.field.insert(field), traits: &mut self.traits, grow })
+        Ok(FieldAtCamera { field: self.field.insert(field), traits: &mut self.traits, grow })
     }
 }
 
@@ -141,12 +141,12 @@ pub fn render(
     scene_file: &SceneFile,
     index: u64,
     renderer: &Renderer,
-    watch: Watch<'_>,
-    kept: &mut LastField,
+    watch: RenderMonitor<'_>,
+    kept: &mut CachedField,
 ) -> Result<RenderedSample> {
-    let Last { field, traits, grow } = kept.at(set, scene_file, index)?;
+    let FieldAtCamera { field, traits, grow } = kept.at(set, scene_file, index)?;
     if set.recipe.labels_only() {
-        return label(set, Last { field, traits, grow }, index, renderer);
+        return label(set, FieldAtCamera { field, traits, grow }, index, renderer);
     }
     let image = renderer.render(field, &Request { watch, ..Request::default() })?;
     image.check_denoised()?;
@@ -158,7 +158,12 @@ pub fn render(
 }
 
 /// Labels an image without rendering it.
-fn label(set: &Set, Last { field, traits, grow }: Last<'_>, index: u64, renderer: &Renderer) -> Result<RenderedSample> {
+fn label(
+    set: &Set,
+    FieldAtCamera { field, traits, grow }: FieldAtCamera<'_>,
+    index: u64,
+    renderer: &Renderer,
+) -> Result<RenderedSample> {
     let begin = Instant::now();
     let labels = field.label()?;
     let sample = field.threads().install(|| labelled(&set.recipe, index, field, (labels, traits)))?;
@@ -179,14 +184,14 @@ fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<T
     });
     sample.record.sampling = if denoised.is_none() { film.sampling() } else { None };
     sample.rgb = photograph.rgb.as_chunks::<3>().0.to_vec();
-    if recipe.keeps(Kept::Nir) {
+    if recipe.keeps(OptionalMap::Nir) {
         sample.nir = photograph.nir;
     }
     sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
     // Class statistics include the coverage, so they are computed again now that it is known.
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
-    if !recipe.keeps(Kept::Coverage) {
+    if !recipe.keeps(OptionalMap::Coverage) {
         sample.coverage.clear();
     }
     if let Some(rendered) = &mut sample.film {
@@ -244,8 +249,8 @@ fn labelled(
         plants: labels.tags.iter().map(|t| t.plant).collect(),
         leaves: labels.tags.iter().map(|t| t.leaf).collect(),
         coverage: Vec::new(),
-        depth: keep::depths(&recipe.rendering()?.keep, &labels.depth),
-        normals: keep::normals(&recipe.rendering()?.keep, labels.normals.iter().map(Vec3::to_array)),
+        depth: optional_maps::depths(&recipe.rendering()?.keep, &labels.depth),
+        normals: optional_maps::normals(&recipe.rendering()?.keep, labels.normals.iter().map(Vec3::to_array)),
         jpeg: None,
         film: None,
     };
@@ -348,8 +353,8 @@ fn hidden(grown: &PlantRecord) -> Plant {
     }
 }
 
-fn described(grown: &PlantRecord, traits: Option<PlantTraits>) -> Grown {
-    Grown {
+fn described(grown: &PlantRecord, traits: Option<PlantTraits>) -> PlantAttributes {
+    PlantAttributes {
         species: grown.species.clone(),
         eppo: grown.eppo.clone(),
         bbch: grown.bbch,

@@ -227,8 +227,8 @@ impl<'a> Run<'a> {
             match row {
                 Row::Image(image) => run.images.push(image),
                 Row::Failure(_) => {}
-                Row::Began(began) => run.began = Some(began.began_s),
-                Row::Ended(ended) => {
+                Row::RunStart(began) => run.began = Some(began.began_s),
+                Row::RunEnd(ended) => {
                     (run.end, run.core_s, run.peak_bytes) = (Some(ended.end), ended.cpu_s, ended.peak_bytes);
                 }
             }
@@ -343,7 +343,7 @@ fn slowest(set: &Set, logs: &[RunLog]) -> Vec<SlowImage> {
     }
     let mut all: Vec<&ImageTiming> = longest.into_values().collect();
     all.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
-    let told = all.into_iter().take(MOST_SLOW).map(|image| SlowImage {
+    let slow_images = all.into_iter().take(MOST_SLOW).map(|image| SlowImage {
         index: image.index,
         seconds: image.seconds,
         grow_s: image.grow_s,
@@ -351,13 +351,13 @@ fn slowest(set: &Set, logs: &[RunLog]) -> Vec<SlowImage> {
         label_s: image.label_s,
         plants: set.record(image.index).ok().map(|record| record.plants.len()),
     });
-    told.collect()
+    slow_images.collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::make::timing_log::{Began, Ended};
+    use crate::make::timing_log::{RunEnd, RunStart};
 
     fn image(index: u64, seconds: f64, done_s: Option<f64>) -> Row {
         let (image, grow_s, draw_s, label_s) = (String::new(), 0.0, seconds, 0.0);
@@ -369,7 +369,7 @@ mod tests {
     }
 
     fn began(began_s: f64) -> Row {
-        Row::Began(Began { began_s, images: 9, at_once: 2, threads: 2 })
+        Row::RunStart(RunStart { began_s, images: 9, at_once: 2, threads: 2 })
     }
 
     /// Expected: the rate is images divided by the seconds from the start to the last image; for a log without times,
@@ -389,22 +389,22 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_tells_nothing_for_long_is_silent() {
+    fn a_run_without_log_rows_for_long_is_silent() {
         let state = |rows, now| Run::of(&log((0, 1), rows)).state(now);
         assert_eq!(state(vec![began(100.0)], 399.0), State::Working);
         assert_eq!(state(vec![began(100.0)], 401.0), State::Silent);
         let slow = vec![began(100.0), image(0, 100.0, Some(200.0))];
         assert_eq!((state(slow.clone(), 1199.0), state(slow, 1201.0)), (State::Working, State::Silent));
-        let ended = Row::Ended(Ended { ended_s: 120.0, end: End::Stopped, cpu_s: None, peak_bytes: None });
+        let ended = Row::RunEnd(RunEnd { ended_s: 120.0, end: End::Stopped, cpu_s: None, peak_bytes: None });
         assert_eq!(state(vec![began(100.0), ended], 1e6), State::Stopped);
     }
 
     #[test]
-    fn the_last_failure_and_the_longest_time_of_an_image_are_told() {
+    fn the_last_failure_and_the_longest_time_of_an_image_are_reported() {
         let failure = |error: &str, failed_s| Row::Failure(ImageFailure { index: 3, error: error.into(), failed_s });
         let logs = [log((0, 1), vec![failure("late", 7.0)]), log((0, 1), vec![failure("early", 5.0)])];
-        let told: Vec<&str> = failures(&logs).into_values().map(|failure| failure.error.as_str()).collect();
-        assert_eq!(told, ["late"]);
+        let messages: Vec<&str> = failures(&logs).into_values().map(|failure| failure.error.as_str()).collect();
+        assert_eq!(messages, ["late"]);
         let runs = [log((0, 3), vec![began(9.0)]), log((0, 8), vec![began(8.0)])];
         let runs: Vec<Run<'_>> = runs.iter().map(Run::of).collect();
         assert_eq!((last_shards(&runs), last_shards(&[])), (3, 1));

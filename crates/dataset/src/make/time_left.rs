@@ -101,14 +101,14 @@ mod tests {
             (10, 0, 10.0, &[next, next], 8.0 * 5.0),
             (2, 1, 70.0, &[first, next], 0.0),
         ] {
-            let told = left(images, growings, elapsed_s, done).expect("some are done");
-            assert!((told - expected).abs() < 1e-9, "{told} instead of {expected} after {done:?}");
+            let computed = left(images, growings, elapsed_s, done).expect("some are done");
+            assert!((computed - expected).abs() < 1e-9, "{computed} instead of {expected} after {done:?}");
         }
         assert_eq!(left(24, 1, 65.0, &[]), None);
     }
 
     #[test]
-    fn nothing_is_told_before_the_first_image() {
+    fn no_time_is_estimated_before_the_first_image() {
         let time = TimeLeft::default();
         time.add(1.0, Duration::ZERO);
         assert_eq!(time.left(), None);

@@ -24,9 +24,9 @@ pub enum Row {
     /// An image could not be made.
     Failure(ImageFailure),
     /// Start of the run; the first row.
-    Began(Began),
+    RunStart(RunStart),
     /// End of the run; the last row, missing if the run was killed.
-    Ended(Ended),
+    RunEnd(RunEnd),
 }
 
 impl Row {
@@ -35,8 +35,8 @@ impl Row {
         match self {
             Self::Image(image) => image.done_s,
             Self::Failure(failure) => Some(failure.failed_s),
-            Self::Began(began) => Some(began.began_s),
-            Self::Ended(ended) => Some(ended.ended_s),
+            Self::RunStart(began) => Some(began.began_s),
+            Self::RunEnd(ended) => Some(ended.ended_s),
         }
     }
 }
@@ -86,7 +86,7 @@ pub struct ImageFailure {
 
 /// The start of a run, before its first image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Began {
+pub struct RunStart {
     /// Time of the start, seconds since 1970.
     pub began_s: f64,
     /// Number of images to make.
@@ -99,7 +99,7 @@ pub struct Began {
 
 /// The end of a run, after its last image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Ended {
+pub struct RunEnd {
     /// Time of the end, seconds since 1970.
     pub ended_s: f64,
     /// Reason for the end.
@@ -226,10 +226,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let log = TimingLog::new(folder.path(), "1-of-3");
         let rows = [
-            Row::Began(Began { began_s: 1.5, images: 2, at_once: 1, threads: 2 }),
+            Row::RunStart(RunStart { began_s: 1.5, images: 2, at_once: 1, threads: 2 }),
             Row::Image(ImageTiming::new(4, "ab".into(), 0.5, &Times::default(), 1, 2)),
             Row::Failure(ImageFailure { index: 7, error: "no sun\n help: wait".into(), failed_s: 2.0 }),
-            Row::Ended(Ended { ended_s: 3.0, end: End::Failed, cpu_s: Some(2.5), peak_bytes: None }),
+            Row::RunEnd(RunEnd { ended_s: 3.0, end: End::Failed, cpu_s: Some(2.5), peak_bytes: None }),
         ];
         for row in &rows {
             log.add(row).unwrap();
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_files_tell_the_shard() {
+    fn file_names_contain_the_shard() {
         assert_eq!(shard("shard-2-of-5-run-10"), Some((2, 5)));
         for other in ["shard-5-of-5-run-1", "shard-2-of-5", "notes", "shard-a-of-b-run-1"] {
             assert_eq!(shard(other), None, "{other}");

@@ -11,11 +11,11 @@ use furrow_render::scene::tag::Class;
 use std::collections::BTreeMap;
 
 /// Pixel count and bounding box of each plant, with the key (plant, 0), and of each leaf, with the key (plant, leaf).
-type Counted = BTreeMap<(u32, u16), (u32, Box2)>;
+type PixelCounts = BTreeMap<(u32, u16), (u32, Box2)>;
 
 /// Counts the pixels of plants and leaves, and finds their bounding boxes. `width` is the image width in pixels.
-fn count(width: u32, plants: &[u32], leaves: &[u16]) -> Counted {
-    let mut all = Counted::new();
+fn count(width: u32, plants: &[u32], leaves: &[u16]) -> PixelCounts {
+    let mut all = PixelCounts::new();
     // Counts a run of pixels of the same leaf at a time.
     let mut from = 0;
     while from < plants.len() {

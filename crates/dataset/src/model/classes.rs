@@ -240,10 +240,10 @@ fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
     let parts = PartKind::NUMBERED.iter().map(|(_, name, ..)| *name).filter(|name| part(name).is_some());
     let others = SEMANTICS.into_iter().chain(parts).map(str::to_owned);
     let others: Vec<String> = others.chain(models.iter().map(|name| format!("{OF_NAME}{name}"))).collect();
-    let told = |s: &SpeciesRecord| {
+    let described = |s: &SpeciesRecord| {
         if s.eppo.is_empty() { s.name.clone() } else { format!("{} ({})", s.name, s.eppo) }
     };
-    let species: Vec<String> = species.iter().map(told).collect();
+    let species: Vec<String> = species.iter().map(described).collect();
     let species = if species.is_empty() { "none".into() } else { species.join(", ") };
     let what = format!("the classes use the label `{label}`, which the dataset does not have");
     Error::input(what).help(format!("its labels are {}; its species: {species}", others.join(", ")))
@@ -326,8 +326,8 @@ mod tests {
         };
         let table = [species("fat hen", "CHEAL"), species("thistle", "CIRAR")];
         for twice in ["soil; a=CHEAL; b=fat hen; weed", "soil; a=cheal; b=CHEAL; weed"] {
-            let said = Classes::parse(twice).unwrap().of(&table, &[]).unwrap_err().to_string();
-            assert!(said.contains("fat hen (CHEAL) belongs to `a` and to `b`"), "{said}");
+            let message = Classes::parse(twice).unwrap().of(&table, &[]).unwrap_err().to_string();
+            assert!(message.contains("fat hen (CHEAL) belongs to `a` and to `b`"), "{message}");
         }
         let classes = Classes::parse("soil; ignore=thistle,stick; hen=cheal; weed; stone").unwrap();
         assert_eq!(classes.names(), ["soil", "hen", "weed", "stone"]);
@@ -347,7 +347,7 @@ mod tests {
     /// Expected: a named model has the class of its name, any other model that of `model`; without either it is soil,
     /// as in `semantics.png`. The error for an unknown name lists the known ones.
     #[test]
-    fn models_are_told_apart_by_their_names() {
+    fn models_are_distinguished_by_their_names() {
         let names = ["robot".to_owned(), "box".to_owned()];
         let pixels = |text: &str| {
             let classes = Classes::parse(text).unwrap();
@@ -358,8 +358,8 @@ mod tests {
         assert_eq!(pixels("soil; crop; ignore=model:robot"), [0, 0, IGNORE, 0]);
         assert_eq!(pixels("soil; crop; machine=model:robot; ignore=model"), [0, IGNORE, 2, IGNORE]);
         let missing = Classes::parse("soil; crop; ignore=model:tractor").unwrap().of(&[], &names).unwrap_err();
-        let said = missing.to_string();
-        assert!(said.contains("`model:tractor`") && said.contains("model:robot, model:box"), "{said}");
+        let message = missing.to_string();
+        assert!(message.contains("`model:tractor`") && message.contains("model:robot, model:box"), "{message}");
     }
 
     #[test]

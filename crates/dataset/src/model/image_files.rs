@@ -4,8 +4,8 @@
 //! the image: it is never read, and `verify` reports it. Files with other names belong to the user, such as additional
 //! bands for training.
 
-use crate::model::keep::{Kept, Omitted};
-use crate::model::recipe::{Made, Recipe};
+use crate::model::optional_maps::{OmittableMap, OptionalMap};
+use crate::model::recipe::{ImageOrigin, Recipe};
 use furrow_output::ENDINGS;
 use std::path::{Path, PathBuf};
 
@@ -29,21 +29,24 @@ pub(crate) const NAMES: [&str; 12] = [
 /// written by an earlier version, does not state whether there is near infrared, its files belong to the images.
 pub fn belongs(recipe: &Recipe, file: &str) -> bool {
     let rendering = match &recipe.made {
-        Made::Rendered(rendering) => Some(rendering),
-        Made::Imported { .. } => None,
+        ImageOrigin::Rendered(rendering) => Some(rendering),
+        ImageOrigin::Imported { .. } => None,
     };
     let drawn = !recipe.labels_only();
     let stored = |name: &str| drawn && file == format!("{name}.{}", recipe.photo().ending());
-    let kept = |maps: &[Kept]| rendering.is_some_and(|rendering| maps.iter().any(|map| rendering.keep.contains(map)));
+    let kept =
+        |maps: &[OptionalMap]| rendering.is_some_and(|rendering| maps.iter().any(|map| rendering.keep.contains(map)));
     match file {
         "rgb.png" | "rgb.jpg" => stored("rgb"),
-        "nir.png" | "nir.jpg" => stored("nir") && recipe.keeps(Kept::Nir),
-        "species.png" => rendering.is_some() && !recipe.omits(Omitted::Species),
+        "nir.png" | "nir.jpg" => stored("nir") && recipe.keeps(OptionalMap::Nir),
+        "species.png" => rendering.is_some() && !recipe.omits(OmittableMap::Species),
         "parts.png" => rendering.is_some_and(|rendering| rendering.parts),
-        "plants.png" => !recipe.omits(Omitted::Plants),
-        "leaves.png" => !recipe.omits(Omitted::Leaves),
-        "coverage.png" => drawn && kept(&[Kept::Coverage]),
-        "geometry.exr" => kept(&[Kept::Depth, Kept::Depth32, Kept::Normals, Kept::Normals16]),
+        "plants.png" => !recipe.omits(OmittableMap::Plants),
+        "leaves.png" => !recipe.omits(OmittableMap::Leaves),
+        "coverage.png" => drawn && kept(&[OptionalMap::Coverage]),
+        "geometry.exr" => {
+            kept(&[OptionalMap::Depth, OptionalMap::Depth32, OptionalMap::Normals, OptionalMap::Normals16])
+        }
         _ => true,
     }
 }
@@ -70,7 +73,7 @@ mod tests {
     fn rendered(change: impl FnOnce(&mut Rendering)) -> Vec<&'static str> {
         let text = include_str!("../../../../tests/data/dataset/dataset.json");
         let mut recipe: Recipe = serde_json::from_str(text).unwrap();
-        if let Made::Rendered(rendering) = &mut recipe.made {
+        if let ImageOrigin::Rendered(rendering) = &mut recipe.made {
             change(rendering);
         }
         of(&recipe)
@@ -80,19 +83,19 @@ mod tests {
     /// encoding, no map that is not kept, no map from samples for labels only, and for imported images nothing that
     /// only rendered ones have; user files always belong. Source: the table of files in `docs/reference/files.md`.
     #[test]
-    fn the_recipe_tells_the_files_of_an_image() {
+    fn the_recipe_lists_the_files_of_an_image() {
         let oldest = rendered(|_| ());
         let photographs = ["rgb.png", "nir.png", "semantics.png", "species.png", "plants.png", "leaves.png"];
         assert_eq!(oldest, [&photographs[..], &["coverage.png", "geometry.exr", "record.json"]].concat());
         let least = rendered(|rendering| {
             rendering.keep.clear();
-            rendering.omit = Omitted::NAMED.map(|(_, map, _)| map).to_vec();
+            rendering.omit = OmittableMap::NAMED.map(|(_, map, _)| map).to_vec();
         });
         assert_eq!(least, ["rgb.png", "semantics.png", "record.json"]);
         let stored = rendered(|rendering| {
             (rendering.photo, rendering.parts) = (Some(Photo::Jpeg(90)), true);
-            rendering.keep = vec![Kept::Nir, Kept::Normals];
-            rendering.omit = vec![Omitted::Species, Omitted::Leaves];
+            rendering.keep = vec![OptionalMap::Nir, OptionalMap::Normals];
+            rendering.omit = vec![OmittableMap::Species, OmittableMap::Leaves];
         });
         let expected =
             ["rgb.jpg", "nir.jpg", "semantics.png", "parts.png", "plants.png", "geometry.exr", "record.json"];
@@ -102,9 +105,9 @@ mod tests {
         let mut imported = Recipe::of_species(Vec::new());
         let with_nir = ["rgb.png", "nir.png", "semantics.png", "plants.png", "leaves.png", "record.json"];
         let without = ["rgb.png", "semantics.png", "plants.png", "leaves.png", "record.json"];
-        for (said, expected) in [(None, &with_nir[..]), (Some(true), &with_nir), (Some(false), &without)] {
-            if let Made::Imported { nir, .. } = &mut imported.made {
-                *nir = said;
+        for (recorded, expected) in [(None, &with_nir[..]), (Some(true), &with_nir), (Some(false), &without)] {
+            if let ImageOrigin::Imported { nir, .. } = &mut imported.made {
+                *nir = recorded;
             }
             assert_eq!(of(&imported), expected);
             assert!(belongs(&imported, "thermal.png"));

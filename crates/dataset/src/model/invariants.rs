@@ -1,7 +1,7 @@
 //! Invariants of every image, checked before an image is written, and again by `verify` on the files.
 
 use crate::model::annotate;
-use crate::model::recipe::{Made, Recipe};
+use crate::model::recipe::{ImageOrigin, Recipe};
 use crate::model::record::{Leaf, Plant, Seen};
 use crate::model::sample::{IGNORE, Sample};
 use furrow_base::{Error, Result};
@@ -45,7 +45,7 @@ pub fn faults(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     if !sizes.is_empty() {
         return sizes;
     }
-    let rendered = matches!(recipe.made, Made::Rendered(_));
+    let rendered = matches!(recipe.made, ImageOrigin::Rendered(_));
     let mut all = Vec::new();
     all.extend(nesting(sample, rendered));
     all.extend(numbers(recipe, sample));
@@ -93,13 +93,13 @@ fn nesting(sample: &Sample, rendered: bool) -> Vec<String> {
             mixed += u64::from(*of_plant.entry(plant).or_insert((class, species)) != (class, species) || !vegetation);
         }
     }
-    let told = [
+    let recorded = [
         (unknown, "have an unknown class"),
         (loose, "have a leaf or a species but no plant"),
         (bare, "are crop or weed but no plant"),
         (mixed, "have another class or species than the rest of their plant, or are soil"),
     ];
-    told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} pixels {words}")).collect()
+    recorded.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} pixels {words}")).collect()
 }
 
 /// Checks that species are in the recipe's table, that the record agrees with the recipe, that coordinates are finite,
@@ -115,11 +115,11 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
         all.push(format!("it is in the split {}, but its number belongs to another", record.split.name()));
     }
     let (field, capture) = recipe.field_of(record.index);
-    let told = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
-    let frames = record.capture.as_ref().is_none_or(|told| u64::from(told.frame) <= capture);
+    let recorded = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
+    let frames = record.capture.as_ref().is_none_or(|recorded| u64::from(recorded.frame) <= capture);
     let day = record.capture.as_ref().and_then(|capture| capture.day);
     let of_day = recipe.days().get((capture / recipe.captures_a_day()) as usize).copied();
-    if told != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
+    if recorded != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
         all.push("its field, frame or day does not match its number".into());
     }
     let points = record
@@ -156,22 +156,22 @@ fn counts(sample: &Sample) -> Vec<String> {
     let (mut classes, ignored) = annotate::classes(sample);
     if sample.coverage.is_empty() {
         // The coverage was summed when the map existed; the map was not stored.
-        for (share, told) in classes.iter_mut().zip(&record.classes) {
-            share.covered = told.covered;
+        for (share, recorded) in classes.iter_mut().zip(&record.classes) {
+            share.covered = recorded.covered;
         }
     }
     if (&classes, ignored) != (&record.classes, record.ignored) {
         all.push("the record's pixel counts of the classes differ from the map".into());
     }
     let shown = annotate::plants(sample);
-    let told: Vec<&Plant> = record.seen().collect();
+    let recorded: Vec<&Plant> = record.seen().collect();
     let same_leaf = |(a, b): (&Leaf, &Leaf)| a.number == b.number && same(&a.seen, &b.seen);
     let same_plant = |(a, b): (&Plant, &&Plant)| {
         let leaves: Vec<&Leaf> = b.leaves.iter().filter(|l| l.seen.pixels > 0).collect();
         let fits = (a.number, a.class, a.leaves.len()) == (b.number, b.class, leaves.len()) && same(&a.seen, &b.seen);
         fits && a.leaves.iter().zip(leaves).all(same_leaf)
     };
-    if shown.len() != told.len() || !shown.iter().zip(&told).all(same_plant) {
+    if shown.len() != recorded.len() || !shown.iter().zip(&recorded).all(same_plant) {
         all.push("the record's plants, boxes or masks differ from the maps".into());
     }
     for plant in &record.plants {

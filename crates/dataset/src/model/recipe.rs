@@ -5,8 +5,8 @@
 //! folder can continue the dataset.
 
 use crate::model::classes::Classes;
-use crate::model::keep::{Kept, Omitted};
 use crate::model::labelling::Labelling;
+use crate::model::optional_maps::{OmittableMap, OptionalMap};
 use crate::model::photo::Photo;
 use crate::model::split::{Shares, Split};
 use furrow_base::input::{Scope, below};
@@ -24,7 +24,7 @@ pub struct Recipe {
     /// Version of the program.
     pub furrow: String,
     /// Origin of the images.
-    pub made: Made,
+    pub made: ImageOrigin,
     /// Number of images.
     pub count: u64,
     /// Proportions of the splits.
@@ -46,7 +46,7 @@ pub struct Recipe {
 /// Origin of images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Made {
+pub enum ImageOrigin {
     /// Rendered from a scene file.
     Rendered(Box<Rendering>),
     /// Imported from another tool.
@@ -99,14 +99,14 @@ pub struct Rendering {
     /// names none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
-    /// Maps that are stored in addition to image, labels and record; [`Kept::OLDEST`] for recipes of earlier versions,
+    /// Maps that are stored in addition to image, labels and record; [`OptionalMap::OLDEST`] for recipes of earlier versions,
     /// which do not list them.
     #[serde(default = "oldest", skip_serializing_if = "is_oldest")]
-    pub keep: Vec<Kept>,
+    pub keep: Vec<OptionalMap>,
     /// Label maps that are not stored, since the records contain the same information; empty for recipes of earlier
     /// versions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub omit: Vec<Omitted>,
+    pub omit: Vec<OmittableMap>,
     /// Whether images are labels only, without rendered images and maps from samples; `spp` then has no effect.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub labels_only: bool,
@@ -122,12 +122,12 @@ pub struct Rendering {
     pub edit: Option<String>,
 }
 
-fn oldest() -> Vec<Kept> {
-    Kept::OLDEST.to_vec()
+fn oldest() -> Vec<OptionalMap> {
+    OptionalMap::OLDEST.to_vec()
 }
 
-fn is_oldest(kept: &[Kept]) -> bool {
-    kept == Kept::OLDEST
+fn is_oldest(kept: &[OptionalMap]) -> bool {
+    kept == OptionalMap::OLDEST
 }
 
 fn one() -> u64 {
@@ -220,7 +220,7 @@ impl Recipe {
     pub(crate) fn of_species(species: Vec<SpeciesRecord>) -> Self {
         Self {
             furrow: String::new(),
-            made: Made::Imported { from: String::new(), source_sha256: String::new(), nir: None },
+            made: ImageOrigin::Imported { from: String::new(), source_sha256: String::new(), nir: None },
             count: 0,
             split: Shares::default(),
             formats: Vec::new(),
@@ -234,8 +234,8 @@ impl Recipe {
     /// Returns the number of images of each field; 1 for imported images.
     pub fn captures(&self) -> u64 {
         match &self.made {
-            Made::Rendered(rendering) => rendering.captures.max(1),
-            Made::Imported { .. } => 1,
+            ImageOrigin::Rendered(rendering) => rendering.captures.max(1),
+            ImageOrigin::Imported { .. } => 1,
         }
     }
 
@@ -277,7 +277,7 @@ impl Recipe {
 
     /// Returns an error if `classes` need `parts.png` and the images have none.
     pub fn check_parts(&self, classes: &Classes) -> Result<()> {
-        let has_parts = matches!(&self.made, Made::Rendered(rendering) if rendering.parts);
+        let has_parts = matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.parts);
         if has_parts || !classes.needs_parts() {
             return Ok(());
         }
@@ -288,28 +288,28 @@ impl Recipe {
 
     /// Returns whether the images are labels only, without rendered images.
     pub fn labels_only(&self) -> bool {
-        matches!(&self.made, Made::Rendered(rendering) if rendering.labels_only)
+        matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.labels_only)
     }
 
     /// Returns the encoding of the images.
     pub fn photo(&self) -> Photo {
         match &self.made {
-            Made::Rendered(rendering) => rendering.photo.unwrap_or_default(),
-            Made::Imported { .. } => Photo::Png,
+            ImageOrigin::Rendered(rendering) => rendering.photo.unwrap_or_default(),
+            ImageOrigin::Imported { .. } => Photo::Png,
         }
     }
 
     /// Returns whether the image files contain a comment, as in earlier versions. Without a comment, formats contain
     /// the same bytes.
     pub fn has_comments(&self) -> bool {
-        matches!(&self.made, Made::Rendered(rendering) if rendering.photo.is_none())
+        matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.photo.is_none())
     }
 
     /// Returns the render parameters; an error for imported images.
     pub fn rendering(&self) -> Result<&Rendering> {
         match &self.made {
-            Made::Rendered(rendering) => Ok(rendering),
-            Made::Imported { from, .. } => {
+            ImageOrigin::Rendered(rendering) => Ok(rendering),
+            ImageOrigin::Imported { from, .. } => {
                 Err(Error::misuse(format!("these images were imported from {from} and cannot be rendered")).help(
                     "`trace dataset verify` checks them, \
                  `trace dataset finish --format …` writes further formats",
@@ -320,16 +320,16 @@ impl Recipe {
 
     /// Returns whether the images have a map, if its file exists. Rendered images have the maps in `keep`. Imported
     /// images have the maps that they came with; if their recipe does not state near infrared, they may have it.
-    pub fn keeps(&self, map: Kept) -> bool {
+    pub fn keeps(&self, map: OptionalMap) -> bool {
         match &self.made {
-            Made::Rendered(rendering) => rendering.keep.contains(&map),
-            Made::Imported { nir, .. } => map != Kept::Nir || nir.unwrap_or(true),
+            ImageOrigin::Rendered(rendering) => rendering.keep.contains(&map),
+            ImageOrigin::Imported { nir, .. } => map != OptionalMap::Nir || nir.unwrap_or(true),
         }
     }
 
     /// Returns whether the images omit a label map; their records contain the same information.
-    pub fn omits(&self, map: Omitted) -> bool {
-        matches!(&self.made, Made::Rendered(rendering) if rendering.omit.contains(&map))
+    pub fn omits(&self, map: OmittableMap) -> bool {
+        matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.omit.contains(&map))
     }
 
     /// Returns the name of a species by its number in `species.png`; `None` for 0 and unknown numbers.

@@ -137,14 +137,14 @@ pub struct Plant {
     pub stem: Option<Keypoint>,
     /// Properties of the grown plant; null for an imported plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub grown: Option<Grown>,
+    pub grown: Option<PlantAttributes>,
     /// Leaves by number.
     pub leaves: Vec<Leaf>,
 }
 
 /// Properties of a plant beyond its pixels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Grown {
+pub struct PlantAttributes {
     /// Common name from the species file, or the name of the model.
     pub species: String,
     /// EPPO code; empty for a model.

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_archive_tells_nothing_of_its_machine() {
+    fn an_archive_names_nothing_of_its_machine() {
         let header = header("images/000000/rgb.png", 3).unwrap();
         assert_eq!(header.path().unwrap().to_str(), Some("000000.rgb.png"));
         let numbers = (header.mtime().unwrap(), header.uid().unwrap(), header.gid().unwrap(), header.mode().unwrap());

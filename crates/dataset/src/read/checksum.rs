@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_told_by_its_bytes() {
+    fn a_file_is_recognised_by_its_bytes() {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), [7; 10_000]).unwrap();
         let sum = Checksum::of(&[7; 10_000]);

@@ -8,7 +8,7 @@ use crate::read::checksum::Checksum;
 use crate::read::native;
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
-use furrow_output::{Together, write_atomically, write_together};
+use furrow_output::{FileSet, write_atomically, write_together};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -97,7 +97,7 @@ pub(crate) fn write_files(folder: &Path, files: &[File]) -> Result<()> {
 /// becomes a hard link to that one.
 pub(crate) fn write_files_beside(folder: &Path, files: &[File], there: &BTreeMap<String, Checksum>) -> Result<()> {
     let known = if there.is_empty() { BTreeMap::new() } else { lying(folder, files, there)? };
-    let add_all = |together: &mut Together| {
+    let add_all = |together: &mut FileSet| {
         let mut large = known.clone();
         for file in files {
             if file.bytes.is_empty() {

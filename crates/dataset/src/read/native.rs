@@ -17,7 +17,7 @@
 
 use crate::File;
 use crate::model::image_files::{self, NAMES};
-use crate::model::keep::Kept;
+use crate::model::optional_maps::OptionalMap;
 use crate::model::photo::{Jpegs, Photo};
 use crate::model::recipe::{Recipe, compact};
 use crate::model::record::Record;
@@ -25,7 +25,7 @@ use crate::model::sample::{IGNORE, Sample};
 use crate::read::label_maps;
 use furrow_base::{Error, Result};
 use furrow_field::PartKind;
-use furrow_output::{Picture, Precision};
+use furrow_output::{ImageData, Precision};
 use furrow_render::scene::tag::Class;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
         }
         Ok(())
     };
-    let png = |picture: &Picture<'_>| furrow_output::encode_png(w, h, picture, text);
+    let png = |picture: &ImageData<'_>| furrow_output::encode_png(w, h, picture, text);
     let colors = palette(sample.semantics.contains(&IGNORE));
     let of_photograph = if recipe.has_comments() { text } else { "" };
     if let Some(jpeg) = &sample.jpeg {
@@ -73,28 +73,28 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
         }
     } else {
         if !sample.rgb.is_empty() {
-            add("rgb.png", &|| furrow_output::encode_png(w, h, &Picture::Rgb(&sample.rgb), of_photograph))?;
+            add("rgb.png", &|| furrow_output::encode_png(w, h, &ImageData::Rgb(&sample.rgb), of_photograph))?;
         }
         if !sample.nir.is_empty() {
-            add("nir.png", &|| furrow_output::encode_png(w, h, &Picture::Gray(&sample.nir), of_photograph))?;
+            add("nir.png", &|| furrow_output::encode_png(w, h, &ImageData::Gray(&sample.nir), of_photograph))?;
         }
     }
-    add("semantics.png", &|| png(&Picture::Indexed(&sample.semantics, &colors)))?;
+    add("semantics.png", &|| png(&ImageData::Indexed(&sample.semantics, &colors)))?;
     if !sample.species.is_empty() {
-        add("species.png", &|| png(&Picture::Gray(&sample.species)))?;
+        add("species.png", &|| png(&ImageData::Gray(&sample.species)))?;
     }
     if !sample.parts.is_empty() {
         let colors = PartKind::palette(recipe.models().len());
-        add("parts.png", &|| png(&Picture::Indexed(&sample.parts, &colors)))?;
+        add("parts.png", &|| png(&ImageData::Indexed(&sample.parts, &colors)))?;
     }
-    add("plants.png", &|| png(&Picture::Numbers(&sample.plants)))?;
-    add("leaves.png", &|| png(&Picture::Gray16(&sample.leaves)))?;
+    add("plants.png", &|| png(&ImageData::Numbers(&sample.plants)))?;
+    add("leaves.png", &|| png(&ImageData::Gray16(&sample.leaves)))?;
     if !sample.coverage.is_empty() {
-        add("coverage.png", &|| png(&Picture::Linear(&sample.coverage)))?;
+        add("coverage.png", &|| png(&ImageData::Linear(&sample.coverage)))?;
     }
     if !sample.depth.is_empty() || !sample.normals.is_empty() {
-        let small = !(recipe.keeps(Kept::Depth32) && recipe.keeps(Kept::Normals16));
-        let depth = if recipe.keeps(Kept::Depth) { Precision::Half } else { Precision::Single };
+        let small = !(recipe.keeps(OptionalMap::Depth32) && recipe.keeps(OptionalMap::Normals16));
+        let depth = if recipe.keeps(OptionalMap::Depth) { Precision::Half } else { Precision::Single };
         let encode = || furrow_output::encode_geometry(w, h, (&sample.depth, depth), &sample.normals, small);
         add("geometry.exr", &encode)?;
     }
@@ -263,7 +263,7 @@ impl<'a, F: Files> Image<'a, F> {
     pub fn species(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u8>)> {
         match self.optional("species.png")? {
             Some((place, bytes)) => furrow_output::decode_gray(&place, &bytes).map_err(Error::in_dataset),
-            None => self.told(size, known, label_maps::species),
+            None => self.derived(size, known, label_maps::species),
         }
     }
 
@@ -271,7 +271,7 @@ impl<'a, F: Files> Image<'a, F> {
     pub fn plants(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u32>)> {
         match self.optional("plants.png")? {
             Some((place, bytes)) => furrow_output::decode_numbers(&place, &bytes).map_err(Error::in_dataset),
-            None => self.told(size, known, label_maps::plants),
+            None => self.derived(size, known, label_maps::plants),
         }
     }
 
@@ -279,12 +279,12 @@ impl<'a, F: Files> Image<'a, F> {
     fn leaves(&self, size: (u32, u32), known: Option<&Record>) -> Result<(u32, u32, Vec<u16>)> {
         match self.optional("leaves.png")? {
             Some((place, bytes)) => furrow_output::decode_gray16(&place, &bytes).map_err(Error::in_dataset),
-            None => self.told(size, known, label_maps::leaves),
+            None => self.derived(size, known, label_maps::leaves),
         }
     }
 
     /// Makes a label map from the record, which must have the given `size`.
-    fn told<T>(
+    fn derived<T>(
         &self,
         size: (u32, u32),
         known: Option<&Record>,

@@ -199,13 +199,13 @@ pub(crate) fn in_parallel<'a, T: Send + 'a>(
 }
 
 /// Writer of the files that belong to all images; collects their checksums.
-pub struct Whole<'a> {
+pub struct SetWriter<'a> {
     folder: &'a Path,
     /// Checksums of the files written so far, by path relative to the dataset's folder.
     pub files: BTreeMap<String, Checksum>,
 }
 
-impl<'a> Whole<'a> {
+impl<'a> SetWriter<'a> {
     /// Returns a writer for the dataset in `folder`.
     pub fn new(folder: &'a Path) -> Self {
         Self { folder, files: BTreeMap::new() }

@@ -4,7 +4,7 @@ use super::statistics::{Species, Statistics};
 use crate::format;
 use crate::model::image_files::belongs;
 use crate::model::photo::Photo;
-use crate::model::recipe::{Made, Recipe, Rendering};
+use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::split::Split;
 use furrow_render::scene::tag::Class;
 use furrow_render::settings::Engine;
@@ -14,11 +14,11 @@ use maud::{Markup, html};
 /// Returns the title: the scene file's name without folder and extension, or the format of imported images.
 pub(super) fn title(recipe: &Recipe) -> String {
     match &recipe.made {
-        Made::Rendered(rendering) => {
+        ImageOrigin::Rendered(rendering) => {
             let file = rendering.scene.rsplit('/').next().unwrap_or_default();
             file.trim_end_matches(".ron").to_owned()
         }
-        Made::Imported { from, .. } => format!("imported from {from}"),
+        ImageOrigin::Imported { from, .. } => format!("imported from {from}"),
     }
 }
 
@@ -30,10 +30,10 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
         many => format!("{} sizes, {} to {} pixels", many.len(), many[0], many[many.len() - 1]),
     };
     match &recipe.made {
-        Made::Rendered(rendering) if rendering.labels_only => {
+        ImageOrigin::Rendered(rendering) if rendering.labels_only => {
             format!("Labels of procedurally grown crop fields at {size}, exact from the geometry, without images.")
         }
-        Made::Rendered(rendering) => {
+        ImageOrigin::Rendered(rendering) => {
             let Rendering { engine, spp, .. } = &**rendering;
             let how = if *engine == Engine::Trace { "path traced" } else { "rasterized" };
             format!(
@@ -42,7 +42,7 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
                 count(u64::from(*spp), "sample", "samples")
             )
         }
-        Made::Imported { from, .. } => format!("Images and labels imported from {from}, {size}."),
+        ImageOrigin::Imported { from, .. } => format!("Images and labels imported from {from}, {size}."),
     }
 }
 
@@ -50,7 +50,7 @@ pub(super) fn lead(recipe: &Recipe, found: &Statistics) -> String {
 pub(super) fn provenance(recipe: &Recipe) -> Markup {
     let mut rows: Vec<(&str, Markup)> = Vec::new();
     match &recipe.made {
-        Made::Rendered(made) => {
+        ImageOrigin::Rendered(made) => {
             rows.push(("scene", html! { code { (made.scene) } }));
             rows.push(("scene SHA-256", html! { code { (made.scene_sha256) } }));
             rows.push(("seed", html! { (made.seed) }));
@@ -72,7 +72,7 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
             }
             rows.push(("kernels", html! { (made.kernels) }));
         }
-        Made::Imported { from, .. } => rows.push(("imported from", html! { (from) })),
+        ImageOrigin::Imported { from, .. } => rows.push(("imported from", html! { (from) })),
     }
     rows.push(("program", html! { "Furrow " (recipe.furrow) }));
     rows.push(("licence of the images", html! { (recipe.licence) }));
@@ -82,8 +82,10 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
 /// Returns the table of splits with their numbers of images.
 pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> Markup {
     let words = match &recipe.made {
-        Made::Rendered(_) => "Fields are never divided between splits: no plant and no patch of soil is in two splits.",
-        Made::Imported { .. } => "Only the source can state whether a plant or a field is in two splits.",
+        ImageOrigin::Rendered(_) => {
+            "Fields are never divided between splits: no plant and no patch of soil is in two splits."
+        }
+        ImageOrigin::Imported { .. } => "Only the source can state whether a plant or a field is in two splits.",
     };
     html! {
         table {
@@ -197,13 +199,13 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
         }
         @if !recipe.formats.is_empty() {
             p { "The same images in other formats, each in the folder of its name:" }
-            (pairs(&recipe.formats.iter().map(|name| (name, told(name))).collect::<Vec<_>>()))
+            (pairs(&recipe.formats.iter().map(|name| (name, format_description(name))).collect::<Vec<_>>()))
         }
     }
 }
 
 /// Returns the description of a format, and how to open it.
-fn told(name: &str) -> Markup {
+fn format_description(name: &str) -> Markup {
     let of = |table: &[(&str, &'static str)]| table.iter().find(|(n, _)| *n == name).map_or("", |(_, text)| text);
     html! { (of(format::NAMES)) br; code { (of(format::READ)) } }
 }
@@ -239,7 +241,7 @@ for plant in record[\"plants\"]:
 pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
     let mut all: Vec<String> = Vec::new();
     match &recipe.made {
-        Made::Rendered(made) => {
+        ImageOrigin::Rendered(made) => {
             all.push(
                 "The images are synthetic. Only real images can show their value for real fields: keep some as a test set."
                     .into(),
@@ -258,7 +260,7 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
             }
             all.push("Wind and diseases are not modelled. Insect damage, dead tissue and motion blur occur if the scene file requests them.".into());
         }
-        Made::Imported { .. } => {
+        ImageOrigin::Imported { .. } => {
             all.push("The labels and their accuracy are those of the source.".into());
             if !found.has_plants() {
                 all.push("The source labels classes; it does not distinguish plants.".into());
@@ -273,7 +275,7 @@ pub(super) fn limits(recipe: &Recipe, found: &Statistics) -> Markup {
 /// Returns the literature on which the dataset is based.
 pub(super) fn sources(recipe: &Recipe) -> Markup {
     match &recipe.made {
-        Made::Rendered(_) => html! {
+        ImageOrigin::Rendered(_) => html! {
             p {
                 "Procedural fields for plant detection: Di Cicco, Potena, Grisetti & Pretto, "
                 cite { "Automatic Model Based Dataset Generation for Fast and Accurate Crop and Weeds Detection" }
@@ -281,7 +283,7 @@ pub(super) fn sources(recipe: &Recipe) -> Markup {
                  Sky: Hošek & Wilkie 2012. Rays: Embree, Wald et al. 2014."
             }
         },
-        Made::Imported { .. } => html! { p { "Cite the source of the images, and comply with its licence." } },
+        ImageOrigin::Imported { .. } => html! { p { "Cite the source of the images, and comply with its licence." } },
     }
 }
 

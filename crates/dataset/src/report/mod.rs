@@ -12,14 +12,14 @@
 //! The charts and the page layout are those of [`furrow_report`].
 
 mod card;
+mod contact_sheet;
 mod photographs;
-mod sheet;
 mod statistics;
 #[cfg(test)]
 mod tests;
 
 use crate::model::split::Split;
-use crate::read::set::{Set, Whole};
+use crate::read::set::{Set, SetWriter};
 use furrow_base::Result;
 use furrow_report::chart::{self, Series, grid, histograms};
 use furrow_report::{Number, Page, Tally, numbers, section, whole};
@@ -34,13 +34,13 @@ const SCRIPT: &str = include_str!("sheet.js");
 pub const FILE: &str = "report.html";
 
 /// Writes the report of a dataset with all its images.
-pub fn write(set: &Set, out: &mut Whole<'_>) -> Result<()> {
+pub fn write(set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
     let mut found = Statistics::new(set.recipe.count);
     for record in set.all() {
         found.add(&record?);
     }
     let names = Split::ALL.map(|split| set.names(split));
-    let sheet = sheet::sheet(set, &names)?;
+    let sheet = contact_sheet::sheet(set, &names)?;
     let photographs = photographs::measure(set)?;
     out.file(FILE, |page| page.put(html(set, &found, &photographs, &names, &sheet)))
 }

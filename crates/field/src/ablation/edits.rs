@@ -1,7 +1,7 @@
 //! Table of edits. Tests iterate over it, so they cover new entries automatically.
 
 use super::{Change, Edit, growth, labels, light, picture};
-use crate::assemble::Growing;
+use crate::assemble::SceneEdit;
 use furrow_base::ron_file::choose;
 use furrow_base::{Error, Result};
 use furrow_render::material::Feature;
@@ -55,7 +55,7 @@ macro_rules! grown {
             name: $name,
             about: $about,
             keeps_labels: false,
-            change: Change::Growth(Growing { page: None, species: Some($change) }),
+            change: Change::Growth(SceneEdit { page: None, species: Some($change) }),
         }
     };
 }
@@ -99,14 +99,14 @@ pub static EDITS: &[Edit] = &[
     without!(
         "plain-leaves",
         "leaves in the uniform colour of their pigments, without the colours of their images; outlines stay",
-        Picture
+        Texture
     ),
     // Geometry.
     Edit {
         name: "flat-soil",
         about: "the ground is a plane with the same texture, without clods; stones, straw and plants are moved down to it",
         keeps_labels: false,
-        change: Change::Growth(Growing { page: Some(growth::flat_soil), species: None }),
+        change: Change::Growth(SceneEdit { page: Some(growth::flat_soil), species: None }),
     },
     grown!("flat-leaves", "blades are flat sheets from base to tip", growth::flat_leaves),
     grown!("low-poly", "blades of 16 triangles", growth::few_triangles),

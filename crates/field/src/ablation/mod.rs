@@ -19,7 +19,7 @@ mod light;
 mod picture;
 
 use crate::Field;
-use crate::assemble::{Growing, Options, Source};
+use crate::assemble::{Options, SceneEdit, Source};
 use furrow_base::Result;
 use furrow_base::input::Scope;
 use furrow_optics::light::Light;
@@ -52,7 +52,7 @@ pub enum Change {
     /// No change.
     Nothing,
     /// Edits the descriptions of scene file and species files before the field is built.
-    Growth(Growing),
+    Growth(SceneEdit),
     /// Edits the lights.
     Lights(fn(&mut Vec<Light>)),
     /// Leaves a feature out of all materials.
@@ -77,7 +77,7 @@ impl Edit {
 
     /// Opens a scene file for [`Edit::field`]. Neither it nor the files that it names may be outside `scope`.
     pub fn open(&self, page: &Path, scope: Scope) -> Result<Source> {
-        let growing = if let Change::Growth(growing) = self.change { growing } else { Growing::default() };
+        let growing = if let Change::Growth(growing) = self.change { growing } else { SceneEdit::default() };
         Ok(Source::open_within(page, scope)?.growing(growing))
     }
 

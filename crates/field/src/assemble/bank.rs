@@ -13,10 +13,10 @@
 //! more than 0.99 with it ([`furrow_optics::optics::LeafOptics::at`]). Damage is that of the bank plant.
 
 use super::drawn::Drawn;
-use super::grown::Grown;
+use super::grown::GrownOrgan;
 use super::member::Member;
 use super::progress::Stage;
-use super::seedling::{Place, Seedling, greenness, grow};
+use super::seedling::{PlantSite, Seedling, greenness, grow};
 use crate::PlantRecord;
 use crate::desc::Detail;
 use furrow_base::Result;
@@ -37,7 +37,7 @@ const BANK: Purpose = Purpose::Scatter;
 pub(super) struct Model {
     record: PlantRecord,
     /// Organs; `None` if the plant has not emerged.
-    pub(super) organs: Option<Vec<Grown>>,
+    pub(super) organs: Option<Vec<GrownOrgan>>,
     /// Chlorophyll relative to the species' mean.
     green: f32,
 }
@@ -104,7 +104,7 @@ pub(super) fn bank(drawn: &Drawn<'_>, seedlings: &[Seedling], dust: Spectrum) ->
         drawn.options.wanted()?;
         let stream = drawn.stream(Purpose::Plant, member.population).child(BANK, member.number);
         let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
-        let place = Place { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
+        let place = PlantSite { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
         let (record, organs) = grow(&own, &place, |_| true);
         Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
     };

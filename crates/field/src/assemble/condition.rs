@@ -1,6 +1,6 @@
 //! Applies a plant's condition to its organs: holes in the opacity mask, and changed tissue optics, leaf by leaf.
 
-use super::grown::Grown;
+use super::grown::GrownOrgan;
 use crate::library::Choice;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{Spectrum, Vec2};
@@ -20,7 +20,7 @@ const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
 const MARKED_DAYS: f32 = 21.0;
 
 /// A plant's condition, drawn from its description.
-pub(super) struct Ailing<'a> {
+pub(super) struct PlantCondition<'a> {
     desc: &'a ConditionDesc,
     drawn: Condition,
     /// Random stream of the plant.
@@ -32,7 +32,7 @@ pub(super) struct Ailing<'a> {
 }
 
 /// Properties of an organ before its condition is applied.
-pub(super) struct Bare<'a> {
+pub(super) struct HealthyOrgan<'a> {
     /// Kind of the organ.
     pub(super) kind: OrganKind,
     /// Drawn variant of its material.
@@ -49,7 +49,7 @@ pub(super) struct Bare<'a> {
     pub(super) last: u16,
 }
 
-impl<'a> Ailing<'a> {
+impl<'a> PlantCondition<'a> {
     /// Draws the condition of the plant with this random stream.
     pub(super) fn new(desc: &'a ConditionDesc, stream: &'a Stream, soil: Spectrum) -> Self {
         Self { desc, drawn: desc.draw(stream), stream, soil, over_days: None }
@@ -79,7 +79,7 @@ impl<'a> Ailing<'a> {
     }
 
     /// Applies the condition to an organ. Returns one organ, or one for each leaflet.
-    pub(super) fn dress(&self, grown: &Grown, bare: &Bare<'_>) -> Vec<Grown> {
+    pub(super) fn dress(&self, grown: &GrownOrgan, bare: &HealthyOrgan<'_>) -> Vec<GrownOrgan> {
         let leaf = grown.part.tag.leaf;
         let age = match leaf {
             0 => 1.0,
@@ -102,7 +102,7 @@ impl<'a> Ailing<'a> {
             let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
             let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
             let chlorophyll = base * bare.green * green;
-            let mut one = Grown { chlorophyll, material: own.clone(), ..grown.with(mesh) };
+            let mut one = GrownOrgan { chlorophyll, material: own.clone(), ..grown.with(mesh) };
             if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {
                 one.part.mask = Some(Arc::new(marks.cut(one.part.mask.as_deref())));
             }
@@ -118,7 +118,14 @@ impl<'a> Ailing<'a> {
         dressed
     }
 
-    fn marks(&self, leaf: u16, mesh: &Mesh, (age, share): (f32, f32), bare: &Bare<'_>, stream: &Stream) -> Marks {
+    fn marks(
+        &self,
+        leaf: u16,
+        mesh: &Mesh,
+        (age, share): (f32, f32),
+        bare: &HealthyOrgan<'_>,
+        stream: &Stream,
+    ) -> Marks {
         let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
         let image = mesh.image_size().filter(|_| bare.choice.pictured);
         let met = self.met(leaf, share);

@@ -1,10 +1,10 @@
 //! Values that a field draws from its scene file before anything is built: the input of every later step.
 
-use super::lighting::{Lighting, Listed};
+use super::field_day::FieldDay;
+use super::lighting::{Lighting, SceneLight};
 use super::options::Options;
 use super::season::Season;
-use super::today::Today;
-use super::view::Sight;
+use super::view::VisibleGround;
 use super::{rig, scanner};
 use crate::desc::{Detail, FieldDesc};
 use crate::drive::Capture;
@@ -45,7 +45,7 @@ pub(super) struct Drawn<'a> {
     pub(super) index: u64,
     pub(super) season: Season,
     /// Day of the field; `None` if it has no days.
-    pub(super) today: Option<Today>,
+    pub(super) today: Option<FieldDay>,
     /// Indices of the scene file's crops that this field has.
     pub(super) sown: std::ops::Range<usize>,
     /// Camera of the first image.
@@ -57,7 +57,7 @@ pub(super) struct Drawn<'a> {
 }
 
 /// The lights that a field draws.
-pub(super) struct Lit {
+pub(super) struct DrawnLights {
     pub(super) lights: Vec<Light>,
     pub(super) records: Vec<LightRecord>,
     pub(super) lighting: Vec<Lighting>,
@@ -70,14 +70,14 @@ impl<'a> Drawn<'a> {
         desc: &'a FieldDesc,
         options: &'a Options,
         library: &mut Library,
-    ) -> Result<(Self, Lit, Vec<String>)> {
+    ) -> Result<(Self, DrawnLights, Vec<String>)> {
         library.counted.begin(options.memory);
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
         let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
-        let today = Today::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
+        let today = FieldDay::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
         let daily = |address| {
             let stream = Stream::of(seed, index, Purpose::Page, address);
             today.as_ref().map_or_else(|| stream.clone(), |today| today.stream(&stream))
@@ -94,7 +94,7 @@ impl<'a> Drawn<'a> {
         for file in desc.lights.iter().flat_map(LightDesc::files) {
             library.environment_map_file(page, file)?;
         }
-        for (i, Listed { desc: light, at }) in listed.into_iter().enumerate() {
+        for (i, SceneLight { desc: light, at }) in listed.into_iter().enumerate() {
             let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
             let drawn = light.draw(&mut daily(1 + i as u64), &mut open);
             let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
@@ -112,7 +112,7 @@ impl<'a> Drawn<'a> {
         let scanners = scanner::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         let camera = captures.first().map_or(camera, |first| first.camera);
         let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, captures, scanners };
-        Ok((drawn, Lit { lights, records, lighting }, warnings))
+        Ok((drawn, DrawnLights { lights, records, lighting }, warnings))
     }
 
     pub(super) fn stream(&self, purpose: Purpose, index: u64) -> Stream {
@@ -187,7 +187,7 @@ impl<'a> Drawn<'a> {
     }
 
     /// Returns the area that plants and their shadows must reach to be part of the scene; `None` if all are.
-    pub(super) fn shown(&self, sight: &Sight) -> Option<Rect> {
+    pub(super) fn shown(&self, sight: &VisibleGround) -> Option<Rect> {
         self.has_ground().then_some(sight.view.area)
     }
 }

@@ -1,6 +1,6 @@
 //! Data of a field's ground during construction.
 
-use super::ground_view::Onlooker;
+use super::ground_view::Viewpoint;
 use crate::desc::Detail;
 use crate::layer::Layer;
 use furrow_base::math::Spectrum;
@@ -20,14 +20,14 @@ pub(super) struct Soil {
     /// Texel size of the baked maps, metres.
     pub(super) texel: f32,
     /// Cameras near whose views the ground is built; empty if all of it is built.
-    pub(super) onlookers: Vec<Onlooker>,
+    pub(super) viewpoints: Vec<Viewpoint>,
     /// Seed and index of the field.
     pub(super) of: (u64, u64),
 }
 
 /// Ground and stones, before clods and litter are added.
 #[derive(Clone)]
-pub(super) struct Earth {
+pub(super) struct GroundAndStones {
     pub(super) ground: Arc<Ground>,
     pub(super) pile: Pile,
     pub(super) stones: Vec<Debris>,
@@ -42,8 +42,8 @@ pub(super) struct BakedGrounds {
 }
 
 /// Ground without cover, its baked textures, and the inputs that it was built from.
-pub(super) struct Bed {
+pub(super) struct BareGround {
     pub(super) soil: Soil,
-    pub(super) earth: Earth,
+    pub(super) earth: GroundAndStones,
     pub(super) baked: Arc<BakedGrounds>,
 }

@@ -3,9 +3,9 @@
 use super::census::Population;
 use super::drawn::Drawn;
 use super::member::Member;
-use super::preview::Counted;
-use super::seedling::{Place, Seedling, grow};
-use super::view::Sight;
+use super::preview::CountedPlant;
+use super::seedling::{PlantSite, Seedling, grow};
+use super::view::VisibleGround;
 use super::{ground, sow};
 use crate::desc::Detail;
 use crate::estimate::{Estimate, Share};
@@ -46,7 +46,7 @@ const SECONDS_PER_INSTANCE: f64 = 1e-5;
 const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 
 /// Estimates the cost of the field for the ground in sight.
-pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Sight) -> Result<Estimate> {
+pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &VisibleGround) -> Result<Estimate> {
     let camera = &drawn.camera;
     let pixels = f64::from(camera.width()) * f64::from(camera.height());
     let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
@@ -125,7 +125,7 @@ fn pictured(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Share>> {
 }
 
 /// Counts triangles and organs of sample plants of a population by growing them. A plant that might itself be too large is not grown.
-fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<Counted> {
+fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<CountedPlant> {
     let number = range.len();
     let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
     let tried = number.min(most);
@@ -133,7 +133,7 @@ fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, rang
         let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
         let cell = drawn.cell(seedling.position);
         let known = drawn.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
-        Counted { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
+        CountedPlant { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
     });
     samples.collect()
 }
@@ -146,15 +146,15 @@ fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
     }
     // Holes and spots are expensive to compute and do not change the triangles.
     let healthy = Seedling { condition: None, ..seedling.clone() };
-    let place = Place { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
+    let place = PlantSite { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
     let (_, organs) = grow(&healthy, &place, |_| true);
     let organs = organs.unwrap_or_default();
     (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
 }
 
 /// Estimates the cost of `number` plants from the samples `some`. `shared` lists the bank plants of those that are instances.
-fn expected(some: &[Counted], number: usize, shared: &[Member]) -> Cost {
-    let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), Counted { size: (t, o), .. }| (a + t, b + o));
+fn expected(some: &[CountedPlant], number: usize, shared: &[Member]) -> Cost {
+    let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), CountedPlant { size: (t, o), .. }| (a + t, b + o));
     let each = Cost::of(triangles, organs) + Cost::work(0.0, triangles * SECONDS_PER_TRIANGLE);
     let meshes = number - shared.len() + shared.iter().collect::<BTreeSet<_>>().len();
     let of = some.len().max(1) as f64;

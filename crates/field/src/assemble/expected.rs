@@ -1,7 +1,7 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
 use super::drawn::Drawn;
-use super::{Options, Source, ground, unlikely, view};
+use super::{Options, Source, ground, plausibility, view};
 use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::sampling::Purpose;
@@ -20,12 +20,12 @@ impl Source {
     /// Returns the expected number of plants in view of field `options.index`: the mean over random placements, for the camera and the
     /// densities drawn for this field.
     pub fn expected_plants(&self, options: &Options) -> Result<f64> {
-        self.ask(options, expected_plants)
+        self.query(options, expected_plants)
     }
 
     /// Returns the warnings of field `options.index` that can be found without building it.
-    pub fn foretold(&self, options: &Options) -> Result<Vec<String>> {
-        self.ask(options, |Asked { drawn, library, warnings }| {
+    pub fn expected_warnings(&self, options: &Options) -> Result<Vec<String>> {
+        self.query(options, |Asked { drawn, library, warnings }| {
             // Load soil and models first, so that unusable files are reported as errors.
             let sight = view::sight(drawn, warnings)?;
             if let Some(soil) = &self.desc.soil {
@@ -34,19 +34,19 @@ impl Source {
             for model in &self.desc.models {
                 library.model(&self.page, model)?;
             }
-            warnings.extend(unlikely::camera(drawn));
-            warnings.extend(unlikely::plants(drawn, library)?);
+            warnings.extend(plausibility::camera(drawn));
+            warnings.extend(plausibility::plants(drawn, library)?);
             Ok(std::mem::take(warnings))
         })
     }
 
     /// Returns the cameras of field `options.index`, one for each image of a day, in the order of the images.
     pub fn cameras(&self, options: &Options) -> Result<Vec<CameraRecord>> {
-        self.ask(options, |asked| Ok(asked.drawn.captures.iter().map(|capture| capture.camera.record()).collect()))
+        self.query(options, |asked| Ok(asked.drawn.captures.iter().map(|capture| capture.camera.record()).collect()))
     }
 
     /// Answers a query about a field without building it.
-    pub(super) fn ask<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
+    pub(super) fn query<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let mut library = held().clone();
         let desc = super::scanner::grown(&self.desc, options.scan.as_ref());

@@ -2,14 +2,14 @@
 
 use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
-use super::earth::{BakedGrounds, Bed, Earth, Soil};
-use super::ground_view::{Onlooker, from_view};
-use super::populate::{self, Stocked};
-use super::preview::Under;
+use super::earth::{BakedGrounds, BareGround, GroundAndStones, Soil};
+use super::ground_view::{Viewpoint, from_view};
+use super::populate::{self, PlantsAndModels};
+use super::preview::CoverInputs;
 use super::terrain::{GROUND_MARGIN, tilted_to};
-use super::view::Sight;
 use super::view::View;
-use super::{sow, unlikely, view};
+use super::view::VisibleGround;
+use super::{plausibility, sow, view};
 use crate::PartKind;
 use crate::desc::Detail;
 use crate::layer::Layer;
@@ -64,8 +64,8 @@ pub(super) fn cultivate(
     library: &mut Library,
     warnings: &mut Vec<String>,
     desc: &SoilDesc,
-    sight: &Sight,
-) -> Result<(Stocked, SoilRecord)> {
+    sight: &VisibleGround,
+) -> Result<(PlantsAndModels, SoilRecord)> {
     let soil = soil(drawn, library, desc, sight.view)?;
     let options = drawn.options;
     let preview = options.preview.as_ref();
@@ -79,12 +79,12 @@ pub(super) fn cultivate(
     let ground = earth.ground.clone();
     let floor = Floor { ground: &ground, maps: &soil.maps, flat: desc.flat };
     let record = soil_record(drawn, desc, &ground);
-    warnings.extend(unlikely::burial(drawn, floor));
-    let seen = in_view(&soil.onlookers, ground.area(), |p| floor.height(p.x, p.y));
+    warnings.extend(plausibility::burial(drawn, floor));
+    let seen = in_view(&soil.viewpoints, ground.area(), |p| floor.height(p.x, p.y));
     // Baking takes about as long as everything else, and the two are independent.
     let (baked, rest) = rayon::join(
         || match &known {
-            _ if options.unlit || options.told_only => None,
+            _ if options.unlit || options.records_only => None,
             Some(bed) => Some(bed.baked.clone()),
             None => Some(Arc::new(bake(&ground, &soil))),
         },
@@ -94,8 +94,8 @@ pub(super) fn cultivate(
             // Plants first: they push the clods aside, not the other way round.
             let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
             let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
-            let same = known.clone().and_then(|bed| preview?.laid(&Under { bed, plants: meshes() }));
-            let uncovered = same.is_some() || options.told_only;
+            let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));
+            let uncovered = same.is_some() || options.records_only;
             let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
             Ok::<_, Error>((stocked, same, cover))
         },
@@ -104,9 +104,9 @@ pub(super) fn cultivate(
     drawn.options.wanted()?;
     let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
     if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
-        let bed = known.unwrap_or_else(|| Arc::new(Bed { soil, earth, baked }));
+        let bed = known.unwrap_or_else(|| Arc::new(BareGround { soil, earth, baked }));
         let plants = stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
-        preview.keep_ground(Under { bed, plants }, &laid);
+        preview.keep_ground(CoverInputs { bed, plants }, &laid);
     }
     stocked.parts.lay_below(&laid);
     Ok((stocked, record))
@@ -121,8 +121,8 @@ pub(super) fn soil(drawn: &Drawn<'_>, library: &mut Library, desc: &SoilDesc, vi
     let mut read = |file: &str| library.soil_spectrum(drawn.page, file);
     let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
     let (site, texel, of) = (site(drawn, view), texel(drawn, view), (drawn.seed, drawn.index));
-    let (desc, onlookers) = (weathered(drawn, desc), view::onlookers(drawn, view));
-    Ok(Soil { desc, detail: drawn.desc.detail, colors, maps, site, texel, onlookers, of })
+    let (desc, viewpoints) = (weathered(drawn, desc), view::viewpoints(drawn, view));
+    Ok(Soil { desc, detail: drawn.desc.detail, colors, maps, site, texel, viewpoints, of })
 }
 
 /// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
@@ -137,13 +137,13 @@ fn weathered(drawn: &Drawn<'_>, desc: &SoilDesc) -> SoilDesc {
 }
 
 /// Builds the surface and the stones, which must exist before plants are placed.
-fn break_ground(drawn: &Drawn<'_>, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<Earth> {
+fn break_ground(drawn: &Drawn<'_>, Soil { desc, colors, maps, site, .. }: &Soil) -> Result<GroundAndStones> {
     let ground = Ground::new(desc, colors, maps, site, &drawn.stream(Purpose::Soil, 0))
         .map_err(|e| drawn.page.blame(&[Step::Field("soil")], e))?;
     drawn.options.wanted()?;
     let mut pile = Pile::new(&ground).until(drawn.options.stop.as_ref());
     let stones = soil::stones(&desc.stones, &ground, &mut pile, &drawn.stream(Purpose::Debris, STONES));
-    Ok(Earth { ground: Arc::new(ground), pile, stones })
+    Ok(GroundAndStones { ground: Arc::new(ground), pile, stones })
 }
 
 /// Returns the area of ground to be built, and its resolution.
@@ -196,7 +196,7 @@ pub(super) fn expected_soil(drawn: &Drawn<'_>, desc: &SoilDesc, view: View) -> (
     let streams = [(Purpose::Soil, 0), (Purpose::Debris, STONES), (Purpose::Debris, LITTER)];
     let streams = streams.map(|(purpose, index)| drawn.stream(purpose, index));
     let site = site(drawn, view);
-    let seen = in_view(&view::onlookers(drawn, view), site.area, |_| 0.0);
+    let seen = in_view(&view::viewpoints(drawn, view), site.area, |_| 0.0);
     soil::expected(desc, &site, texel(drawn, view), &seen, streams.each_ref())
 }
 
@@ -210,7 +210,7 @@ fn cover(
     drawn: &Drawn<'_>,
     above: &Contents,
     desc: &SoilDesc,
-    Earth { ground, pile, stones: debris }: &mut Earth,
+    GroundAndStones { ground, pile, stones: debris }: &mut GroundAndStones,
     seen: &InView,
 ) -> Vec<Clods> {
     let mut canopy = Canopy::none(ground);
@@ -241,12 +241,12 @@ fn beyond(view: View) -> f32 {
 }
 
 /// Returns the part of the ground in view of the onlookers; all of it if there are none. `height` gives the ground's height.
-fn in_view(onlookers: &[Onlooker], area: Rect, height: impl Fn(Vec2) -> f32 + Sync) -> InView {
-    if onlookers.is_empty() {
+fn in_view(viewpoints: &[Viewpoint], area: Rect, height: impl Fn(Vec2) -> f32 + Sync) -> InView {
+    if viewpoints.is_empty() {
         return InView::ALL;
     }
-    let run = onlookers.iter().map(Onlooker::run).fold(0.0, f32::max);
-    InView::of(area, run, height, |p| from_view(onlookers, p))
+    let run = viewpoints.iter().map(Viewpoint::run).fold(0.0, f32::max);
+    InView::of(area, run, height, |p| from_view(viewpoints, p))
 }
 
 /// Bakes the textures of the ground and its clods. Each texel averages the layers' colours over its area, unless `detail` is full.

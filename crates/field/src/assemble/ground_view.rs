@@ -69,7 +69,7 @@ impl GroundView {
 
 /// A camera position and the ground in its image.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Onlooker {
+pub(super) struct Viewpoint {
     eye: Vec3,
     /// Distance that the camera travels during the exposure, metres.
     travel: f32,
@@ -78,7 +78,7 @@ pub(super) struct Onlooker {
     corners: [Vec2; 2],
 }
 
-impl Onlooker {
+impl Viewpoint {
     /// Creates the onlooker of a camera; `None` if the camera sees the horizon.
     pub(super) fn of(camera: &Camera) -> Option<Self> {
         let sees = GroundView::around(camera.outline(0.0, ALONG_SIDE)?);
@@ -122,8 +122,8 @@ impl Onlooker {
 }
 
 /// Returns the distance of a ground point from the nearest view of any onlooker, metres; 0 if the point is in view.
-pub(super) fn from_view(onlookers: &[Onlooker], at: Vec3) -> f32 {
-    onlookers.iter().fold(f32::INFINITY, |nearest, onlooker| onlooker.nearer(at, nearest))
+pub(super) fn from_view(viewpoints: &[Viewpoint], at: Vec3) -> f32 {
+    viewpoints.iter().fold(f32::INFINITY, |nearest, viewpoint| viewpoint.nearer(at, nearest))
 }
 
 #[cfg(test)]
@@ -160,7 +160,7 @@ mod tests {
                 "Pinhole(size: (64, 48), intrinsics: Pixels(fx: 32, fy: 32, cx: 32, cy: 24), pose: Nadir(height_m: 2, at_m: {at}))"
             );
             let desc: CameraDesc = RonFile::of(text.as_str()).parse().unwrap();
-            Onlooker::of(&desc.build(&mut Stream::of(1, 0, Purpose::Test, 0)).unwrap()).unwrap()
+            Viewpoint::of(&desc.build(&mut Stream::of(1, 0, Purpose::Test, 0)).unwrap()).unwrap()
         };
         let one = [camera("(10, 0)")];
         for (at, distance) in [

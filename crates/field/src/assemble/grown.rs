@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// A grown organ, in world space or, for a bank plant, in plant space.
 #[derive(Clone)]
-pub(super) struct Grown {
+pub(super) struct GrownOrgan {
     pub(super) part: Part,
     pub(super) kind: OrganKind,
     /// Name of its material in the species file.
@@ -22,7 +22,7 @@ pub(super) struct Grown {
     pub(super) own: bool,
 }
 
-impl Grown {
+impl GrownOrgan {
     /// Returns the colour factor (R, G, B) that results from multiplying the chlorophyll content by `factor`.
     pub(super) fn tint(&self, factor: f32) -> Vec3 {
         self.material.chlorophyll_tint(self.chlorophyll, self.chlorophyll * factor)

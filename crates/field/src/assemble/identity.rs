@@ -53,7 +53,7 @@ mod tests {
 
     /// Rationale: 32-bit hashes collide. Expected: 101 equal hashes get distinct identities; the first keeps its hash.
     #[test]
-    fn equal_hashes_are_told_apart() {
+    fn equal_hashes_get_different_identities() {
         let mut taken = BTreeSet::new();
         let first = of(7, 0, 1, 42);
         assert_eq!(alone(first, &mut taken), first);

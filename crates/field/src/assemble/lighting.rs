@@ -19,7 +19,7 @@ pub struct Lighting {
 }
 
 /// A light of the field and its path in the scene file.
-pub(super) struct Listed<'a> {
+pub(super) struct SceneLight<'a> {
     pub(super) desc: &'a LightDesc,
     pub(super) at: Vec<Step<'static>>,
 }
@@ -31,12 +31,12 @@ impl Lighting {
         page: &RonFile,
         lights: &'a [LightDesc],
         stream: impl Fn(usize) -> Stream,
-    ) -> Result<(Vec<Self>, Vec<Listed<'a>>)> {
+    ) -> Result<(Vec<Self>, Vec<SceneLight<'a>>)> {
         let (mut all, mut listed) = (Vec::new(), Vec::new());
         for (place, desc) in lights.iter().enumerate() {
             let at = vec![Step::Field("lights"), Step::Item(place)];
             let LightDesc::OneOf(lists) = desc else {
-                listed.push(Listed { desc, at });
+                listed.push(SceneLight { desc, at });
                 continue;
             };
             let at = [at, vec![Step::Item(0)]].concat();
@@ -44,7 +44,7 @@ impl Lighting {
             let drawn = stream(place).index(lists.len());
             all.push(Self { place, drawn, of: lists.len() });
             let inner = |k| [&at[..], &[Step::Item(drawn), Step::Item(k)]].concat();
-            listed.extend(lists[drawn].iter().enumerate().map(|(k, desc)| Listed { desc, at: inner(k) }));
+            listed.extend(lists[drawn].iter().enumerate().map(|(k, desc)| SceneLight { desc, at: inner(k) }));
         }
         Ok((all, listed))
     }

@@ -9,6 +9,7 @@ mod earth;
 mod estimate;
 mod expected;
 mod field;
+mod field_day;
 mod ground;
 mod ground_view;
 mod grown;
@@ -19,6 +20,7 @@ mod lighting;
 mod member;
 mod models;
 mod options;
+mod plausibility;
 mod populate;
 mod preview;
 mod progress;
@@ -30,14 +32,12 @@ mod seedling;
 mod sow;
 mod stand;
 mod terrain;
-mod today;
-mod unlikely;
 mod view;
 
 use super::desc::FieldDesc;
 use super::estimate::Estimate;
-pub use super::growing::Growing;
 use super::library::Library;
+pub use super::scene_edit::SceneEdit;
 use contents::Contents;
 use drawn::Drawn;
 use expected::Asked;
@@ -49,7 +49,7 @@ use furrow_base::sampling::Purpose;
 use furrow_render::scene::Scene;
 pub use lighting::Lighting;
 pub use options::{Options, Scanner};
-use populate::Stocked;
+use populate::PlantsAndModels;
 pub use preview::Preview;
 pub use progress::BuildProgress;
 pub use progress::Stage;
@@ -118,7 +118,7 @@ impl Source {
 
     /// Applies an experiment's changes to the descriptions of field and species.
     #[must_use]
-    pub fn growing(mut self, growing: Growing) -> Self {
+    pub fn growing(mut self, growing: SceneEdit) -> Self {
         if let Some(change) = growing.page {
             change(&mut self.desc);
         }
@@ -150,7 +150,7 @@ impl Source {
 
     /// Estimates memory and time of field `options.index` without building it.
     pub fn estimate(&self, options: &Options) -> Result<Estimate> {
-        self.ask(options, |Asked { drawn, library, warnings }| {
+        self.query(options, |Asked { drawn, library, warnings }| {
             let sight = view::sight(drawn, warnings)?;
             estimate::estimate(drawn, library, &sight)
         })
@@ -164,9 +164,9 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     let sight = view::sight(&drawn, &mut warnings)?;
     let estimate = estimate::estimate(&drawn, library, &sight)?;
     estimate.check(drawn.memory()).map_err(|(at, error)| page.blame(&at, error))?;
-    warnings.extend(unlikely::camera(&drawn));
-    warnings.extend(unlikely::plants(&drawn, library)?);
-    let (Stocked { parts, mut plants }, soil) = match &desc.soil {
+    warnings.extend(plausibility::camera(&drawn));
+    warnings.extend(plausibility::plants(&drawn, library)?);
+    let (PlantsAndModels { parts, mut plants }, soil) = match &desc.soil {
         None => {
             let (seedlings, _) = sow::seedlings(&drawn, library, &sight, &[])?;
             (populate::populate(&drawn, library, &seedlings, None, &sight)?, None)
@@ -179,7 +179,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     };
     let (species, models) = (known::species(&drawn, library)?, known::model_names(&drawn)?);
     known::number_kinds(&mut plants, &species);
-    warnings.extend(unlikely::view(&drawn, &plants, drawn.shown(&sight)));
+    warnings.extend(plausibility::view(&drawn, &plants, drawn.shown(&sight)));
     let conditions = Conditions {
         camera: drawn.camera.record(),
         sensor: desc.sensor.build(&mut drawn.stream(Purpose::Sensor, 0)).record(),

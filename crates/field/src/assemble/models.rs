@@ -4,7 +4,7 @@ use super::contents::Contents;
 use super::drawn::{Drawn, FARTHEST, Floor};
 use super::identity;
 use super::known;
-use super::preview::Stood;
+use super::preview::PlacedModel;
 use crate::desc::ModelDesc;
 use crate::library::Library;
 use crate::{PartKind, PlantRecord};
@@ -14,7 +14,7 @@ use furrow_base::ron_file::{Num, Step};
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
 use furrow_grow::model::{self, Label, Model};
-use furrow_render::material::{Material, Painted, Repaint};
+use furrow_render::material::{Material, ModelSurface, SurfaceOverride};
 use furrow_render::scene::Part;
 use furrow_render::scene::tag::{Class, MOST_PLANTS, Tag};
 use std::collections::{BTreeMap, BTreeSet};
@@ -62,15 +62,15 @@ fn place(
     let turn = desc.turn_deg.draw32(&mut stream).to_radians();
     let scale = desc.scale.draw32(&mut stream);
     let foot = Vec3::new(x, y, floor.map_or(0.0, |f| f.height(x, y)) + desc.lift_m.draw32(&mut stream));
-    let repaint = Repaint {
+    let repaint = SurfaceOverride {
         roughness: desc.roughness.map(Num::f32),
         transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
         nir: desc.nir.map(Num::f32),
     };
     let materials: Vec<u32> =
-        model.surfaces.iter().map(|s| all.material(Material::Painted(Painted::new(s, &repaint)))).collect();
+        model.surfaces.iter().map(|s| all.material(Material::ModelSurface(ModelSurface::new(s, &repaint)))).collect();
     let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    let meshes = meshes(drawn, k, &Stood { model: model.clone(), turn, scale, foot });
+    let meshes = meshes(drawn, k, &PlacedModel { model: model.clone(), turn, scale, foot });
     for (part, mesh) in model.parts.iter().zip(meshes) {
         let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
             let words = format!("label maps can number {MOST_PLANTS} plants, and this model exceeds that");
@@ -101,13 +101,13 @@ fn place(
 }
 
 /// Returns the meshes of a model's parts in world space.
-fn meshes(drawn: &Drawn<'_>, k: usize, stood: &Stood) -> Vec<Arc<Mesh>> {
+fn meshes(drawn: &Drawn<'_>, k: usize, stood: &PlacedModel) -> Vec<Arc<Mesh>> {
     let preview = drawn.options.preview.as_ref();
     if let Some(known) = preview.and_then(|preview| preview.model(k, stood)) {
         return known;
     }
-    let Stood { model, turn, scale, foot } = stood;
-    let put = |part: &model::Part| {
+    let PlacedModel { model, turn, scale, foot } = stood;
+    let put = |part: &model::ModelPart| {
         let mut mesh = part.mesh.clone();
         // Skip the identity transform, so that the vertices stay bit-identical.
         if *turn != 0.0 || *scale != 1.0 || *foot != Vec3::ZERO {

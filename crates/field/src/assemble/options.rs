@@ -34,7 +34,7 @@ pub struct Options {
     pub unlit: bool,
     /// Whether only the field's records are needed: hash, files, warnings, species, plants and conditions. The ground's textures are not
     /// baked, and clods and litter are left out.
-    pub told_only: bool,
+    pub records_only: bool,
     /// Whether leaves and stems keep their bending joints ([`LeafAxis::rig`](furrow_grow::plant::LeafAxis::rig),
     /// [`PlantRecord::rig`](crate::PlantRecord::rig)) and the skinning weights of their vertices.
     pub rigged: bool,

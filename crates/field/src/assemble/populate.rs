@@ -4,14 +4,14 @@ use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
 use super::progress::Stage;
 use super::seedling::Seedling;
-use super::view::Sight;
+use super::view::VisibleGround;
 use super::{identity, models, stand};
 use crate::PlantRecord;
 use crate::library::Library;
 use furrow_base::Result;
 
 /// Plants and models as scene parts, and the records of those that are plants.
-pub(super) struct Stocked {
+pub(super) struct PlantsAndModels {
     pub(super) parts: Contents,
     pub(super) plants: Vec<PlantRecord>,
 }
@@ -22,8 +22,8 @@ pub(super) fn populate(
     library: &mut Library,
     seedlings: &[Seedling],
     floor: Option<Floor<'_>>,
-    sight: &Sight,
-) -> Result<Stocked> {
+    sight: &VisibleGround,
+) -> Result<PlantsAndModels> {
     let mut parts = Contents::default();
     let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, drawn.shown(sight))?;
     plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), floor)?);
@@ -31,5 +31,5 @@ pub(super) fn populate(
     if floor.is_some() {
         drawn.options.progress.enter(Stage::Cover);
     }
-    Ok(Stocked { parts, plants })
+    Ok(PlantsAndModels { parts, plants })
 }

@@ -3,15 +3,15 @@
 //! A cached result is used only if all its inputs are equal, so a preview equals the field that a build without a cache would give.
 
 use super::contents::Contents;
-use super::earth::{Bed, Soil};
-use super::grown::Grown;
-use super::seedling::{Place, Seedling};
+use super::earth::{BareGround, Soil};
+use super::grown::GrownOrgan;
+use super::seedling::{PlantSite, Seedling};
 use crate::PlantRecord;
 use furrow_base::Result;
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::Vec3;
 use furrow_grow::model::Model;
-use furrow_render::accel::{Before, EmbreeAccel};
+use furrow_render::accel::{EmbreeAccel, PreviousBuild};
 use furrow_render::scene::Part;
 use std::collections::HashMap;
 use std::fmt;
@@ -20,32 +20,32 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Cache of the last field, for successive previews of a scene file that is being edited.
 #[derive(Clone, Default)]
 pub struct Preview {
-    kept: Arc<Mutex<Kept>>,
+    kept: Arc<Mutex<CacheEntries>>,
 }
 
 #[derive(Default)]
-struct Kept {
-    plants: HashMap<u32, Arc<Standing>>,
-    counted: HashMap<u32, Counted>,
+struct CacheEntries {
+    plants: HashMap<u32, Arc<CachedPlant>>,
+    counted: HashMap<u32, CountedPlant>,
     /// Meshes of models, by their index in the scene file.
-    models: HashMap<usize, (Stood, Vec<Arc<Mesh>>)>,
-    bed: Option<Arc<Bed>>,
-    laid: Option<(Under, Arc<Contents>)>,
+    models: HashMap<usize, (PlacedModel, Vec<Arc<Mesh>>)>,
+    bed: Option<Arc<BareGround>>,
+    laid: Option<(CoverInputs, Arc<Contents>)>,
     built: Option<(Vec<Shape>, Arc<EmbreeAccel>)>,
 }
 
 /// A grown plant and its inputs.
-pub(super) struct Standing {
+pub(super) struct CachedPlant {
     pub(super) seedling: Seedling,
-    pub(super) place: Place,
+    pub(super) place: PlantSite,
     pub(super) record: PlantRecord,
     /// `None` if the plant has not emerged, or neither it nor its shadow reaches the view.
-    pub(super) organs: Option<Vec<Grown>>,
+    pub(super) organs: Option<Vec<GrownOrgan>>,
 }
 
 /// Numbers of triangles and organs of a plant that was grown to count them, and its inputs.
 #[derive(Clone)]
-pub(super) struct Counted {
+pub(super) struct CountedPlant {
     pub(super) seedling: Seedling,
     pub(super) cell: f32,
     pub(super) size: (f64, f64),
@@ -53,7 +53,7 @@ pub(super) struct Counted {
 
 /// A placed model: the inputs of its meshes.
 #[derive(Clone)]
-pub(super) struct Stood {
+pub(super) struct PlacedModel {
     pub(super) model: Arc<Model>,
     /// Rotation, clockwise when seen from above, radians.
     pub(super) turn: f32,
@@ -61,7 +61,7 @@ pub(super) struct Stood {
     pub(super) foot: Vec3,
 }
 
-impl Stood {
+impl PlacedModel {
     fn same(&self, other: &Self) -> bool {
         let place = |s: &Self| (s.turn, s.scale, s.foot);
         Arc::ptr_eq(&self.model, &other.model) && place(self) == place(other)
@@ -70,12 +70,12 @@ impl Stood {
 
 /// Inputs of the ground's cover: the ground and the plants above it.
 #[derive(Clone)]
-pub(super) struct Under {
-    pub(super) bed: Arc<Bed>,
+pub(super) struct CoverInputs {
+    pub(super) bed: Arc<BareGround>,
     pub(super) plants: Vec<Arc<Mesh>>,
 }
 
-impl Under {
+impl CoverInputs {
     fn same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.bed, &other.bed) && same(&self.plants, &other.plants, Arc::ptr_eq)
     }
@@ -99,18 +99,18 @@ impl fmt::Debug for Preview {
 }
 
 impl Preview {
-    fn lock(&self) -> MutexGuard<'_, Kept> {
+    fn lock(&self) -> MutexGuard<'_, CacheEntries> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns the cached plant, if it was grown from an equal seedling at an equal place.
-    pub(super) fn plant(&self, seedling: &Seedling, place: &Place) -> Option<Arc<Standing>> {
+    pub(super) fn plant(&self, seedling: &Seedling, place: &PlantSite) -> Option<Arc<CachedPlant>> {
         let known = self.lock().plants.get(&seedling.id).cloned();
         known.filter(|known| known.place == *place && known.seedling == *seedling)
     }
 
     /// Replaces the cached plants.
-    pub(super) fn keep_plants(&self, plants: &[Arc<Standing>]) {
+    pub(super) fn keep_plants(&self, plants: &[Arc<CachedPlant>]) {
         self.lock().plants = plants.iter().map(|plant| (plant.seedling.id, plant.clone())).collect();
     }
 
@@ -121,32 +121,32 @@ impl Preview {
     }
 
     /// Replaces the cached numbers.
-    pub(super) fn keep_counted(&self, counted: Vec<Counted>) {
+    pub(super) fn keep_counted(&self, counted: Vec<CountedPlant>) {
         self.lock().counted = counted.into_iter().map(|counted| (counted.seedling.id, counted)).collect();
     }
 
     /// Returns the cached meshes of model `k` of the scene file, if it was placed in the same way.
-    pub(super) fn model(&self, k: usize, stood: &Stood) -> Option<Vec<Arc<Mesh>>> {
+    pub(super) fn model(&self, k: usize, stood: &PlacedModel) -> Option<Vec<Arc<Mesh>>> {
         self.lock().models.get(&k).filter(|(known, _)| known.same(stood)).map(|(_, meshes)| meshes.clone())
     }
 
     /// Replaces the cached meshes of model `k`.
-    pub(super) fn keep_model(&self, k: usize, stood: &Stood, meshes: &[Arc<Mesh>]) {
+    pub(super) fn keep_model(&self, k: usize, stood: &PlacedModel, meshes: &[Arc<Mesh>]) {
         self.lock().models.insert(k, (stood.clone(), meshes.to_vec()));
     }
 
     /// Returns the cached ground, if it was built from an equal soil.
-    pub(super) fn bed(&self, soil: &Soil) -> Option<Arc<Bed>> {
+    pub(super) fn bed(&self, soil: &Soil) -> Option<Arc<BareGround>> {
         self.lock().bed.clone().filter(|bed| bed.soil == *soil)
     }
 
     /// Returns the cached ground parts and cover, if the ground and the plants are the same.
-    pub(super) fn laid(&self, under: &Under) -> Option<Arc<Contents>> {
+    pub(super) fn laid(&self, under: &CoverInputs) -> Option<Arc<Contents>> {
         self.lock().laid.as_ref().filter(|(known, _)| known.same(under)).map(|(_, laid)| laid.clone())
     }
 
     /// Replaces the cached ground and its cover.
-    pub(super) fn keep_ground(&self, under: Under, laid: &Arc<Contents>) {
+    pub(super) fn keep_ground(&self, under: CoverInputs, laid: &Arc<Contents>) {
         let mut kept = self.lock();
         kept.bed = Some(under.bed.clone());
         kept.laid = Some((under, laid.clone()));
@@ -157,7 +157,7 @@ impl Preview {
     pub fn geometry(
         &self,
         parts: &[Part],
-        build: impl FnOnce(Option<&Before<'_>>) -> Result<EmbreeAccel>,
+        build: impl FnOnce(Option<&PreviousBuild<'_>>) -> Result<EmbreeAccel>,
     ) -> Result<Arc<EmbreeAccel>> {
         let of: Vec<Shape> = parts.iter().map(shape).collect();
         let address = |(mesh, mask): &Shape| (Arc::as_ptr(mesh), mask.as_ref().map(Arc::as_ptr));
@@ -169,7 +169,7 @@ impl Preview {
         }
         let places: HashMap<_, usize> = known.iter().enumerate().map(|(i, shape)| (address(shape), i)).collect();
         let places: Vec<Option<usize>> = of.iter().map(|shape| places.get(&address(shape)).copied()).collect();
-        let built = build(Some(&Before { accel: &built, places: &places }))?;
+        let built = build(Some(&PreviousBuild { accel: &built, places: &places }))?;
         Ok(self.keep_built(of, built))
     }
 

@@ -1,7 +1,7 @@
 //! Cameras of a field, and the images that they take on a drive.
 
 use crate::desc::FieldDesc;
-use crate::drive::{self, Around, Capture, FIRST, PathDesc};
+use crate::drive::{self, Capture, DriveInputs, FIRST, PathDesc};
 use crate::library::Library;
 use furrow_base::math::Vec3;
 use furrow_base::ron_file::{RonFile, Step};
@@ -100,7 +100,7 @@ pub(super) fn captures(
         let help = format!("at most {MOST_CAPTURES} images; drive through several fields");
         return Err(page.blame(&[Step::Field("drive"), Step::Field("frames")], Error::input(words).help(help)));
     }
-    let mut around = Around::default();
+    let mut around = DriveInputs::default();
     if let Some(k) = sown.into_iter().next() {
         around.rows = Some(Rows::draw(&desc.crops[k].rows, &stream(Purpose::Scatter, k as u64)).azimuth);
     }

@@ -3,8 +3,8 @@
 use super::drawn::{Drawn, FARTHEST, PLANT_MARGIN};
 use super::ground_view::GroundView;
 use super::options::Scanner;
-use super::terrain::{Look, Reach, Seen};
-use super::view::{LONGEST_REACH, Sight, View, meets};
+use super::terrain::{Seen, ViewLimits, ViewRay};
+use super::view::{LONGEST_REACH, View, VisibleGround, meets};
 use super::{ground, view};
 use crate::desc::Detail;
 use crate::desc::FieldDesc;
@@ -78,7 +78,7 @@ pub(super) fn at_frames(
 /// Returns the minimum spacing of LiDAR rays on the ground, metres; `None` if the field is not scanned.
 pub(super) fn scanned_ground(drawn: &Drawn<'_>) -> Option<f32> {
     let least = |lidar: &Lidar| {
-        let far = looks(lidar).filter_map(|(origin, direction)| slant(origin, direction));
+        let far = view_rays(lidar).filter_map(|(origin, direction)| slant(origin, direction));
         lidar.spacing(far.fold(f32::INFINITY, f32::min).min(lidar.range[1]).max(lidar.range[0]))
     };
     drawn.scanners.iter().map(least).reduce(f32::min)
@@ -94,11 +94,11 @@ pub(super) fn scanned_at(drawn: &Drawn<'_>, at: Vec2) -> Option<f32> {
 }
 
 /// Returns the ground that the LiDAR sees in all frames. Adds a warning if some of it is not planted.
-pub(super) fn scanned(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<Sight> {
+pub(super) fn scanned(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<VisibleGround> {
     let reach = view::reach(drawn)?;
     let mut each = Vec::new();
     let mut whole: Option<View> = None;
-    let mut bare = Bare::default();
+    let mut bare = PulseCounts::default();
     for lidar in &drawn.scanners {
         let view = view_of_lidar(drawn, lidar, reach, &mut bare, &mut each);
         whole = Some(whole.map_or(view, |before| before.join(view)));
@@ -111,13 +111,19 @@ pub(super) fn scanned(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<S
         return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
     }
     warnings.extend(bare.warning(reach));
-    Ok(Sight { view: whole, each })
+    Ok(VisibleGround { view: whole, each })
 }
 
-fn view_of_lidar(drawn: &Drawn<'_>, lidar: &Lidar, reach: f32, bare: &mut Bare, each: &mut Vec<GroundView>) -> View {
+fn view_of_lidar(
+    drawn: &Drawn<'_>,
+    lidar: &Lidar,
+    reach: f32,
+    bare: &mut PulseCounts,
+    each: &mut Vec<GroundView>,
+) -> View {
     let below = lidar.position.truncate();
     let mut seen = vec![below];
-    for (origin, direction) in looks(lidar) {
+    for (origin, direction) in view_rays(lidar) {
         let ahead = direction.truncate();
         // The ray ends at the ground, at the maximum range, or at the reach.
         let ground = meets(origin, direction).map_or(f32::INFINITY, |at| at.distance(below));
@@ -127,10 +133,10 @@ fn view_of_lidar(drawn: &Drawn<'_>, lidar: &Lidar, reach: f32, bare: &mut Bare, 
     }
     let (lo, hi) = seen.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
     let area = Rect::new(lo.x, lo.y, hi.x, hi.y);
-    let near = view::nearest(drawn, looks(lidar), area);
-    let down = looks(lidar).filter(|(_, direction)| direction.z < 0.0);
-    let down: Vec<Look> = down.map(|(_, direction)| (lidar.position, direction)).collect();
-    let far = Reach { field_m: reach, ray_m: lidar.range[1], travel_m: 0.0 };
+    let near = view::nearest(drawn, view_rays(lidar), area);
+    let down = view_rays(lidar).filter(|(_, direction)| direction.z < 0.0);
+    let down: Vec<ViewRay> = down.map(|(_, direction)| (lidar.position, direction)).collect();
+    let far = ViewLimits { field_m: reach, ray_m: lidar.range[1], travel_m: 0.0 };
     let Seen { area, near, met, .. } = Seen::of(ground::envelope(drawn), area, near, &down, &far);
     each.push(GroundView::around(seen.into_iter().chain(met)));
     let open = bare.count(lidar, area.grown(1e-3));
@@ -138,7 +144,7 @@ fn view_of_lidar(drawn: &Drawn<'_>, lidar: &Lidar, reach: f32, bare: &mut Bare, 
 }
 
 /// Returns origin and direction of the pulses of all beams, for columns that are evenly spaced over the turn.
-fn looks(lidar: &Lidar) -> impl Iterator<Item = Look> {
+fn view_rays(lidar: &Lidar) -> impl Iterator<Item = ViewRay> {
     let columns = lidar.columns();
     let some = columns.min(LOOKED_AT);
     let column = move |k: u32| (u64::from(k) * u64::from(columns - 1) / u64::from((some - 1).max(1))) as u32;
@@ -155,17 +161,17 @@ fn slant(origin: Vec3, direction: Vec3) -> Option<f32> {
 
 /// Numbers of pulses that meet the ground within range, and of those that meet it beyond the planted area.
 #[derive(Default)]
-struct Bare {
+struct PulseCounts {
     ground: f32,
     beyond: f32,
     farthest: f32,
 }
 
-impl Bare {
+impl PulseCounts {
     /// Counts the pulses of a LiDAR. Returns `true` if any of them meets the ground outside `area`.
     fn count(&mut self, lidar: &Lidar, area: Rect) -> bool {
         let before = self.beyond;
-        for (origin, direction) in looks(lidar) {
+        for (origin, direction) in view_rays(lidar) {
             let (Some(at), Some(range)) = (meets(origin, direction), slant(origin, direction)) else { continue };
             if range > lidar.range[1] {
                 continue;

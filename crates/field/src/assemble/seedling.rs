@@ -1,10 +1,10 @@
 //! A plant to be grown, and its growth at its position.
 
-use super::condition::{Ailing, Bare};
-use super::grown::Grown;
+use super::condition::{HealthyOrgan, PlantCondition};
+use super::field_day::{FieldDay, emerging};
+use super::grown::GrownOrgan;
 use super::individual::Individual;
 use super::member::Member;
-use super::today::{Today, emerging};
 use crate::PlantRecord;
 use crate::desc::{Growth, SpeciesDesc};
 use crate::library::Species;
@@ -32,7 +32,7 @@ pub(super) struct Seedling {
     /// Index that the field has drawn for all `Either` lists of growths.
     pub(super) season: usize,
     /// Day of the field; `None` if it has no days.
-    pub(super) today: Option<Today>,
+    pub(super) today: Option<FieldDay>,
     pub(super) position: Vec2,
     pub(super) turn: f32,
     pub(super) only_leaf: Option<u16>,
@@ -58,7 +58,7 @@ impl Seedling {
 
 /// Site of a plant and resolution of its mesh: together with the [`Seedling`] it determines shape and materials.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct PlantSite {
     /// Height of the plant's foot, metres.
     pub(super) height: f32,
     /// Normal of the ground around the plant.
@@ -75,10 +75,10 @@ pub(super) struct Place {
 /// has not emerged or if `wanted` returns `false`.
 pub(super) fn grow(
     s: &Seedling,
-    place: &Place,
+    place: &PlantSite,
     wanted: impl FnOnce(&PlantRecord) -> bool,
-) -> (PlantRecord, Option<Vec<Grown>>) {
-    let Place { height: z, normal, dust, cell, rigged } = *place;
+) -> (PlantRecord, Option<Vec<GrownOrgan>>) {
+    let PlantSite { height: z, normal, dust, cell, rigged } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let (drawn, green) = begun(s, &mut stream);
@@ -87,7 +87,7 @@ pub(super) fn grow(
     let Some(stage) = s.individual.as_ref().map_or(drawn, |individual| stage(s, &mut individual.age())) else {
         return (unborn(s, normal, z), None);
     };
-    let mut ailing = s.condition.as_ref().map(|condition| Ailing::new(condition, shape, dust));
+    let mut ailing = s.condition.as_ref().map(|condition| PlantCondition::new(condition, shape, dust));
     let mut vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
     if let (Some(_), Stage::Age(days)) = (&s.today, stage) {
         if let Some(ailing) = &mut ailing {
@@ -95,7 +95,7 @@ pub(super) fn grow(
         }
         vigour *= emerging(&desc.plant, days);
     }
-    let options = GrowOptions { vigour, condition: ailing.as_ref().map(Ailing::posture), cell, rigged };
+    let options = GrowOptions { vigour, condition: ailing.as_ref().map(PlantCondition::posture), cell, rigged };
     let plant = match &s.individual {
         Some(individual) => individual.plant(desc, stage, &stream, &options),
         None => plant::grow_with(&desc.plant, stage, &stream, &options),
@@ -120,7 +120,7 @@ pub(super) fn grow(
         leaves: plant.organs.iter().map(|o| o.leaf).filter(|leaf| kept(*leaf)).max().unwrap_or(0),
         leaf_axes,
         rig: if kept(0) { plant.rig.iter().map(|joint| joint.moved(to_world)).collect() } else { Vec::new() },
-        condition: ailing.as_ref().map(Ailing::drawn),
+        condition: ailing.as_ref().map(PlantCondition::drawn),
         ..unborn(s, normal, z)
     };
     if !wanted(&record) {
@@ -137,8 +137,9 @@ pub(super) fn grow(
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
         let age = plant.ages.get(&organ.leaf).filter(|_| cut);
         let material = aged(&chosen.material, pigments, age);
-        let bare = Bare { kind: organ.kind, material: &material, choice: chosen, pigments, green, ground: z, last };
-        let grown = Grown {
+        let bare =
+            HealthyOrgan { kind: organ.kind, material: &material, choice: chosen, pigments, green, ground: z, last };
+        let grown = GrownOrgan {
             part: Part {
                 mesh: Arc::new(mesh),
                 mask: if cut { chosen.mask.clone() } else { None },

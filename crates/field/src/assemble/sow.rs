@@ -4,7 +4,7 @@ use super::census::{Census, Members, Population};
 use super::drawn::{Drawn, PLANT_MARGIN};
 use super::individual::Individual;
 use super::seedling::Seedling;
-use super::view::{self, Sight};
+use super::view::{self, VisibleGround};
 use super::{bank, identity};
 use crate::desc::{Detail, Growth};
 use crate::library::{Library, Species};
@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub(super) fn seedlings(
     drawn: &Drawn<'_>,
     library: &mut Library,
-    sight: &Sight,
+    sight: &VisibleGround,
     stones: &[Disc],
 ) -> Result<(Vec<Seedling>, Vec<Members>)> {
     let mut all = Vec::new();

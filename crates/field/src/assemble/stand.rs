@@ -4,11 +4,11 @@ use super::bank;
 use super::bank::Variation;
 use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
-use super::grown::Grown;
+use super::grown::GrownOrgan;
 use super::member::Member;
-use super::preview::Standing;
+use super::preview::CachedPlant;
 use super::progress::Stage;
-use super::seedling::{Place, Seedling, grow};
+use super::seedling::{PlantSite, Seedling, grow};
 use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::Placement;
@@ -28,15 +28,15 @@ use std::sync::Arc;
 const SHADOW: f32 = 2.75;
 
 /// A placed plant.
-enum Stands {
+enum PlacedPlant {
     /// A plant with its own meshes.
-    Own(Arc<Standing>),
+    Own(Arc<CachedPlant>),
     /// An instance of a bank plant.
     Shared(Box<PlantRecord>, Member, Variation),
 }
 
-impl Stands {
-    fn own(&self) -> Option<Arc<Standing>> {
+impl PlacedPlant {
+    fn own(&self) -> Option<Arc<CachedPlant>> {
         match self {
             Self::Own(plant) => Some(plant.clone()),
             Self::Shared(..) => None,
@@ -69,33 +69,33 @@ pub(super) fn plant(
         let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
         if let Some(member) = seedling.member {
             let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
-            return Ok(Stands::Shared(Box::new(record), member, own));
+            return Ok(PlacedPlant::Shared(Box::new(record), member, own));
         }
-        let place = Place { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
+        let place = PlantSite { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
         let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
         let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
-        Ok(Stands::Own(known.unwrap_or_else(|| {
+        Ok(PlacedPlant::Own(known.unwrap_or_else(|| {
             let (record, organs) = grow(seedling, &place, reaches);
-            Arc::new(Standing { seedling: seedling.clone(), place, record, organs })
+            Arc::new(CachedPlant { seedling: seedling.clone(), place, record, organs })
         })))
     };
     let grown = seedlings.par_iter().map(stand).inspect(|_| options.progress.plants.add());
-    let grown: Vec<Stands> = grown.collect::<Result<_>>()?;
+    let grown: Vec<PlacedPlant> = grown.collect::<Result<_>>()?;
     if let Some(preview) = &options.preview {
-        preview.keep_plants(&grown.iter().filter_map(Stands::own).collect::<Vec<_>>());
+        preview.keep_plants(&grown.iter().filter_map(PlacedPlant::own).collect::<Vec<_>>());
     }
     let mut records = Vec::with_capacity(grown.len());
     let mut worn: BTreeMap<Member, Vec<u32>> = BTreeMap::new();
     for (number, stands) in (1..).zip(grown) {
         match stands {
-            Stands::Own(plant) => {
+            PlacedPlant::Own(plant) => {
                 let (true, Some(organs)) = (reaches(&plant.record), &plant.organs) else { continue };
                 let record = PlantRecord { number, ..plant.record.clone() };
                 let materials = dress(drawn, parts, &record, organs)?;
                 put_organs(parts, number, organs, &materials, None);
                 records.push(record);
             }
-            Stands::Shared(record, member, own) => {
+            PlacedPlant::Shared(record, member, own) => {
                 let (true, Some(organs)) = (reaches(&record), &bank[&member].organs) else { continue };
                 let record = PlantRecord { number, ..*record };
                 if let Entry::Vacant(first) = worn.entry(member) {
@@ -110,7 +110,7 @@ pub(super) fn plant(
 }
 
 /// Creates the materials of a plant's organs. Returns the material index of each organ.
-fn dress(drawn: &Drawn<'_>, parts: &mut Contents, record: &PlantRecord, organs: &[Grown]) -> Result<Vec<u32>> {
+fn dress(drawn: &Drawn<'_>, parts: &mut Contents, record: &PlantRecord, organs: &[GrownOrgan]) -> Result<Vec<u32>> {
     // One material per plant and name, because plants differ in chlorophyll. Organs with damage have their own material.
     let mut made: Vec<(&str, usize, u32)> = Vec::new();
     let mut materials = Vec::with_capacity(organs.len());
@@ -137,7 +137,13 @@ fn dress(drawn: &Drawn<'_>, parts: &mut Contents, record: &PlantRecord, organs: 
 }
 
 /// Adds a plant's organs to the scene: meshes in world space, or those of a bank plant with the transform of an instance.
-fn put_organs(parts: &mut Contents, number: u32, organs: &[Grown], materials: &[u32], instance: Option<Variation>) {
+fn put_organs(
+    parts: &mut Contents,
+    number: u32,
+    organs: &[GrownOrgan],
+    materials: &[u32],
+    instance: Option<Variation>,
+) {
     let instance = instance.map(|Variation { at, greener }| (Arc::new(at), greener));
     for (organ, material) in organs.iter().zip(materials) {
         let tag = Tag { plant: number, ..organ.part.tag };

@@ -13,7 +13,7 @@ pub(super) const GROUND_MARGIN: f32 = 0.04;
 const HALVINGS: u32 = 32;
 
 /// Origin and direction of a ray.
-pub(super) type Look = (Vec3, Vec3);
+pub(super) type ViewRay = (Vec3, Vec3);
 
 /// Returns the radius around the world's origin within which the ground is tilted, metres; beyond it is level. It encloses `near`, the
 /// rectangle of uniform cells.
@@ -38,7 +38,7 @@ impl Terrain {
 
     /// Returns the point where a ray meets the surface that is `higher` metres above the one through the world's origin; `None` if it
     /// never does. A ray that starts below the surface meets it at its origin.
-    pub(super) fn meets(&self, (origin, direction): Look, higher: f32) -> Option<Vec2> {
+    pub(super) fn meets(&self, (origin, direction): ViewRay, higher: f32) -> Option<Vec2> {
         if direction.z >= 0.0 {
             return None;
         }
@@ -77,7 +77,7 @@ pub(super) struct Near {
     /// Area on the plane z = 0.
     pub(super) area: Rect,
     /// Rays that end in the area.
-    pub(super) looks: Vec<Look>,
+    pub(super) view_rays: Vec<ViewRay>,
     /// Maximum length of these rays, metres.
     pub(super) ray_m: f32,
 }
@@ -85,7 +85,7 @@ pub(super) struct Near {
 /// Limits of the view of a camera or LiDAR.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::struct_field_names, reason = "lengths carry their unit")]
-pub(super) struct Reach {
+pub(super) struct ViewLimits {
     /// Reach of the planted area to the east, north, west and south, metres.
     pub(super) field_m: f32,
     /// Maximum length of a ray, metres.
@@ -94,10 +94,10 @@ pub(super) struct Reach {
     pub(super) travel_m: f32,
 }
 
-impl Reach {
+impl ViewLimits {
     /// Clips a ray that meets the ground at `at` (or nowhere) to the limits. Returns its end, and whether the end was beyond the planted
     /// area.
-    fn end(&self, (origin, direction): Look, at: Option<Vec2>) -> (Vec2, bool) {
+    fn end(&self, (origin, direction): ViewRay, at: Option<Vec2>) -> (Vec2, bool) {
         let (from, ahead) = (origin.truncate(), direction.truncate());
         let longest = if self.ray_m.is_finite() { self.ray_m * ahead.length() } else { f32::INFINITY };
         let along = ahead.normalize_or_zero();
@@ -122,24 +122,30 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Extends a view from the plane z = 0 to a ground within `envelope`. `area` is the area seen on the plane, `looks` are the rays to
+    /// Extends a view from the plane z = 0 to a ground within `envelope`. `area` is the area seen on the plane, `view_rays` are the rays to
     /// its border. `near` is the part with uniform cells; `None` if that is all of it.
-    pub(super) fn of(envelope: Envelope, area: Rect, near: Option<Near>, looks: &[Look], reach: &Reach) -> Self {
+    pub(super) fn of(
+        envelope: Envelope,
+        area: Rect,
+        near: Option<Near>,
+        view_rays: &[ViewRay],
+        reach: &ViewLimits,
+    ) -> Self {
         let heights = [-envelope.below_m, envelope.above_m];
-        let ends = |terrain: &Terrain, looks: &[Look], reach: &Reach| -> (Vec<Vec2>, Vec<bool>) {
-            let of = |look: &Look| heights.map(|higher| reach.end(*look, terrain.meets(*look, higher)));
-            looks.iter().flat_map(of).unzip()
+        let ends = |terrain: &Terrain, view_rays: &[ViewRay], reach: &ViewLimits| -> (Vec<Vec2>, Vec<bool>) {
+            let of = |look: &ViewRay| heights.map(|higher| reach.end(*look, terrain.meets(*look, higher)));
+            view_rays.iter().flat_map(of).unzip()
         };
         let sloping = Terrain { envelope, level_m: f32::INFINITY };
         let (terrain, fine) = match near {
             None => (sloping, None),
-            Some(Near { area: near, looks, ray_m }) => {
-                let reach = Reach { ray_m: ray_m.min(reach.ray_m), ..*reach };
-                let near = widened(near, &ends(&sloping, &looks, &reach).0, 0.0);
+            Some(Near { area: near, view_rays, ray_m }) => {
+                let reach = ViewLimits { ray_m: ray_m.min(reach.ray_m), ..*reach };
+                let near = widened(near, &ends(&sloping, &view_rays, &reach).0, 0.0);
                 (Terrain { envelope, level_m: tilted_to(near) }, Some(near))
             }
         };
-        let (mut met, farther) = ends(&terrain, looks, reach);
+        let (mut met, farther) = ends(&terrain, view_rays, reach);
         let mut wide = widened(area, &met, reach.travel_m);
         if let Some(near) = fine {
             wide = widened(wide, &near.corners(), 0.0);
@@ -173,7 +179,7 @@ mod tests {
     const SLOPE: Envelope = Envelope { tilt: Vec2::new(0.0, -0.05), below_m: 0.02, above_m: 0.03 };
 
     /// Returns a ray that starts 1 m above the origin and heads north, descending by `sinks` metres per metre.
-    fn look(sinks: f32) -> Look {
+    fn look(sinks: f32) -> ViewRay {
         (vec3(0.0, 0.0, 1.0), vec3(0.0, 1.0, -sinks).normalize())
     }
 
@@ -205,23 +211,23 @@ mod tests {
     #[test]
     fn a_view_is_as_wide_as_the_slope_needs() {
         let area = Rect::new(-1.0, 2.0, 1.0, 10.0);
-        let looks = [look(0.5), look(0.1)];
-        let reach = Reach { field_m: 60.0, ray_m: f32::INFINITY, travel_m: 0.0 };
+        let view_rays = [look(0.5), look(0.1)];
+        let reach = ViewLimits { field_m: 60.0, ray_m: f32::INFINITY, travel_m: 0.0 };
         let low = Envelope { below_m: 0.003, ..Envelope::LEVEL };
         for envelope in [Envelope::LEVEL, low] {
-            let seen = Seen::of(envelope, area, None, &looks, &reach);
+            let seen = Seen::of(envelope, area, None, &view_rays, &reach);
             assert!((seen.area, seen.near) == (area, area) && seen.met.is_empty() && !seen.beyond, "{seen:?}");
         }
-        let seen = Seen::of(SLOPE, area, None, &looks, &reach);
+        let seen = Seen::of(SLOPE, area, None, &view_rays, &reach);
         assert!((seen.area.y1 - 20.4).abs() < 1e-3 && seen.near == seen.area && !seen.beyond, "{seen:?}");
         assert_eq!((seen.area.x0, seen.area.y0, seen.area.x1), (-1.0, 2.0, 1.0));
         assert!(seen.met.iter().any(|at| at.distance(vec2(0.0, seen.area.y1)) < 1e-3));
-        let near = Near { area: Rect::new(-1.0, 2.0, 1.0, 2.1), looks: vec![look(0.5), look(0.1)], ray_m: 4.0 };
-        let graded = Seen::of(SLOPE, area, Some(near), &looks, &reach);
+        let near = Near { area: Rect::new(-1.0, 2.0, 1.0, 2.1), view_rays: vec![look(0.5), look(0.1)], ray_m: 4.0 };
+        let graded = Seen::of(SLOPE, area, Some(near), &view_rays, &reach);
         assert!((graded.near.y1 - 4.0).abs() < 0.03, "{graded:?}");
         // The ground is level beyond the uniform cells.
         assert!((10.0..13.0).contains(&graded.area.y1), "{graded:?}");
-        let short = Seen::of(SLOPE, area, None, &looks, &Reach { field_m: 12.0, ..reach });
+        let short = Seen::of(SLOPE, area, None, &view_rays, &ViewLimits { field_m: 12.0, ..reach });
         assert!((short.area.y1 - 12.0).abs() < 1e-4 && short.beyond, "{short:?}");
     }
 }

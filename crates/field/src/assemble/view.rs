@@ -5,8 +5,8 @@
 //! warning with the bare share of the ground in view. If that share is more than half, the scene is refused.
 
 use super::drawn::{Drawn, FARTHEST};
-use super::ground_view::{GroundView, Onlooker};
-use super::terrain::{Look, Near, Reach, Seen};
+use super::ground_view::{GroundView, Viewpoint};
+use super::terrain::{Near, Seen, ViewLimits, ViewRay};
 use super::{ground, scanner};
 use crate::desc::Detail;
 use crate::drive::{Capture, FIRST};
@@ -32,7 +32,7 @@ const NEAR: f32 = 4.5;
 const SIDEWAYS: f32 = 1.75;
 
 /// Ground that the images or scans of a field see.
-pub(super) struct Sight {
+pub(super) struct VisibleGround {
     /// All of it.
     pub(super) view: View,
     /// Its outline in each image or scan; empty for a scene of single plants and models.
@@ -85,9 +85,9 @@ pub(super) fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
 
 /// Returns the ground that all images or scans see together, and adds a warning if some of it is not planted. Returns [`View::NONE`] for
 /// a scene of single plants and models.
-pub(super) fn sight(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<Sight> {
+pub(super) fn sight(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<VisibleGround> {
     if !drawn.has_ground() {
-        return Ok(Sight { view: View::NONE, each: Vec::new() });
+        return Ok(VisibleGround { view: View::NONE, each: Vec::new() });
     }
     if !drawn.scanners.is_empty() {
         return scanner::scanned(drawn, warnings);
@@ -109,19 +109,19 @@ pub(super) fn sight(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<Sig
             "use fewer frames, drive along a row to the north or east, drive through several fields, or raise reach_m";
         return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
     }
-    Ok(Sight { view: whole, each })
+    Ok(VisibleGround { view: whole, each })
 }
 
 /// Returns the distinct camera poses of a drive; the ground is then built only near their views. Returns an empty list if all of the
 /// ground is to be built: for single images, for scans, and if a camera sees ground beyond the planted area.
-pub(super) fn onlookers(drawn: &Drawn<'_>, view: View) -> Vec<Onlooker> {
+pub(super) fn viewpoints(drawn: &Drawn<'_>, view: View) -> Vec<Viewpoint> {
     let drives = drawn.captures.last().is_some_and(|last| last.frame > 0);
     if !drives || view.open || !drawn.scanners.is_empty() {
         return Vec::new();
     }
     let mut captures: Vec<&Capture> = drawn.captures.iter().collect();
     captures.sort_by(|a, b| a.name.cmp(&b.name));
-    let all: Option<Vec<Onlooker>> = captures.iter().map(|capture| Onlooker::of(&capture.camera)).collect();
+    let all: Option<Vec<Viewpoint>> = captures.iter().map(|capture| Viewpoint::of(&capture.camera)).collect();
     let mut all = all.unwrap_or_default();
     all.dedup_by(|next, kept| next.like(kept));
     all
@@ -154,12 +154,12 @@ pub(super) fn reach(drawn: &Drawn<'_>) -> Result<f32> {
     Ok(reach)
 }
 
-/// Returns the ground that one camera sees, and adds its outline to `each`. Adds a warning if some of it is not planted, unless `told` is `true`:
+/// Returns the ground that one camera sees, and adds its outline to `each`. Adds a warning if some of it is not planted, unless `already_warned` is `true`:
 /// an earlier capture has added it.
 fn view_of(
     drawn: &Drawn<'_>,
     capture: &Capture,
-    told: bool,
+    already_warned: bool,
     each: &mut Vec<GroundView>,
     warnings: &mut Vec<String>,
 ) -> Result<View> {
@@ -174,13 +174,13 @@ fn view_of(
     }
     let mut seen: Vec<Vec2> = Vec::new();
     let mut level: Vec<Vec2> = Vec::new();
-    let mut looks: Vec<Look> = Vec::new();
+    let mut view_rays: Vec<ViewRay> = Vec::new();
     // Corners and midpoints of the sides: barrel distortion makes the sides bulge.
     for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
         let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
         if direction.z < -HORIZON && origin.z > 0.0 {
             seen.extend(meets(origin, direction));
-            looks.push((origin, direction));
+            view_rays.push((origin, direction));
         } else {
             level.push(below + direction.truncate().normalize_or_zero() * reach);
         }
@@ -195,9 +195,9 @@ fn view_of(
     // Rays are those of the middle of each row's exposure, so widen the area by the distance travelled.
     let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
     let near = nearest(drawn, raster(camera), area);
-    let far = Reach { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
+    let far = ViewLimits { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
     let Seen { area, near, met, beyond: farther, terrain } =
-        Seen::of(ground::envelope(drawn), area, near, &looks, &far);
+        Seen::of(ground::envelope(drawn), area, near, &view_rays, &far);
     // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
     let points = seen.iter().chain(&level).chain(&met).copied();
     each.push(GroundView::around(points.chain([below])));
@@ -216,7 +216,7 @@ fn view_of(
         (100.0 * bare).ceil()
     );
     let help = "lower the camera, turn it down, narrow its angle of view, or raise reach_m";
-    if drawn.desc.detail == Detail::Full && !told {
+    if drawn.desc.detail == Detail::Full && !already_warned {
         warnings.push(format!(
             "{} sees ground {far}, and detail is Full: all of it is built as fine as the nearest; detail: ByPixel builds each place \
              only as fine as its pixels, in a fraction of the time and memory",
@@ -226,18 +226,18 @@ fn view_of(
     if bare > TOO_BARE {
         return Err(blame_capture(drawn, capture, Error::input(words).help(help)));
     }
-    if !told {
+    if !already_warned {
         warnings.push(format!("{words}; {help}"));
     }
     Ok(View { area, near, open: true })
 }
 
 /// Returns the part of the ground in view that gets uniform cells; `None` if all of it does.
-pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = Look>, area: Rect) -> Option<Near> {
+pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = ViewRay>, area: Rect) -> Option<Near> {
     if drawn.desc.detail == Detail::Full {
         return None;
     }
-    let seen: Vec<(Vec2, f32, Look)> = rays
+    let seen: Vec<(Vec2, f32, ViewRay)> = rays
         .filter_map(|look @ (origin, direction)| Some((meets(origin, direction)?, origin.z / -direction.z, look)))
         .filter(|(at, ..)| area.contains(*at))
         .collect();
@@ -247,13 +247,13 @@ pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = Look>, area:
         return None;
     }
     let (lo, hi) = near.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), (p, ..)| (l.min(*p), h.max(*p)));
-    let looks = near.into_iter().map(|(_, _, look)| look).collect();
-    Some(Near { area: Rect::new(lo.x, lo.y, hi.x, hi.y), looks, ray_m })
+    let view_rays = near.into_iter().map(|(_, _, look)| look).collect();
+    Some(Near { area: Rect::new(lo.x, lo.y, hi.x, hi.y), view_rays, ray_m })
 }
 
 /// Returns `true` if a plant at `at` may be visible or cast a shadow into the view. Always `true` with `detail: Full`, where only
 /// the rectangle around the view limits the plants.
-pub(super) fn may_be_seen(drawn: &Drawn<'_>, sight: &Sight, at: Vec2) -> bool {
+pub(super) fn may_be_seen(drawn: &Drawn<'_>, sight: &VisibleGround, at: Vec2) -> bool {
     drawn.desc.detail == Detail::Full
         || sight.each.is_empty()
         || sight.each.iter().any(|view| view.distance(at) <= SIDEWAYS)
@@ -291,7 +291,7 @@ fn blind(which: &str, camera: &Camera) -> Error {
 }
 
 /// Returns rays through a uniform raster of image points, from corner to corner.
-fn raster(camera: &Camera) -> impl Iterator<Item = Look> {
+fn raster(camera: &Camera) -> impl Iterator<Item = ViewRay> {
     let size = vec2(camera.width() as f32, camera.height() as f32);
     (0..=RAYS * (RAYS + 2))
         .map(|n| vec2((n % (RAYS + 1)) as f32, (n / (RAYS + 1)) as f32))

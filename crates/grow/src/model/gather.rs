@@ -2,8 +2,8 @@
 //! meshes, and warns of surfaces that are invisible.
 
 use super::notes::Notes;
-use super::parts::{Label, MOST_TRIANGLES, Model, Part};
-use super::settle::{Wrong, settle, too_many_triangles};
+use super::parts::{Label, MOST_TRIANGLES, Model, ModelPart};
+use super::settle::{ModelError, settle, too_many_triangles};
 use furrow_base::geometry::{AlphaMask, Coverage, Mesh};
 use furrow_base::math::{DMat4, DVec3};
 use furrow_optics::texture::Surface;
@@ -15,14 +15,14 @@ const REMOTE: f64 = 100.0;
 
 /// Parts whose meshes are not yet in the model's frame.
 #[derive(Default)]
-pub(super) struct Gathered {
-    parts: Vec<(Part, DMat4)>,
+pub(super) struct UnplacedParts {
+    parts: Vec<(ModelPart, DMat4)>,
     triangles: usize,
     /// Bounding box in the model's frame.
     bounds: Option<(DVec3, DVec3)>,
 }
 
-impl Gathered {
+impl UnplacedParts {
     /// Adds a part whose mesh `to` transforms into the model's frame. Returns an error if there are too many triangles.
     pub(super) fn add(
         &mut self,
@@ -31,7 +31,7 @@ impl Gathered {
         surface: usize,
         label: Option<Label>,
         to: DMat4,
-    ) -> Result<(), Wrong> {
+    ) -> Result<(), ModelError> {
         self.triangles += mesh.triangles.len();
         if self.triangles > MOST_TRIANGLES {
             return Err(too_many_triangles());
@@ -46,12 +46,12 @@ impl Gathered {
                 self.bounds = Some((lo.min(at), hi.max(at)));
             }
         }
-        self.parts.push((Part { name, mesh, surface, label }, to));
+        self.parts.push((ModelPart { name, mesh, surface, label }, to));
         Ok(())
     }
 
     /// Settles the parts and appends them to `model`, whose surfaces are complete.
-    pub(super) fn into_model(self, model: &mut Model, notes: &mut Notes) -> Result<(), Wrong> {
+    pub(super) fn into_model(self, model: &mut Model, notes: &mut Notes) -> Result<(), ModelError> {
         let offset = self.bounds.and_then(offset);
         if let Some(at) = offset {
             notes.add(moved(at));
@@ -84,9 +84,10 @@ pub(super) fn moved(at: DVec3) -> String {
 
 /// Warns of parts that are cut away by the opacity of their pictures.
 fn warn_of_invisible(model: &Model, notes: &mut Notes) {
-    let gone = |part: &&Part| model.surfaces[part.surface].mask.as_deref().is_some_and(|mask| is_cut_away(part, mask));
-    let all: Vec<&Part> = model.parts.iter().filter(|part| !part.mesh.triangles.is_empty()).collect();
-    let invisible: Vec<&Part> = all.iter().copied().filter(gone).collect();
+    let gone =
+        |part: &&ModelPart| model.surfaces[part.surface].mask.as_deref().is_some_and(|mask| is_cut_away(part, mask));
+    let all: Vec<&ModelPart> = model.parts.iter().filter(|part| !part.mesh.triangles.is_empty()).collect();
+    let invisible: Vec<&ModelPart> = all.iter().copied().filter(gone).collect();
     for part in &invisible {
         let Surface { name, .. } = &model.surfaces[part.surface];
         notes.about(format!("the opacity of the material `{name}` cuts away every triangle"), &part.name);
@@ -96,7 +97,7 @@ fn warn_of_invisible(model: &Model, notes: &mut Notes) {
     }
 }
 
-fn is_cut_away(part: &Part, mask: &AlphaMask) -> bool {
+fn is_cut_away(part: &ModelPart, mask: &AlphaMask) -> bool {
     let Mesh { triangles, uvs, .. } = &part.mesh;
     triangles.iter().all(|t| mask.coverage(t.map(|k| uvs[k as usize])) == Coverage::Transparent)
 }

@@ -22,26 +22,26 @@ mod samples;
 mod settle;
 mod uri;
 
-pub use parts::{Label, Model, Part, Up};
+pub use parts::{Label, Model, ModelPart, Up};
 
 use files::Files;
 use furrow_base::input::{self, Scope};
 use furrow_base::{Error, Result};
-use furrow_optics::texture::Allowance;
-use settle::Wrong;
+use furrow_optics::texture::MemoryLimit;
+use settle::ModelError;
 use std::path::Path;
 
 impl Model {
     /// Reads a model. The file extension selects the format: `.glb`, `.gltf`, `.obj`. An [`Error`] states what is wrong
     /// with the file. Files that the model refers to must be in its folder or below.
     pub fn load(path: &Path, up: Up) -> Result<Self> {
-        Self::load_within(path, up, None, Allowance::UNLIMITED)
+        Self::load_within(path, up, None, MemoryLimit::UNLIMITED)
     }
 
     /// Reads a model whose files may also be in the scope `lifted` instead of its folder. Textures that exceed the
     /// memory `allowance` are refused before they are decoded.
-    pub fn load_within(path: &Path, up: Up, lifted: Option<&Scope>, allowance: Allowance) -> Result<Self> {
-        let wrong = |Wrong { what, help }: Wrong| Error::input(what).help(help).in_file(path);
+    pub fn load_within(path: &Path, up: Up, lifted: Option<&Scope>, allowance: MemoryLimit) -> Result<Self> {
+        let wrong = |ModelError { what, help }: ModelError| Error::input(what).help(help).in_file(path);
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let files = Files::of(path, lifted, allowance);
         let model = match extension.as_str() {

@@ -34,7 +34,7 @@ impl Up {
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     /// Parts.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ModelPart>,
     /// Surfaces of the parts.
     pub surfaces: Vec<Surface>,
     /// All files that were read (the model's own, its buffers, textures and materials) with the SHA-256 of their
@@ -48,7 +48,7 @@ pub struct Model {
 
 /// Part of a model.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct ModelPart {
     /// Name in the file.
     pub name: String,
     /// Triangles.

@@ -92,19 +92,19 @@ pub(super) fn into_one_tile(uvs: &mut [Vec2], wrap: [Wrap; 2], name: &str, notes
 }
 
 /// Error in a file.
-pub(super) struct Wrong {
+pub(super) struct ModelError {
     pub(super) what: String,
     /// Advice; empty if only a new export helps.
     pub(super) help: &'static str,
 }
 
-impl From<String> for Wrong {
+impl From<String> for ModelError {
     fn from(what: String) -> Self {
         Self { what, help: "" }
     }
 }
 
 /// Returns the error for a file with too many triangles.
-pub(super) fn too_many_triangles() -> Wrong {
-    Wrong { what: format!("it has more than {MOST_TRIANGLES} triangles"), help: "simplify it in your program" }
+pub(super) fn too_many_triangles() -> ModelError {
+    ModelError { what: format!("it has more than {MOST_TRIANGLES} triangles"), help: "simplify it in your program" }
 }

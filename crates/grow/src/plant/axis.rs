@@ -1,8 +1,8 @@
 //! The growth axis: the hypocotyl, the stem above it, and the seats of the leaves.
 
-use super::growth::{Growth, LeafNow};
+use super::growth::{Growth, LeafState};
 use super::leaf::Seat;
-use super::organ::{self, Carried, OnStem, Organ, OrganKind, StemLine};
+use super::organ::{self, Organ, OrganKind, StemLine, StemPosition, StemVertices};
 use super::tube::{self, Profile, Ring};
 use furrow_base::math::{Frame, Vec3, direction, lerp, smoothstep, vec3};
 use furrow_base::sampling::{Purpose, Stream};
@@ -38,14 +38,14 @@ pub(super) struct Axis {
     radii: Vec<f32>,
     section: Section,
     /// Position of each node on the plant's stems.
-    on: Vec<OnStem>,
+    on: Vec<StemPosition>,
     /// Ratio of the height of the crown's dome to its radius; 0 where a stem continues.
     crown: f32,
 }
 
 impl Axis {
     /// Returns the seat of a leaf: just inside the stem's surface, on the leaf's side.
-    pub(super) fn seat(&self, leaf: &LeafNow<'_>) -> Seat {
+    pub(super) fn seat(&self, leaf: &LeafState<'_>) -> Seat {
         let last = self.nodes.len().saturating_sub(1);
         let (point, axis) = self.nodes[leaf.layer.min(last)];
         let out = direction(FRAC_PI_2, leaf.azimuth);
@@ -61,7 +61,7 @@ impl Axis {
 
 /// Base of a stem: where it leaves the soil, and its size.
 #[derive(Clone, Debug)]
-pub(super) struct Foot {
+pub(super) struct StemBase {
     /// Position, metres.
     pub(super) point: Vec3,
     /// Direction of the stem there, unit vector.
@@ -74,7 +74,7 @@ pub(super) struct Foot {
     pub(super) stream: Stream,
 }
 
-impl Foot {
+impl StemBase {
     /// Returns the base of a plant's first stem.
     pub(super) fn first(growth: &Growth<'_>, along: Vec3) -> Self {
         Self { point: Vec3::ZERO, along, size: 1.0, root: ROOT, stream: growth.stream.child(Purpose::Plant, 2) }
@@ -86,7 +86,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, section: Sectio
     let mut stream = growth.stream.child(Purpose::Plant, 1);
     let lean = growth.lean(&mut stream);
     let towards = stream.range32(0.0, TAU);
-    stem(organs, growth, section, Foot::first(growth, direction(lean, towards)), &mut stream)
+    stem(organs, growth, section, StemBase::first(growth, direction(lean, towards)), &mut stream)
 }
 
 /// Builds the hypocotyl and the stem from a base. The directions of the internodes are drawn from `stream`.
@@ -94,7 +94,7 @@ pub(super) fn stem(
     organs: &mut Vec<Organ>,
     growth: &Growth<'_>,
     section: Section,
-    foot: Foot,
+    foot: StemBase,
     stream: &mut Stream,
 ) -> Axis {
     let mut direction_now = foot.along;
@@ -147,14 +147,14 @@ pub(super) fn stem(
     let mesh = tube::rigid(&rings, tube::sides(radius, if stemless { 10 } else { 12 }, growth.cell()));
     let material = material(&growth.desc.stem_material);
     let on = if stemless {
-        let carried = vec![Carried { corners: mesh.positions.len(), line: foot.line, at: Some(foot.at) }];
+        let carried = vec![StemVertices { corners: mesh.positions.len(), line: foot.line, at: Some(foot.at) }];
         organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None, lines: Vec::new(), carried });
         vec![foot; nodes.len()]
     } else {
         let number = organ::next_line(organs);
         let line = StemLine { number, points: nodes.iter().map(|(point, _)| *point).collect(), on: Some(foot) };
         organs.push(Organ::stem(OrganKind::Stem, material, mesh, line));
-        (0..nodes.len()).map(|k| OnStem { line: number, at: k as f32 }).collect()
+        (0..nodes.len()).map(|k| StemPosition { line: number, at: k as f32 }).collect()
     };
     Axis { nodes, radii, section, on, crown }
 }
@@ -166,8 +166,8 @@ pub(super) fn material(own: &str) -> String {
 
 /// Adds the hypocotyl from its base upwards: round, with this radius at both ends. A slender hypocotyl is slightly
 /// bowed and thinner in its middle, as it is after emergence. Returns the position of its upper end.
-pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Foot, radius: f32) -> OnStem {
-    let Foot { point, along, size, root, mut stream } = foot;
+pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: StemBase, radius: f32) -> StemPosition {
+    let StemBase { point, along, size, root, mut stream } = foot;
     let length = growth.hypocotyl * size;
     let side = along.cross(direction(FRAC_PI_2, stream.range32(0.0, TAU))).normalize_or(Vec3::X);
     let bow = 0.05 * stream.normal().clamp(-2.0, 2.0) as f32 * length;

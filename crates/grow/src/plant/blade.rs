@@ -16,7 +16,7 @@ pub const PAD: f32 = 0.014;
 /// Flat mesh in leaf coordinates (y along the midrib from the blade's base, z out of the upper side), with the weights
 /// that bind it to a skeleton.
 #[derive(Clone, Debug, Default)]
-pub struct Rest {
+pub struct RestMesh {
     /// Vertices, metres.
     pub positions: Vec<Vec3>,
     /// Texture coordinates.
@@ -27,7 +27,7 @@ pub struct Rest {
     pub weights: Vec<Weights>,
 }
 
-impl Rest {
+impl RestMesh {
     /// Adds a vertex and returns its index.
     pub fn corner(&mut self, position: Vec3, uv: Vec2, weights: Weights) -> u32 {
         self.positions.push(position);
@@ -58,9 +58,9 @@ impl Rest {
 
 /// Rest mesh of a blade with its grid: `rows + 1` rows of `columns + 1` vertices, with the midrib in the middle column.
 #[derive(Clone, Debug)]
-pub struct Sheet {
+pub struct BladeGrid {
     /// Mesh.
-    pub rest: Rest,
+    pub rest: RestMesh,
     /// Number of cells along the blade.
     pub rows: usize,
     /// Number of cells across the blade, even.
@@ -73,7 +73,7 @@ pub struct Sheet {
 
 /// Builds the flat mesh of a blade of `length` and `width` (metres) with `rows` × `columns` cells (columns are rounded
 /// up to an even number).
-pub fn sheet(outline: Outline, width: f32, rows: usize, columns: usize, skeleton: &Skeleton) -> Sheet {
+pub fn sheet(outline: Outline, width: f32, rows: usize, columns: usize, skeleton: &Skeleton) -> BladeGrid {
     let length = skeleton.length();
     let rows = rows.max(2);
     let columns = columns.max(2).next_multiple_of(2);
@@ -81,7 +81,7 @@ pub fn sheet(outline: Outline, width: f32, rows: usize, columns: usize, skeleton
         Outline::Full => (MARGIN, MARGIN),
         Outline::Power { .. } => (PAD, PAD),
     };
-    let mut rest = Rest {
+    let mut rest = RestMesh {
         positions: Vec::with_capacity((rows + 1) * (columns + 1)),
         uvs: Vec::with_capacity((rows + 1) * (columns + 1)),
         weights: Vec::with_capacity((rows + 1) * (columns + 1)),
@@ -106,7 +106,7 @@ pub fn sheet(outline: Outline, width: f32, rows: usize, columns: usize, skeleton
     for i in 0..rows as u32 {
         rest.stitch(i * stride, (i + 1) * stride, columns as u32);
     }
-    Sheet { rest, rows, columns, t: ts, half_width: half_widths }
+    BladeGrid { rest, rows, columns, t: ts, half_width: half_widths }
 }
 
 /// Returns the outline's largest half-width within [`PAD`] of `t`, as a fraction of the width.

@@ -4,14 +4,14 @@
 //! blade's plan with pinnules, and each pinnule is cut into lobes with a pointed tip. Built of the same ribbons as
 //! mayweed leaves.
 
-use super::blade::Rest;
+use super::blade::RestMesh;
 use super::ribbons::{MOST, Ribbons, series};
 use super::skeleton::Skeleton;
 use furrow_base::math::{Vec3, lerp, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// An axis of the blade and the parameters of its branches.
-struct Limb {
+struct FernAxis {
     start: Vec3,
     /// Vector from its start to its tip, metres.
     along: Vec3,
@@ -31,7 +31,7 @@ pub(super) fn blade(
     (width, cell): (f32, f32),
     skeleton: &Skeleton,
     stream: &mut Stream,
-) -> Rest {
+) -> RestMesh {
     let length = skeleton.length();
     // Small leaves have fewer, not finer, segments.
     let (pairs, pinnules) = (pairs.min(MOST) as f32, pinnules.min(MOST) as f32);
@@ -40,18 +40,18 @@ pub(super) fn blade(
     let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
     ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8.0) as u32);
     let whole =
-        Limb { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
+        FernAxis { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
     // Branches shorter than a segment's width are not built yet.
-    let is_seen = |limb: &Limb| limb.along.length() > segment;
+    let is_seen = |limb: &FernAxis| limb.along.length() > segment;
     for (pinna, mut own) in branches(&whole, stream) {
         let share = pinna.along.length() / (0.5 * width);
-        let pinna = Limb { pairs: pinnules * share, reach: 0.42, ..pinna };
+        let pinna = FernAxis { pairs: pinnules * share, reach: 0.42, ..pinna };
         let bow = pinna.up * (pinna.along.length() * own.range32(-0.12, 0.12));
         ribbons.strip(pinna.start, pinna.along, pinna.up, bow, 0.8 * segment, 2);
         for (pinnule, own) in branches(&pinna, &own).into_iter().filter(|(pinnule, _)| is_seen(pinnule)) {
             let long = pinnule.along.length();
             ribbons.strip(pinnule.start, pinnule.along, pinnule.up, Vec3::ZERO, segment, 1);
-            let pinnule = Limb { pairs: (long / (2.6 * segment)).min(2.0), reach: 0.5, ..pinnule };
+            let pinnule = FernAxis { pairs: (long / (2.6 * segment)).min(2.0), reach: 0.5, ..pinnule };
             for (lobe, _) in branches(&pinnule, &own).into_iter().filter(|(lobe, _)| is_seen(lobe)) {
                 ribbons.strip(lobe.start, lobe.along, lobe.up, Vec3::ZERO, 0.9 * segment, 1);
             }
@@ -73,7 +73,7 @@ pub(super) fn half_width(t: f32) -> f32 {
 
 /// Returns the branches of an axis, pair by pair from its base, each with its own stream, so that later branches do not
 /// move earlier ones.
-fn branches(limb: &Limb, stream: &Stream) -> Vec<(Limb, Stream)> {
+fn branches(limb: &FernAxis, stream: &Stream) -> Vec<(FernAxis, Stream)> {
     let length = limb.along.length();
     let ahead = limb.along / length.max(1e-9);
     let right = ahead.cross(limb.up);
@@ -92,7 +92,7 @@ fn branches(limb: &Limb, stream: &Stream) -> Vec<(Limb, Stream)> {
             let reach = grown * limb.reach * length * taper(t) * own.range32(0.88, 1.12);
             // The width is measured in projection, so branches at a small angle to the axis are lengthened.
             let along = along * (reach / spread.sin().max(0.5));
-            all.push((Limb { start: limb.start + limb.along * t, along, up, pairs: 0.0, reach: 0.0 }, own));
+            all.push((FernAxis { start: limb.start + limb.along * t, along, up, pairs: 0.0, reach: 0.0 }, own));
         }
     }
     all

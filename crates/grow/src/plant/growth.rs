@@ -17,7 +17,7 @@ pub(super) const CELL: f32 = 0.9e-3;
 
 /// One leaf at the current age. Lengths in metres, angles in radians.
 #[derive(Clone, Debug)]
-pub(super) struct LeafNow<'a> {
+pub(super) struct LeafState<'a> {
     /// Leaf number, from 1.
     pub(super) number: u16,
     /// Layer, from 0.
@@ -69,13 +69,13 @@ pub(super) struct Growth<'a> {
     pub(super) axils: Vec<(usize, f32)>,
     /// Height of each layer above the first, metres.
     pub(super) rise: Vec<f32>,
-    pub(super) leaves: Vec<LeafNow<'a>>,
+    pub(super) leaves: Vec<LeafState<'a>>,
     /// Factor on all sizes of this plant.
     pub(super) vigour: f32,
     /// Whether its leaves keep their joints.
     pub(super) rigged: bool,
     /// The two stages around the current age, for inflorescences.
-    pub(super) between: Between<'a>,
+    pub(super) between: StageInterpolation<'a>,
     /// Random stream of the plant.
     pub(super) stream: &'a Stream,
 }
@@ -110,14 +110,14 @@ pub(super) fn shoots(many: f32) -> impl Iterator<Item = (usize, f32)> {
 
 /// Two neighbouring stages and the position between them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Between<'a> {
+pub(super) struct StageInterpolation<'a> {
     pub(super) from: &'a StageDesc,
     pub(super) to: &'a StageDesc,
     /// 0 at the first, 1 at the second.
     pub(super) u: f32,
 }
 
-impl<'a> Between<'a> {
+impl<'a> StageInterpolation<'a> {
     fn find(stages: &'a [StageDesc], stage: Stage) -> Option<Self> {
         let key = |s: &StageDesc| match stage {
             Stage::Age(_) => s.days.f32(),
@@ -175,8 +175,8 @@ pub(super) fn age(desc: &PlantDesc, stage: Stage) -> f32 {
         Stage::Bbch(code) => code,
     };
     let between = || {
-        let between = Between::find(&desc.stages, stage);
-        between.map_or(0.0, |Between { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
+        let between = StageInterpolation::find(&desc.stages, stage);
+        between.map_or(0.0, |StageInterpolation { from, to, u }| lerp(from.days.f32(), to.days.f32(), u))
     };
     covering(desc, code).map_or_else(between, |(_, days)| days)
 }
@@ -195,8 +195,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         Stage::Age(_) => None,
     };
     let stage = covering.map_or(stage, |(_, days)| Stage::Age(days));
-    let between = Between::find(&desc.stages, stage)?;
-    let Between { from, to, u } = between;
+    let between = StageInterpolation::find(&desc.stages, stage)?;
+    let StageInterpolation { from, to, u } = between;
     let whole = (Some(from), to);
     let own = stream.child(Purpose::Plant, 0);
     let stem = between.draw(whole, None, &own, 3, |s| &s.stem_mm) * MM * vigour;
@@ -234,7 +234,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
             let grown = before.map_or(u, |_| 1.0);
             let angle = between.draw(ends, None, &stream, 4, |l| &l.angle_deg).to_radians();
             let fold = between.draw(ends, None, &stream, 7, |l| &l.fold_deg).to_radians();
-            leaves.push(LeafNow {
+            leaves.push(LeafState {
                 number,
                 layer: k,
                 kind_name: name,

@@ -1,12 +1,12 @@
 //! Builds one leaf: poses its skeleton and bends blade and stalk with it.
 
-use super::blade::{self, Rest};
+use super::blade::{self, RestMesh};
 use super::fern;
-use super::growth::{CELL, LeafNow};
+use super::growth::{CELL, LeafState};
 use super::kind::Shape;
 use super::leaflets;
 use super::margin::LeafOutline;
-use super::organ::{LeafAxis, LeafSize, OnStem, Organ, OrganKind};
+use super::organ::{LeafAxis, LeafSize, Organ, OrganKind, StemPosition};
 use super::ribbons::{self, Division};
 use super::rig;
 use super::skeleton::{Measures, Pose, Skeleton};
@@ -42,7 +42,7 @@ pub(super) struct Seat {
     /// Direction from the axis towards the leaf; must not be parallel to the axis.
     pub(super) out: Vec3,
     /// Position on the plant's stems.
-    pub(super) on: Option<OnStem>,
+    pub(super) on: Option<StemPosition>,
 }
 
 /// Lower part of a leaf.
@@ -55,7 +55,7 @@ pub(super) enum Lower {
 }
 
 /// Builds a leaf and adds its organs.
-pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lower: Lower) {
+pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lower: Lower) {
     // Posture and relief have separate streams, so that changes to the relief never change the posture.
     let mut stream = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 100);
     let mut skeleton = Skeleton::new(&measures(leaf));
@@ -67,7 +67,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
     let motions = skeleton.motions(root);
     let mut stream = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 101);
     let relief = relief(leaf, &mut stream);
-    let mut spined = Rest::default();
+    let mut spined = RestMesh::default();
     let rest = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
             let (rows, columns) = cells(leaf);
@@ -134,18 +134,18 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafNow<'_>, seat: Seat, lowe
 }
 
 /// Returns the number of vertices around the stalk.
-fn sides(leaf: &LeafNow<'_>) -> u32 {
+fn sides(leaf: &LeafState<'_>) -> u32 {
     tube::sides(0.5 * leaf.kind.stalk_width.f32() * leaf.blade, SIDES, leaf.cell)
 }
 
 /// Returns the number of segments of a stalk or midrib of `length` metres; `usual` at the usual mesh resolution.
-fn pieces(leaf: &LeafNow<'_>, length: f32, usual: u8) -> u8 {
+fn pieces(leaf: &LeafState<'_>, length: f32, usual: u8) -> u8 {
     if leaf.cell > CELL { ((length / leaf.cell).ceil().min(255.0) as u8).clamp(2, usual) } else { usual }
 }
 
 /// Returns the number of cells along and across the blade: that of the kind, reduced where cells would be shorter than
 /// the leaf's shortest cell, so that a bud has few triangles.
-fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
+fn cells(leaf: &LeafState<'_>) -> (usize, usize) {
     let (rows, columns) = (leaf.kind.rows.get(), leaf.kind.columns.get());
     let fewest = if leaf.cell > CELL { FEWEST_COARSE } else { FEWEST };
     let fit = f64::from(leaf.blade / leaf.cell).max(fewest.0).min(rows);
@@ -155,7 +155,7 @@ fn cells(leaf: &LeafNow<'_>) -> (usize, usize) {
     (fit.round() as usize, across.max(fewest.1).min(columns) as usize)
 }
 
-fn measures(leaf: &LeafNow<'_>) -> Measures {
+fn measures(leaf: &LeafState<'_>) -> Measures {
     let count = leaf.kind.joints.get() as usize;
     let half_width = |t: f32| match &leaf.kind.shape {
         Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => outline.half_width(t) * leaf.width,
@@ -180,7 +180,7 @@ fn measures(leaf: &LeafNow<'_>) -> Measures {
 }
 
 /// Returns the frame of ST1 in plant coordinates: vein along the stalk, y out of the upper side, which faces the axis.
-fn stand(leaf: &LeafNow<'_>, seat: Seat, lower: Lower, stream: &mut Stream) -> Pose {
+fn stand(leaf: &LeafState<'_>, seat: Seat, lower: Lower, stream: &mut Stream) -> Pose {
     let out = (seat.out - seat.axis * seat.out.dot(seat.axis)).normalize_or(Vec3::X);
     let (sin, cos) = leaf.angle.sin_cos();
     let vein = seat.axis * cos + out * sin;
@@ -198,7 +198,7 @@ fn stand(leaf: &LeafNow<'_>, seat: Seat, lower: Lower, stream: &mut Stream) -> P
 /// Gravity: the moment of the mass beyond joint k is Σ mⱼ·(sⱼ − sₖ)·cos φ, with φ the elevation at the joint. The
 /// midrib's stiffness decreases towards the tip as (1 − 0.75 s)³. The ratio of the two is scaled so that a level blade
 /// bends by `bend` in total, and is added to the joint's angle together with the random bends.
-fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, lower: Lower, stream: &mut Stream) {
+fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower, stream: &mut Stream) {
     let wobble = leaf.kind.wobble_deg.f32().to_radians();
     let free = if lower == Lower::Petiole { 1.0 } else { 0.0 };
     let stalk_bend = free * (leaf.kind.stalk_bend_deg.draw32(stream).to_radians() + leaf.arch);
@@ -254,7 +254,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafNow<'_>, root: Pose, lower: Lower, s
 }
 
 /// Returns a dissected blade, flattened into its plane if `flat` is set.
-fn pressed(leaf: &LeafNow<'_>, mut rest: Rest) -> Rest {
+fn pressed(leaf: &LeafState<'_>, mut rest: RestMesh) -> RestMesh {
     if leaf.kind.flat {
         rest.positions.iter_mut().for_each(|p| p.z = 0.0);
     }
@@ -262,7 +262,7 @@ fn pressed(leaf: &LeafNow<'_>, mut rest: Rest) -> Rest {
 }
 
 /// Returns the relief of the blade.
-fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> BladeRelief {
+fn relief(leaf: &LeafState<'_>, stream: &mut Stream) -> BladeRelief {
     let kind = leaf.kind;
     let angle = kind.vein_angle_deg.f32().to_radians();
     let relief = BladeRelief {
@@ -290,8 +290,14 @@ fn relief(leaf: &LeafNow<'_>, stream: &mut Stream) -> BladeRelief {
 }
 
 /// Builds the stalk in the flat leaf's coordinates, and the midrib that continues it under the blade.
-fn stalk(leaf: &LeafNow<'_>, skeleton: &Skeleton, relief: &BladeRelief, lower: Lower, stream: &mut Stream) -> Rest {
-    let mut rest = Rest::default();
+fn stalk(
+    leaf: &LeafState<'_>,
+    skeleton: &Skeleton,
+    relief: &BladeRelief,
+    lower: Lower,
+    stream: &mut Stream,
+) -> RestMesh {
+    let mut rest = RestMesh::default();
     if leaf.stalk <= 0.0 && leaf.kind.rib.get() == 0.0 {
         return rest;
     }

@@ -5,8 +5,8 @@
 //! branches. These joints bend it in the flat leaf's coordinates; the rachis then moves it rigidly with its base. Young
 //! leaflets are upright and face each other.
 
-use super::blade::{self, Rest};
-use super::growth::LeafNow;
+use super::blade::{self, RestMesh};
+use super::growth::LeafState;
 use super::kind::Shape;
 use super::margin::LeafOutline;
 use super::skeleton::{Measures, Pose, Skeleton};
@@ -19,13 +19,13 @@ const JOINTS: usize = 4;
 
 /// Builds the rest mesh of all leaflets, each with `rows` × `columns` cells; an empty mesh for other shapes.
 pub(super) fn blade(
-    leaf: &LeafNow<'_>,
+    leaf: &LeafState<'_>,
     relief: &BladeRelief,
     (rows, columns): (usize, usize),
     rachis: &Skeleton,
     stream: &mut Stream,
-) -> Rest {
-    let mut rest = Rest::default();
+) -> RestMesh {
+    let mut rest = RestMesh::default();
     let Shape::Leaflets {
         outline,
         pairs,

@@ -5,7 +5,7 @@
 //! half-width, and along the midrib, so that teeth and lobes differ in place and size. Half of the leaves, chosen at
 //! random, use the mirrored texture. Colour and labels use the same mesh.
 
-use super::blade::Sheet;
+use super::blade::BladeGrid;
 use furrow_base::math::vec2;
 use furrow_base::sampling::Stream;
 use furrow_optics::texture::noise::Perlin;
@@ -38,7 +38,7 @@ impl LeafOutline {
     }
 
     /// Deforms a flat sheet of `length` metres. The midrib does not move.
-    pub(super) fn apply(&self, sheet: &mut Sheet, length: f32) {
+    pub(super) fn apply(&self, sheet: &mut BladeGrid, length: f32) {
         if self.mirrored {
             sheet.rest.uvs.iter_mut().for_each(|uv| *uv = vec2(1.0 - uv.x, uv.y));
         }
@@ -72,7 +72,7 @@ mod tests {
     use furrow_base::geometry::outline::Outline;
     use furrow_base::sampling::Purpose;
 
-    fn sheet() -> Sheet {
+    fn sheet() -> BladeGrid {
         let skeleton = Skeleton::new(&Measures {
             stalk: 0.0,
             stalk_joints: 1,
@@ -91,7 +91,7 @@ mod tests {
     fn leaves_differ_in_outline_and_none_is_torn() {
         let plain = sheet();
         let area =
-            |s: &Sheet| Mesh::smooth(s.rest.positions.clone(), s.rest.uvs.clone(), s.rest.triangles.clone()).area();
+            |s: &BladeGrid| Mesh::smooth(s.rest.positions.clone(), s.rest.uvs.clone(), s.rest.triangles.clone()).area();
         let (mut mirrored, mut areas, mut squares, mut count) = (0, 0.0, 0.0, 0);
         for seed in 0..200 {
             let outline = LeafOutline::draw(0.08, &mut Stream::of(seed, 0, Purpose::Leaf, 0));

@@ -72,7 +72,7 @@ pub use desc::{Form, PlantDesc, Stage};
 pub use flower::desc::{FlowerDesc, RingDesc};
 pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
 pub use kind::{LeafKind, Shape, Spines, Stipules};
-pub use organ::{Carried, LeafAxis, LeafSize, OnStem, Organ, OrganKind, StemLine};
+pub use organ::{LeafAxis, LeafSize, Organ, OrganKind, StemLine, StemPosition, StemVertices};
 pub use rig::RigJoint;
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};

@@ -84,14 +84,14 @@ pub struct LeafAxis {
     /// All joints with their axes; empty unless [`GrowOptions::rigged`](super::GrowOptions::rigged) is set.
     pub rig: Vec<RigJoint>,
     /// Attachment to the plant's stems; `None` if the leaf's sheath starts at the soil.
-    pub on: Option<OnStem>,
+    pub on: Option<StemPosition>,
     /// Index in [`Plant::rig`](super::Plant::rig) of the stem joint that bears the leaf; `None` without a rig.
     pub bearer: Option<u16>,
 }
 
 /// Position on the stems of a plant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OnStem {
+pub struct StemPosition {
     /// [`StemLine::number`] of the stem.
     pub line: u32,
     /// Position along the line, in points: 1.5 is half-way between its second and its third point.
@@ -106,19 +106,19 @@ pub struct StemLine {
     /// Points from base to tip, metres.
     pub points: Vec<Vec3>,
     /// Attachment to another stem; `None` if this stem leaves the soil.
-    pub on: Option<OnStem>,
+    pub on: Option<StemPosition>,
 }
 
 impl StemLine {
     /// Returns the position of the tip.
-    pub(super) fn end(&self) -> OnStem {
-        OnStem { line: self.number, at: self.points.len().saturating_sub(1) as f32 }
+    pub(super) fn end(&self) -> StemPosition {
+        StemPosition { line: self.number, at: self.points.len().saturating_sub(1) as f32 }
     }
 }
 
 /// Run of consecutive vertices of an organ's mesh that follow the motion of one stem.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Carried {
+pub struct StemVertices {
     /// Number of vertices.
     pub corners: usize,
     /// Number of the stem's line.
@@ -160,7 +160,7 @@ pub struct Organ {
     /// Centre lines of the stems in it, in the same coordinates.
     pub lines: Vec<StemLine>,
     /// Stems that carry the vertices of the mesh; empty if the leaf's own joints carry them.
-    pub carried: Vec<Carried>,
+    pub carried: Vec<StemVertices>,
 }
 
 impl Organ {
@@ -171,15 +171,15 @@ impl Organ {
 
     /// Builds a stem along a line.
     pub(super) fn stem(kind: OrganKind, material: String, mesh: Mesh, line: StemLine) -> Self {
-        let carried = vec![Carried { corners: mesh.positions.len(), line: line.number, at: None }];
+        let carried = vec![StemVertices { corners: mesh.positions.len(), line: line.number, at: None }];
         Self { kind, leaf: 0, material, mesh, axis: None, lines: vec![line], carried }
     }
 
     /// Returns the tip of the last stem in the mesh, or the attachment of the last appendage.
-    pub(super) fn end(&self) -> Option<OnStem> {
+    pub(super) fn end(&self) -> Option<StemPosition> {
         let last = self.carried.last()?;
         let own = self.lines.iter().find(|line| line.number == last.line).map(StemLine::end);
-        own.or_else(|| Some(OnStem { line: last.line, at: last.at? }))
+        own.or_else(|| Some(StemPosition { line: last.line, at: last.at? }))
     }
 }
 

@@ -7,7 +7,7 @@
 //! Pinnae are tilted out of the blade's plane by varying angles, as in mayweed, and curl: the displacement of a point
 //! grows with the square of its distance from the base.
 
-use super::blade::Rest;
+use super::blade::RestMesh;
 use super::growth::CELL;
 use super::skeleton::{Skeleton, Weights};
 use furrow_base::math::{Vec3, lerp, smoothstep, vec2, vec3};
@@ -28,7 +28,7 @@ const GOLDEN: f32 = 0.618_034;
 /// Builder of a blade of ribbons.
 pub(super) struct Ribbons<'a> {
     /// Rest mesh built so far.
-    pub(super) rest: Rest,
+    pub(super) rest: RestMesh,
     /// Skeleton that the vertices are bound to.
     pub(super) skeleton: &'a Skeleton,
     /// Half-width of the blade at a fraction of its length, metres; `None` if only the chain carries the vertices.
@@ -54,7 +54,7 @@ impl<'a> Ribbons<'a> {
     /// the mesh, both in metres.
     pub(super) fn new(skeleton: &'a Skeleton, half_width: &'a dyn Fn(f32) -> f32, segment: f32, cell: f32) -> Self {
         Self {
-            rest: Rest::default(),
+            rest: RestMesh::default(),
             skeleton,
             half_width: Some(half_width),
             width: segment,
@@ -211,7 +211,7 @@ pub(super) fn half_width(bare: f32, t: f32) -> f32 {
 const LACKING: f32 = 0.5;
 
 /// Builds the rest mesh of a divided blade of `width`.
-pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream: &mut Stream) -> Rest {
+pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream: &mut Stream) -> RestMesh {
     let length = skeleton.length();
     let Division { pairs, lobes, bare, segment, cell } = division;
     // Small leaves have fewer, not finer, segments.

@@ -6,9 +6,9 @@
 //! down. Along a creeping stem the leaves turn to its two sides and face the sky, whatever their azimuth on it.
 
 use super::axis;
-use super::growth::{self, Growth, LeafNow};
+use super::growth::{self, Growth, LeafState};
 use super::leaf::{self, Lower, Seat};
-use super::organ::{self, OnStem, Organ, OrganKind, StemLine};
+use super::organ::{self, Organ, OrganKind, StemLine, StemPosition};
 use super::stage::MOST_SHOOTS;
 use super::tube::{self, Profile};
 use super::twine::Helix;
@@ -41,16 +41,16 @@ struct Stem {
 
 impl Stem {
     /// Returns a node and its position on the plant's stems; the last node for an index beyond it.
-    fn node(&self, node: usize) -> Option<((Vec3, Vec3, f32), OnStem)> {
+    fn node(&self, node: usize) -> Option<((Vec3, Vec3, f32), StemPosition)> {
         let k = node.min(self.nodes.len().saturating_sub(1));
         // The line starts at the stem's base, before its first node.
-        Some((*self.nodes.get(k)?, OnStem { line: self.line, at: (k + 1) as f32 }))
+        Some((*self.nodes.get(k)?, StemPosition { line: self.line, at: (k + 1) as f32 }))
     }
 }
 
 /// Parameters of a growth form with side shoots.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Habit {
+pub(super) struct ShootParameters {
     /// Cross-section of its stems.
     pub(super) profile: Profile,
     /// Number of vertices around its stems.
@@ -62,7 +62,8 @@ pub(super) struct Habit {
 }
 
 /// Round stems whose leaves turn towards the light.
-const HABIT: Habit = Habit { profile: Profile::Channelled(1.0), sides: 10, whorled: false, swerve: 0.16 };
+const HABIT: ShootParameters =
+    ShootParameters { profile: Profile::Channelled(1.0), sides: 10, whorled: false, swerve: 0.16 };
 
 /// Builds a plant.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
@@ -70,8 +71,8 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
 }
 
 /// Builds the main shoot, its side shoots and the side shoots of these.
-pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
-    let mut plant = Shoots {
+pub(super) fn shoots(growth: &Growth<'_>, habit: ShootParameters) -> Vec<Organ> {
+    let mut plant = ShootBuilder {
         organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers as usize)),
         growth,
         habit,
@@ -82,8 +83,8 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
     let towards = stream.range32(0.0, TAU);
     let upright = direction(lean, towards);
     let radius = (0.5 * growth.stem).max(2e-4);
-    let on = axis::hypocotyl(&mut plant.organs, growth, axis::Foot::first(growth, upright), radius);
-    let foot = Foot { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl, on };
+    let on = axis::hypocotyl(&mut plant.organs, growth, axis::StemBase::first(growth, upright), radius);
+    let foot = StemBase { point: upright * growth.hypocotyl, along: upright, radius, length: growth.hypocotyl, on };
     plant.line = foot.point.truncate();
     let stem = plant.stem(&foot, &growth.rise, &mut stream);
     for leaf in &growth.leaves {
@@ -114,7 +115,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: Habit) -> Vec<Organ> {
 
 /// Returns the layer and azimuth of each axil from below that has at least two younger layers above it; for a whorl,
 /// one axil on each side.
-fn axils(growth: &Growth<'_>, habit: Habit) -> Vec<(usize, f32)> {
+fn axils(growth: &Growth<'_>, habit: ShootParameters) -> Vec<(usize, f32)> {
     let youngest = growth.leaves.iter().map(|l| l.layer).max().unwrap_or(0);
     let mut all = Vec::new();
     for layer in growth.axils.chunk_by(|a, b| a.0 == b.0) {
@@ -125,14 +126,14 @@ fn axils(growth: &Growth<'_>, habit: Habit) -> Vec<(usize, f32)> {
 }
 
 /// Base of a stem.
-struct Foot {
+struct StemBase {
     point: Vec3,
     along: Vec3,
     radius: f32,
     /// Length of the stem below the base, metres; it counts towards the stem's slenderness.
     length: f32,
     /// Position on the plant's stems.
-    on: OnStem,
+    on: StemPosition,
 }
 
 /// Axil of a side shoot: the layer of the plant, the node of the stem that bears it, its azimuth, and the ratio of its
@@ -154,18 +155,18 @@ struct Shoot {
 }
 
 /// Builder of a plant.
-struct Shoots<'a> {
+struct ShootBuilder<'a> {
     organs: Vec<Organ>,
     growth: &'a Growth<'a>,
-    habit: Habit,
+    habit: ShootParameters,
     /// Horizontal position of the main shoot, which twining shoots wind around, metres.
     line: Vec2,
 }
 
-impl Shoots<'_> {
+impl ShootBuilder<'_> {
     /// Builds a stem. `rise` holds the positions of its nodes along it.
-    fn stem(&mut self, foot: &Foot, rise: &[f32], stream: &mut Stream) -> Stem {
-        let Habit { profile, sides, swerve, .. } = self.habit;
+    fn stem(&mut self, foot: &StemBase, rise: &[f32], stream: &mut Stream) -> Stem {
+        let ShootParameters { profile, sides, swerve, .. } = self.habit;
         let (sinks, lies) = (self.growth.desc.lies_at.0.f32(), self.growth.desc.lies_at.1.f32());
         let whole = rise.last().copied().unwrap_or(0.0);
         let sunk = smoothstep(sinks, lies, (foot.length + whole) / (2.0 * foot.radius));
@@ -216,7 +217,7 @@ impl Shoots<'_> {
     }
 
     /// Builds a leaf at a node.
-    fn seat(&mut self, leaf: &LeafNow<'_>, stem: &Stem, node: usize) {
+    fn seat(&mut self, leaf: &LeafState<'_>, stem: &Stem, node: usize) {
         let Some(((point, along, radius), on)) = stem.node(node) else { return };
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let (out, stands) = if self.habit.whorled {
@@ -249,7 +250,8 @@ impl Shoots<'_> {
         let out = direction(FRAC_PI_2, axil.azimuth + stream.range32(-0.3, 0.3));
         let spread = stream.range32(SPREAD.0, SPREAD.1);
         let start = (Vec3::Z.lerp(along, 0.3) * spread.cos() + out * spread.sin()).normalize_or(out);
-        let foot = Foot { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0, on };
+        let foot =
+            StemBase { point: point + out * (0.3 * radius), along: start, radius: 0.8 * radius, length: 0.0, on };
         // It is younger than the main shoot: it lacks the cotyledons and all layers up to its axil.
         let skip = axil.layer + 1;
         let shift = growth.rise.get(axil.layer).copied().unwrap_or(0.0);
@@ -262,7 +264,7 @@ impl Shoots<'_> {
         let turn = stream.range32(0.0, TAU);
         for leaf in growth.leaves.iter().filter(|l| l.layer >= skip && l.blade * size >= super::stage::BUD) {
             let number = leaf.number + above;
-            let leaf = LeafNow {
+            let leaf = LeafState {
                 number,
                 azimuth: leaf.azimuth + turn,
                 blade: leaf.blade * size,

@@ -10,7 +10,7 @@
 //! halves, the waves of the margin, the blisters between secondary veins, sway and twist. It is applied to the straight
 //! leaf and carried along by the joints.
 
-use super::blade::{Rest, Sheet};
+use super::blade::{BladeGrid, RestMesh};
 use super::skeleton::{Pose, Skeleton};
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{Vec3, smoothstep, vec3};
@@ -48,7 +48,7 @@ pub struct BladeRelief {
 
 impl BladeRelief {
     /// Applies the relief to a flat sheet.
-    pub fn apply(&self, sheet: &mut Sheet, length: f32) {
+    pub fn apply(&self, sheet: &mut BladeGrid, length: f32) {
         if *self == (Self { seed: self.seed, ..Self::default() }) {
             return;
         }
@@ -122,7 +122,7 @@ impl BladeRelief {
 }
 
 /// Returns the positions of a rest mesh's vertices after the joints' motions.
-pub fn bend(rest: &Rest, motions: &[Pose]) -> Vec<Vec3> {
+pub fn bend(rest: &RestMesh, motions: &[Pose]) -> Vec<Vec3> {
     let carry = |(p, weights): (&Vec3, &super::skeleton::Weights)| {
         weights.iter().filter(|(_, w)| *w != 0.0).map(|(k, w)| *w * motions[usize::from(*k)].point(*p)).sum()
     };
@@ -136,7 +136,7 @@ pub fn carried(skeleton: &Skeleton, motions: &[Pose], y: f32) -> Vec3 {
 }
 
 /// Returns the deformed mesh with smooth normals. If `rigged`, it keeps the skin weights of its vertices.
-pub fn skin(rest: Rest, motions: &[Pose], rigged: bool) -> Mesh {
+pub fn skin(rest: RestMesh, motions: &[Pose], rigged: bool) -> Mesh {
     let positions = bend(&rest, motions);
     let mesh = Mesh::smooth(positions, rest.uvs, rest.triangles);
     if rigged { Mesh { weights: rest.weights, ..mesh } } else { mesh }

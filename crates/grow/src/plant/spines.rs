@@ -2,7 +2,7 @@
 //! both sides of the blade, as in thistles. They sit on the lobes of the generated margin `Spined` of
 //! [`furrow_optics::texture`].
 
-use super::blade::{Rest, Sheet};
+use super::blade::{BladeGrid, RestMesh};
 use super::kind::Spines;
 use furrow_base::math::{Vec3, lerp, vec2};
 use furrow_base::sampling::Stream;
@@ -19,8 +19,8 @@ const FOOT: (f32, f32) = (0.82, 0.66);
 
 /// Builds the spines of a sheet after its relief has been applied, bound to the sheet's joints. `blade` is its length
 /// in metres.
-pub(super) fn grow(sheet: &Sheet, spines: &Spines, blade: f32, stream: &mut Stream) -> Rest {
-    let mut rest = Rest::default();
+pub(super) fn grow(sheet: &BladeGrid, spines: &Spines, blade: f32, stream: &mut Stream) -> RestMesh {
+    let mut rest = RestMesh::default();
     if blade < LEAST {
         return rest;
     }

@@ -5,7 +5,7 @@
 //! nearest link of their own stem. Near a joint they are shared by both adjacent links, so that a bent stem does not
 //! kink.
 
-use super::organ::{OnStem, Organ, StemLine};
+use super::organ::{Organ, StemLine, StemPosition};
 use super::rig::RigJoint;
 use furrow_base::geometry::JointWeights;
 use furrow_base::math::{Mat3, Vec3};
@@ -72,7 +72,7 @@ impl Stems {
     }
 
     /// Returns the joint of the link that bears an attachment; at a joint, the joint of the link that ends there.
-    fn bearer(&self, on: OnStem) -> Option<u16> {
+    fn bearer(&self, on: StemPosition) -> Option<u16> {
         let chain = self.chains.get(&on.line)?;
         let Some(last) = chain.links.len().checked_sub(1) else { return chain.parent };
         if on.at <= 0.0 && chain.parent.is_some() {
@@ -92,7 +92,7 @@ impl Stems {
             let corners = &organ.mesh.positions[all.len()..][..run.corners];
             match run.at {
                 Some(at) => {
-                    let bearer = self.bearer(OnStem { line: run.line, at }).unwrap_or(0);
+                    let bearer = self.bearer(StemPosition { line: run.line, at }).unwrap_or(0);
                     all.extend(corners.iter().map(|_| tied((bearer, 1.0), None)));
                 }
                 None => all.extend(corners.iter().map(|corner| self.along(run.line, *corner))),
@@ -155,7 +155,7 @@ mod tests {
     fn stems_hang_on_links_and_corners_on_their_own_stem() {
         let mut stems = Stems::default();
         let up = |z: f32| vec3(0.0, 0.0, z);
-        let on = |line: u32, at: f32| Some(OnStem { line, at });
+        let on = |line: u32, at: f32| Some(StemPosition { line, at });
         for (number, points, on) in [
             (0, vec![Vec3::ZERO, up(0.1)], None),
             (1, vec![up(0.1), up(0.2), up(0.2), up(0.3)], on(0, 1.0)),
@@ -177,8 +177,8 @@ mod tests {
         assert_eq!(near(1, vec3(0.01, 0.0, 0.25)), [(2, 1.0)]);
         let [(1, a), (2, b)] = near(1, up(0.2))[..] else { panic!("{:?}", near(1, up(0.2))) };
         assert!((a - 0.5).abs() < 1e-5 && (b - 0.5).abs() < 1e-5);
-        assert_eq!(stems.bearer(OnStem { line: 1, at: 0.0 }), Some(0));
-        assert_eq!(stems.bearer(OnStem { line: 1, at: 3.0 }), Some(2));
+        assert_eq!(stems.bearer(StemPosition { line: 1, at: 0.0 }), Some(0));
+        assert_eq!(stems.bearer(StemPosition { line: 1, at: 3.0 }), Some(2));
         for joint in &stems.joints {
             assert!((joint.axes.determinant() - 1.0).abs() < 1e-5 && joint.axes.x_axis.is_normalized());
         }

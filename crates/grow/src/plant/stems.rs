@@ -8,9 +8,9 @@
 //!   Struik 2007, in Potato Biology and Biotechnology.
 //! - Positions of their bases, lean and sizes: estimates.
 
-use super::axis::Foot;
+use super::axis::StemBase;
 use super::desc::Form;
-use super::growth::{self, Growth, LeafNow};
+use super::growth::{self, Growth, LeafState};
 use super::stage::{BUD, MOST_SHOOTS};
 use furrow_base::math::{direction, lerp};
 use furrow_base::sampling::{Purpose, Stream};
@@ -31,7 +31,7 @@ const GOLDEN: f32 = 2.399_963;
 /// Main stem in addition to the first.
 pub(super) struct OtherStem {
     /// Base of the stem.
-    pub(super) foot: Foot,
+    pub(super) foot: StemBase,
     /// Offset from a leaf number of the first stem to that of this stem.
     pub(super) above: u16,
     /// Offset added to the azimuths of the first stem's leaves, radians.
@@ -42,10 +42,10 @@ pub(super) struct OtherStem {
 
 impl OtherStem {
     /// Returns this stem's counterpart of the first stem's `leaf`; `None` while it is hidden in the bud.
-    pub(super) fn leaf<'a>(&self, leaf: &LeafNow<'a>, growth: &Growth<'_>) -> Option<LeafNow<'a>> {
+    pub(super) fn leaf<'a>(&self, leaf: &LeafState<'a>, growth: &Growth<'_>) -> Option<LeafState<'a>> {
         let size = self.foot.size;
         let number = leaf.number + self.above;
-        (leaf.blade * size >= BUD).then(|| LeafNow {
+        (leaf.blade * size >= BUD).then(|| LeafState {
             number,
             azimuth: leaf.azimuth + self.turn,
             blade: leaf.blade * size,
@@ -68,7 +68,7 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
         let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
         let towards = growth::turn(growth.stream) + GOLDEN * k as f32 + stream.range32(-0.4, 0.4);
         let out = direction(FRAC_PI_2, towards);
-        let foot = Foot {
+        let foot = StemBase {
             point: out * stream.range32(APART.0, APART.1),
             along: direction(
                 stream.range32(LEAN.0, LEAN.1) + growth.lean_further(&stream.child(Purpose::Plant, 1)),

@@ -3,8 +3,8 @@
 //!
 //! They are built of ribbons, have the stalk's material and belong to its organ.
 
-use super::blade::Rest;
-use super::growth::LeafNow;
+use super::blade::RestMesh;
+use super::growth::LeafState;
 use super::kind::Stipules;
 use super::ribbons::Ribbons;
 use super::skeleton::Skeleton;
@@ -15,10 +15,10 @@ use furrow_base::sampling::Purpose;
 const SPREAD: f32 = 0.55;
 
 /// Builds both stipules of a leaf in the flat leaf's coordinates.
-pub(super) fn pair(plan: &Stipules, leaf: &LeafNow<'_>, skeleton: &Skeleton) -> Rest {
+pub(super) fn pair(plan: &Stipules, leaf: &LeafState<'_>, skeleton: &Skeleton) -> RestMesh {
     let mut stream = leaf.stream.child(Purpose::Leaf, 103);
     let long = plan.length.f32() * leaf.blade;
-    let rest = Rest::default();
+    let rest = RestMesh::default();
     let mut ribbons = Ribbons { rest, skeleton, half_width: None, width: 0.2 * long, count: 0, drawn: 1.0 };
     let lobes = plan.lobes.get().min(12.0) as usize;
     for side in [-1.0_f32, 1.0] {

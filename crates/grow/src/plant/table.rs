@@ -33,7 +33,7 @@ const COLUMNS: [(&str, &str); 13] = [
 const NEEDED: [&str; 6] = ["leaf", "stage", "kind", "blade_mm", "width_mm", "angle_deg"];
 
 /// A part of the text of `layers`, and the byte range of the table that it was made from.
-pub type Part = (String, Range<usize>);
+pub type TextSpan = (String, Range<usize>);
 
 /// Error: the table has no rows for the first stage of the species file, which has this BBCH code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ impl<'t> LeafTable<'t> {
     }
 
     /// Returns the text of `layers` at each of these stages, which must be in ascending order.
-    pub fn layers(&self, stages: &[u32]) -> Result<Result<Vec<Vec<Part>>, NoRows>> {
+    pub fn layers(&self, stages: &[u32]) -> Result<Result<Vec<Vec<TextSpan>>, NoRows>> {
         if let Some(row) = self.rows.iter().find(|row| !stages.contains(&row.stage)) {
             let known = stages.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
             let message = format!("the species file has no stage of BBCH {}", row.stage);
@@ -139,7 +139,7 @@ impl<'t> LeafTable<'t> {
 }
 
 /// Returns the RON text of a list of layers.
-fn parts<'c, 't: 'c>(layers: impl Iterator<Item = &'c BTreeMap<&'static str, Cell<'t>>>) -> Vec<Part> {
+fn parts<'c, 't: 'c>(layers: impl Iterator<Item = &'c BTreeMap<&'static str, Cell<'t>>>) -> Vec<TextSpan> {
     let mut parts = vec![("[".to_owned(), 0..1)];
     for cells in layers {
         let mut between = "(";
@@ -296,7 +296,7 @@ mod tests {
     /// Rationale: a table is long, so an error must name its place. Expected: line, column and message for each
     /// mistake.
     #[test]
-    fn a_mistake_is_told_with_its_line_and_column() {
+    fn an_error_is_reported_with_line_and_column() {
         let first = "1,10,seed,2,5,3,1,70\n";
         for (text, line, column, words) in [
             (format!("{HEAD}{first}1,12,,,6,x,1,\n"), 3, 10, "`x` is not a valid width_mm"),

@@ -1,7 +1,7 @@
 //! Tubes: stems, hypocotyls, sheaths and stalks as rings of vertices. Texture coordinate u runs around the tube, v
 //! along it from base to tip.
 
-use super::blade::Rest;
+use super::blade::RestMesh;
 use super::growth::CELL;
 use super::skeleton::Weights;
 use furrow_base::geometry::Mesh;
@@ -49,7 +49,7 @@ pub(super) fn sides(radius: f32, usual: u32, cell: f32) -> u32 {
 }
 
 /// Adds the tube through the rings to a rest mesh. up × right of the rings must point along the tube.
-pub(super) fn sweep(rest: &mut Rest, rings: &[Ring], sides: u32, mut weights: impl FnMut(Vec3) -> Weights) {
+pub(super) fn sweep(rest: &mut RestMesh, rings: &[Ring], sides: u32, mut weights: impl FnMut(Vec3) -> Weights) {
     let mut previous = None;
     let length = rings.windows(2).map(|w| w[0].centre.distance(w[1].centre)).sum::<f32>().max(1e-9);
     let mut along = 0.0;
@@ -83,7 +83,7 @@ pub(super) fn sweep(rest: &mut Rest, rings: &[Ring], sides: u32, mut weights: im
 
 /// Builds the tube as a rigid mesh. The first and the last vertex of each ring share their normal.
 pub(super) fn rigid(rings: &[Ring], sides: u32) -> Mesh {
-    let mut rest = Rest::default();
+    let mut rest = RestMesh::default();
     sweep(&mut rest, rings, sides, |_| Weights::default());
     let mut mesh = Mesh::smooth(rest.positions, rest.uvs, rest.triangles);
     let corners = mesh.normals.len();

@@ -6,7 +6,7 @@
 //! & McLean 1962, "Grasses: their structure".
 
 use super::axis::ROOT;
-use super::growth::{self, Growth, LeafNow};
+use super::growth::{self, Growth, LeafState};
 use super::leaf::{self, Lower, Seat};
 use super::organ::Organ;
 use super::stage::BUD;
@@ -47,10 +47,10 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
         let base = direction(FRAC_PI_2, towards) * (lerp(APART.0, APART.1, grown) * growth.stem);
         let turn = FRAC_PI_2 + stream.range32(-0.5, 0.5);
         let leaves = growth.leaves.iter().filter(|leaf| leaf.layer >= LACKS && leaf.blade * size >= BUD);
-        let leaves: Vec<LeafNow<'_>> = leaves
+        let leaves: Vec<LeafState<'_>> = leaves
             .map(|leaf| {
                 let number = leaf.number + above;
-                LeafNow {
+                LeafState {
                     number,
                     azimuth: leaf.azimuth + turn,
                     blade: leaf.blade * size,
@@ -87,7 +87,7 @@ pub(super) fn shoot<'a>(
     (width, taper): (f32, f32),
     axis: Vec3,
     base: Vec3,
-    leaves: impl ExactSizeIterator<Item = LeafNow<'a>>,
+    leaves: impl ExactSizeIterator<Item = LeafState<'a>>,
 ) {
     let count = leaves.len().max(1) as f32;
     let foot = ROOT / axis.z.max(0.3);
@@ -96,7 +96,7 @@ pub(super) fn shoot<'a>(
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let out = (out - axis * out.dot(axis)).normalize_or(Vec3::X);
         // The sheath continues into the soil; its length is measured from the surface up.
-        let leaf = LeafNow { stalk: leaf.stalk + foot, pitch: leaf.pitch + leaf.angle, angle: 0.0, ..leaf };
+        let leaf = LeafState { stalk: leaf.stalk + foot, pitch: leaf.pitch + leaf.angle, angle: 0.0, ..leaf };
         let seat = Seat { point: base + out * radius - axis * foot, axis, out, on: None };
         leaf::grow(organs, &leaf, seat, Lower::Sheath(radius));
     }

@@ -4,12 +4,12 @@
 
 use super::growth::Growth;
 use super::organ::Organ;
-use super::runner::{self, Habit};
+use super::runner::{self, ShootParameters};
 use super::tube::Profile;
 
 /// Slender square stems. Leaves keep their place around a lying stem. `swerve`, the sideways wandering of a lying stem,
 /// is an estimate.
-const HABIT: Habit = Habit { profile: Profile::Square, sides: 12, whorled: true, swerve: 0.32 };
+const HABIT: ShootParameters = ShootParameters { profile: Profile::Square, sides: 12, whorled: true, swerve: 0.32 };
 
 /// Builds a plant with whorls.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {

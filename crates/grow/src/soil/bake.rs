@@ -5,7 +5,7 @@ use super::crumb::Raster;
 use super::ground::blur;
 use super::{Ground, LayerMaps, MAX_LAYERS};
 use furrow_base::math::{Vec2, Vec3, vec2};
-use furrow_optics::optics::LostRelief;
+use furrow_optics::optics::UnmeshedRelief;
 use furrow_optics::texture::ground::GroundMaps;
 use rayon::prelude::*;
 
@@ -20,7 +20,7 @@ const FABRIC_M: f32 = 0.12;
 const PIT_WETTING: f32 = 0.2;
 
 /// Maps of the ground before ambient occlusion and moisture are computed from its pits.
-pub(super) struct Painted {
+pub(super) struct UnshadedMaps {
     pub(super) maps: GroundMaps,
     /// Depth of each texel below its surroundings, metres; 0 where it is not below them.
     pub(super) pits: Vec<f32>,
@@ -38,7 +38,7 @@ pub(super) struct Shade {
     /// Depth of a pit that keeps all of its wetness, metres.
     pub(super) wet: f32,
     /// Relief that is in neither the mesh nor the pits.
-    pub(super) lost: Option<LostRelief>,
+    pub(super) lost: Option<UnmeshedRelief>,
 }
 
 impl Shade {
@@ -46,7 +46,7 @@ impl Shade {
     pub(super) const FULL: Self = Self { sky: HALF_SKY_M, wet: HALF_SKY_M, lost: None };
 }
 
-impl Painted {
+impl UnshadedMaps {
     /// Returns the texel at a point, and the slope there, bilinearly interpolated between four texel centres as in a
     /// texture lookup.
     pub(super) fn at(&self, p: Vec2) -> (usize, Vec2) {
@@ -79,14 +79,14 @@ pub(super) fn wet(pit: f32, full: f32) -> f32 {
 impl Ground {
     /// Bakes the texture with texels of at most `texel_m`; `maps` are those that the ground was built with.
     pub fn bake<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> GroundMaps {
-        let clods = self.lost_clods(maps, texel_m);
+        let clods = self.unmeshed_clods(maps, texel_m);
         let painted = self.paint(maps, texel_m, clods.laid);
         let shade = self.shade(maps, &painted, &clods);
         self.finish(painted, shade)
     }
 
     /// Bakes everything except ambient occlusion and moisture; `laid` as in [`Ground::crumbs`].
-    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, laid: f32) -> Painted {
+    pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, laid: f32) -> UnshadedMaps {
         let area = self.area();
         // Texels divide the grid's steps evenly, so that the area consists of whole texels and each is in one cell.
         let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
@@ -107,7 +107,7 @@ impl Ground {
             like: self.color.like,
             lost: None,
         };
-        let look = self.look();
+        let look = self.appearance();
         let crumbs = self.crumbs(raster, laid);
         let mut detail = crumbs.height;
         let rows = (
@@ -137,7 +137,7 @@ impl Ground {
             }
         });
         self.bake_slopes(raster, split, &detail, &mut baked);
-        Painted { maps: baked, pits: self.pits(raster, split, detail), dry: crumbs.dry, split }
+        UnshadedMaps { maps: baked, pits: self.pits(raster, split, detail), dry: crumbs.dry, split }
     }
 
     /// Bakes the material of clods: a square of 12 cm of the ground's soil without crumbs or relief and with uniform
@@ -215,9 +215,9 @@ impl Ground {
     }
 
     /// Computes ambient occlusion and moisture: pits see less of the sky and dry later; crumbs dry first.
-    fn finish(&self, painted: Painted, shade: Shade) -> GroundMaps {
+    fn finish(&self, painted: UnshadedMaps, shade: Shade) -> GroundMaps {
         let Shade { sky, wet: full, lost } = shade;
-        let moistures = &self.look().moisture;
+        let moistures = &self.appearance().moisture;
         let width = painted.maps.width;
         let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5) as u8;
         let moisture = |k: usize| {

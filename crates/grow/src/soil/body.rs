@@ -20,7 +20,7 @@ pub(super) struct Shape {
 
 /// Parameters of a shape's planes and wear.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cut {
+pub(super) struct ShapeParameters {
     /// Range of the number of planes.
     pub(super) planes: (usize, usize),
     /// Range of the planes' distance from the centre.
@@ -91,7 +91,7 @@ fn icosahedron() -> (Vec<Vec3>, Vec<[u32; 3]>) {
 
 impl Shape {
     /// Builds a random shape; the same random stream gives the same body at every level.
-    pub(super) fn new(level: usize, cut: Cut, stream: &mut Stream) -> Self {
+    pub(super) fn new(level: usize, cut: ShapeParameters, stream: &mut Stream) -> Self {
         let planes: Vec<Vec3> = (0..cut.planes.0 + stream.index(cut.planes.1 - cut.planes.0 + 1))
             .map(|_| direction(stream) / stream.range32(cut.distance.0, cut.distance.1))
             .collect();

@@ -4,7 +4,7 @@
 //! them, as on a seedbed. Each is sunk by a fifth to a half of its height, large ones deeper. Triangles that face down
 //! into the ground, about half of them, are left out because no ray can reach them.
 
-use super::body::{self, Cut, LEVELS, Pose, Shape};
+use super::body::{self, LEVELS, Pose, Shape, ShapeParameters};
 use super::crumb::{LOOSE_GAIN, Local, loose_gain, sink};
 use super::{Canopy, Ground, InView, Pile, Rect};
 use furrow_base::geometry::{Cost, Mesh};
@@ -12,8 +12,8 @@ use furrow_base::math::{Spectrum, Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of broken aggregates.
-pub(super) const CUT: Cut =
-    Cut { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.22, rough: 0.24 };
+pub(super) const CUT: ShapeParameters =
+    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.22, rough: 0.24 };
 
 /// Number of different shapes; each clod rotates and stretches one of them.
 const SHAPES: usize = 24;

@@ -59,14 +59,14 @@ impl SoilColor {
 
 /// Colour transform of the layers' textures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shift {
+pub(super) struct ColorTransform {
     /// Factor on R, G, B.
     pub(super) gain: [f32; 3],
     /// Mean reflectance, which determines the NIR from red.
     pub(super) like: Spectrum,
 }
 
-impl Shift {
+impl ColorTransform {
     /// Leaves the textures unchanged.
     pub(super) const NONE: Self = Self { gain: [1.0; 3], like: soil::LOESS };
 
@@ -111,7 +111,8 @@ mod tests {
     #[test]
     fn mixes_stay_between_the_soils_and_one_alone_is_itself() {
         let plain = Plain { albedo: [0.2, 0.1, 0.05], height: 0.5 };
-        let draw = |colors: &[Spectrum], k| Shift::draw(colors, &plain, &mut Stream::of(3, k, Purpose::Test, 0));
+        let draw =
+            |colors: &[Spectrum], k| ColorTransform::draw(colors, &plain, &mut Stream::of(3, k, Purpose::Test, 0));
         let alone = draw(&[soil::SANDY], 0);
         let got: Vec<f32> = alone.gain.iter().zip(plain.albedo).map(|(g, a)| g * a).collect();
         let sandy = soil::SANDY.to_array();
@@ -123,7 +124,7 @@ mod tests {
         }
         assert!(least > soil::HUMIC.0.x && most < soil::SANDY.0.x, "{least} {most}");
         assert!(most - least > 0.9 * (soil::SANDY.0.x - soil::HUMIC.0.x), "{least} {most}");
-        assert_eq!(draw(&[], 0), Shift::NONE);
+        assert_eq!(draw(&[], 0), ColorTransform::NONE);
         let own = |text: &str| {
             let color: SoilColor = ron::from_str(text).unwrap();
             color.reflectance(&mut |file| Ok(Spectrum::splat(file.len() as f32))).unwrap()

@@ -39,7 +39,7 @@ const LEAST_CELLS: i32 = 8;
 
 /// Size distribution of the aggregates of one ground.
 #[derive(Clone, Debug)]
-pub(super) struct Law {
+pub(super) struct SizeDistribution {
     pub(super) over_pivot: f32,
     pub(super) exponent: f32,
     clustering: f32,
@@ -60,7 +60,7 @@ pub(super) struct Law {
 
 /// Part of the aggregates of a ground.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct SizeRange {
     /// Range of lengths, mm; empty if its ends are equal.
     pub(super) mm: (f32, f32),
     /// Fraction of the number that the size distribution gives.
@@ -69,7 +69,7 @@ pub(super) struct Part {
     pub(super) gain: fn(f32) -> f32,
 }
 
-impl Part {
+impl SizeRange {
     fn is_some(&self) -> bool {
         self.mm.0 < self.mm.1 && self.amount > 0.0
     }
@@ -121,7 +121,7 @@ impl Local {
     }
 }
 
-impl Law {
+impl SizeDistribution {
     pub(super) fn new(desc: &ClodsDesc, stream: &Stream) -> Self {
         let child = |k| stream.child(Purpose::Debris, k);
         Self {
@@ -244,9 +244,9 @@ impl Crumbs {
     /// share of the ground's colour.
     pub(super) fn draw(
         raster: Raster,
-        law: &Law,
-        seen: [Part; 2],
-        unseen: [Part; 2],
+        law: &SizeDistribution,
+        seen: [SizeRange; 2],
+        unseen: [SizeRange; 2],
         stream: &Stream,
         share: impl Fn(Vec2) -> f32 + Sync,
     ) -> Self {
@@ -263,7 +263,7 @@ impl Crumbs {
                     |p, length, s| band.add(p, length, part.gain, law, s),
                 );
             }
-            if unseen.iter().any(Part::is_some) {
+            if unseen.iter().any(SizeRange::is_some) {
                 band.fill(law, unseen, &stream.child(Purpose::Debris, seen.len() as u64), &share);
             }
         });
@@ -303,7 +303,7 @@ impl Band<'_> {
     }
 
     /// Adds aggregates that are smaller than the sample spacing to uncovered samples.
-    fn fill(&mut self, law: &Law, parts: [Part; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
+    fn fill(&mut self, law: &SizeDistribution, parts: [SizeRange; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
         let Raster { width, .. } = self.raster;
         for (i, j) in cells(self.area(), CELL_M).filter(|(_, j)| self.cells.contains(j)) {
             let centre = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
@@ -324,7 +324,7 @@ impl Band<'_> {
         }
     }
 
-    fn add(&mut self, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &Law, s: &mut Stream) {
+    fn add(&mut self, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &SizeDistribution, s: &mut Stream) {
         // Always draws the same number of values, so that a crumb outside the area does not change its neighbours.
         let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
@@ -376,7 +376,7 @@ mod tests {
     use super::*;
     use furrow_base::ron_file::{Num, Vary};
 
-    fn law(clustering: f64) -> Law {
+    fn law(clustering: f64) -> SizeDistribution {
         let desc = ClodsDesc {
             over_5mm_per_m2: Vary::fixed(9400.0),
             exponent: Vary::fixed(3.8),
@@ -384,10 +384,10 @@ mod tests {
             sorting: Num::new(0.0),
             ..ClodsDesc::default()
         };
-        Law::new(&desc, &Stream::of(5, 0, Purpose::Test, 0))
+        SizeDistribution::new(&desc, &Stream::of(5, 0, Purpose::Test, 0))
     }
 
-    fn lengths(law: &Law, area: Rect) -> Vec<(Vec2, f32)> {
+    fn lengths(law: &SizeDistribution, area: Rect) -> Vec<(Vec2, f32)> {
         let mut all = Vec::new();
         law.scatter(
             area,
@@ -437,9 +437,9 @@ mod tests {
     fn aggregates_cover_as_much_drawn_or_not() {
         let law = law(0.0);
         let mm = (2.5, 10.0);
-        let some = Part { mm, amount: 0.2, gain: |_| 0.0 };
-        let none = Part { mm: (2.5, 2.5), ..some };
-        let covered = |step: f32, size: usize, seen: Part, unseen: Part| {
+        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0 };
+        let none = SizeRange { mm: (2.5, 2.5), ..some };
+        let covered = |step: f32, size: usize, seen: SizeRange, unseen: SizeRange| {
             let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };
             let stream = Stream::of(9, 0, Purpose::Test, 0);
             let crumbs = Crumbs::draw(raster, &law, [seen, none], [unseen, none], &stream, |_| 1.0);

@@ -1,7 +1,7 @@
 //! Cost estimate of a ground before it is built, from the same random numbers as the ground itself.
 
 use super::blend::Blend;
-use super::crumb::{Law, Local};
+use super::crumb::{Local, SizeDistribution};
 use super::grid::Grid;
 use super::openness::Squares;
 use super::site::{FULL_CELL_M, Sizes};
@@ -52,7 +52,7 @@ pub fn expected(
     let made = seen.share();
     let joined = (1.0 - made) * (grid.x.steps * grid.y.steps) as f64;
     let bare = Cost::of(2.0 * vertices - surface::spared(joined), 1.0) + maps;
-    let law = Law::new(&desc.clods, ground);
+    let law = SizeDistribution::new(&desc.clods, ground);
     let places = places(desc, site, &law, ground);
     let sizes = site.sizes(desc);
     let mut all = Vec::new();
@@ -73,12 +73,12 @@ pub fn expected(
         "lower their amount or raise min_mm",
     );
     for (i, population) in desc.stones.iter().enumerate() {
-        let cost = stone::cost(population, (area, made), sizes.told, &stone_cover::own(debris, i));
+        let cost = stone::cost(population, (area, made), sizes.resolved_mm, &stone_cover::own(debris, i));
         add(&[Step::Field("stones"), Step::Item(i)], cost, "lower their cover or raise min_mm and median_mm");
     }
     let of = ["straw_cover", "sticks_per_m2", "bits_per_m2"];
     let advice = ["lower it, or make straws larger", "lower it, or lower stubs", "lower it"];
-    let costs = litter::costs(&desc.litter, (area, made), sizes.told, leftovers);
+    let costs = litter::costs(&desc.litter, (area, made), sizes.resolved_mm, leftovers);
     for ((field, advice), cost) in of.into_iter().zip(advice).zip(costs) {
         add(&[Step::Field("litter"), Step::Field(field)], cost, advice);
     }
@@ -89,7 +89,7 @@ pub fn expected(
 /// compute their shading.
 fn reckoned(places: &[Local], sizes: &Sizes, area: Rect) -> Cost {
     let (shortest, longest) = (sizes.unseen[1].0, sizes.drawn.1);
-    if sizes.told <= 0.0 || shortest >= longest {
+    if sizes.resolved_mm <= 0.0 || shortest >= longest {
         return Cost::default();
     }
     let per_m2 = places.iter().map(|law| law.number(shortest, longest)).sum::<f32>() / places.len().max(1) as f32;
@@ -99,7 +99,7 @@ fn reckoned(places: &[Local], sizes: &Sizes, area: Rect) -> Cost {
 }
 
 /// Returns the size distribution of clods at sample points all over a site.
-fn places(desc: &SoilDesc, site: &Site, law: &Law, stream: &Stream) -> Vec<Local> {
+fn places(desc: &SoilDesc, site: &Site, law: &SizeDistribution, stream: &Stream) -> Vec<Local> {
     let layers = desc.layers.len().min(MAX_LAYERS);
     let blend = Blend::new(&desc.blend, &desc.layers[..layers], stream);
     let share = |p: Vec2| {

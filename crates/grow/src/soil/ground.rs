@@ -1,8 +1,8 @@
 //! One piece of ground: heights, their interpolation, and the derived fields.
 
 use super::blend::{Blend, Weights};
-use super::color::{Shift, mean};
-use super::crumb::{Crumbs, Law, Part, Raster, mean_gain};
+use super::color::{ColorTransform, mean};
+use super::crumb::{Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
 use super::grid::Grid;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
 use super::relief::Relief;
@@ -26,7 +26,7 @@ const FBM4_SD: f32 = 0.245;
 
 /// Data at each vertex of the fine grid.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Fine {
+pub(super) struct FineGridPoint {
     /// Noise of each layer.
     pub(super) noise: Vec<Weights>,
     /// Height of layers and crumbs: the part of the relief that the baked maps contain at higher resolution.
@@ -37,7 +37,7 @@ pub(super) struct Fine {
 
 /// Moisture and brightness at each vertex of the fine grid.
 #[derive(Clone, Debug)]
-pub(super) struct Look {
+pub(super) struct Appearance {
     /// Moisture, 0..1.
     pub(super) moisture: Vec<f32>,
     /// Brightness factor, about 1.
@@ -52,10 +52,10 @@ pub struct Ground {
     pub(super) slopes: Vec<Vec2>,
     /// Relief without layers and crumbs.
     shape: Relief,
-    pub(super) fine: Fine,
+    pub(super) fine: FineGridPoint,
     pub(super) blend: Blend,
-    pub(super) law: Law,
-    pub(super) color: Shift,
+    pub(super) law: SizeDistribution,
+    pub(super) color: ColorTransform,
     pub(super) sizes: Sizes,
     pub(super) crumbs_amount: f32,
     pub(super) stream: Stream,
@@ -66,7 +66,7 @@ pub struct Ground {
     /// Whether it is rendered as a plane.
     pub(super) flat: bool,
     /// Computed on first use, because scenes that are never shaded do not need it.
-    look: OnceLock<Look>,
+    look: OnceLock<Appearance>,
 }
 
 /// Returns the unit normal of the plane fitted to heights within `radius` of a point.
@@ -99,15 +99,15 @@ impl Ground {
         check(desc, maps.len(), site)?;
         let relief = Relief::new(&desc.relief, *site, stream);
         let blend = Blend::new(&desc.blend, &desc.layers, stream).with_crust(desc.crust);
-        let law = Law::new(&desc.clods, stream);
+        let law = SizeDistribution::new(&desc.clods, stream);
         let grid = Grid::new(site);
         let mut ground = Self {
             heights: Vec::with_capacity(grid.columns() * grid.rows()),
             slopes: Vec::new(),
-            fine: Fine::default(),
+            fine: FineGridPoint::default(),
             blend,
             law,
-            color: Shift::draw(colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
+            color: ColorTransform::draw(colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
             sizes: site.sizes(desc),
             crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
             stream: stream.clone(),
@@ -135,7 +135,7 @@ impl Ground {
             heights: Vec::new(),
             slopes: Vec::new(),
             shape: self.shape.clone(),
-            fine: Fine::default(),
+            fine: FineGridPoint::default(),
             blend: self.blend.clone(),
             law: self.law.clone(),
             color: self.color,
@@ -156,7 +156,7 @@ impl Ground {
     /// Computes heights and slopes once all parameters are known.
     fn complete<L: LayerMaps + Sync>(&mut self, maps: &[L]) {
         self.raise(maps);
-        self.strew();
+        self.scatter_debris();
         self.slopes = self.differences();
     }
 
@@ -197,7 +197,7 @@ impl Ground {
     }
 
     /// Adds crumbs to the heights of the fine grid.
-    fn strew(&mut self) {
+    fn scatter_debris(&mut self) {
         let crumbs = self.crumbs(self.raster(), 1.0);
         let columns = self.grid.columns();
         for (k, h) in crumbs.height.iter().enumerate() {
@@ -215,19 +215,19 @@ impl Ground {
     pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
         let Sizes { drawn, unseen, .. } = self.sizes;
-        let crumbs = |mm| Part { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
-        let clods = |mm, amount| Part { mm, amount, gain: mean_gain };
+        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
+        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain };
         let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
         let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
     }
 
     /// Returns moisture and brightness.
-    pub(super) fn look(&self) -> &Look {
+    pub(super) fn appearance(&self) -> &Appearance {
         self.look.get_or_init(|| self.wet())
     }
 
-    fn wet(&self) -> Look {
+    fn wet(&self) -> Appearance {
         let child = |k| self.stream.child(Purpose::Soil, k);
         let MoistureRecord { mean, spread, patch_m } = self.moisture;
         let drying = self.drying;
@@ -254,7 +254,7 @@ impl Ground {
         let moisture = (patches.iter().zip(&out))
             .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
             .collect();
-        Look { moisture, tone }
+        Appearance { moisture, tone }
     }
 
     /// Returns the moisture of the dry and of the damp clods, 0..1.
@@ -378,7 +378,7 @@ impl Ground {
 
     /// Returns the moisture at a point, 0..1; beyond the area, that of the mirrored point.
     pub fn moisture(&self, x: f32, y: f32) -> f32 {
-        self.fine_value(&self.look().moisture, self.mirrored(vec2(x, y)))
+        self.fine_value(&self.appearance().moisture, self.mirrored(vec2(x, y)))
     }
 
     /// Returns the texture coordinates of a point in [`Ground::bake`]; beyond the area the maps are mirrored.

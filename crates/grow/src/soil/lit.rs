@@ -26,7 +26,7 @@ const FARTHER: f32 = 1.15;
 
 /// Light reflected by one point, relative to level, unshadowed ground of the same reflectance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lit {
+pub(super) struct ReflectedLight {
     /// Light reflected upwards under a uniform sky.
     pub(super) sky: f32,
     /// Contribution to the light reflected from one direction into another, by pair of zenith angles and relative
@@ -42,7 +42,7 @@ pub(super) struct Lit {
 
 /// Range of the horizon search, metres.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(super) struct HorizonRange {
     pub(super) from: f32,
     pub(super) to: f32,
 }
@@ -78,10 +78,10 @@ fn facet([a, b]: [f32; 2], eye: f32, light: f32, between: f32) -> f32 {
     a + b * (between - eye * light).max(0.0) / eye.max(light).max(1e-3)
 }
 
-impl Lit {
+impl ReflectedLight {
     /// Computes the light of a surface with this normal. `sigma` is the standard deviation of the facets' slope angles,
     /// radians. `rise` returns the height of the relief at a horizontal offset above the point, in metres.
-    pub(super) fn of(normal: Vec3, sigma: f32, reach: Reach, rise: impl Fn(Vec2) -> f32) -> Self {
+    pub(super) fn of(normal: Vec3, sigma: f32, reach: HorizonRange, rise: impl Fn(Vec2) -> f32) -> Self {
         let shape = facets(sigma);
         let (mut sky, mut reaching) = (0.0, 0.0);
         // Cosine of each direction to the normal; 0 for hidden directions.
@@ -118,7 +118,7 @@ impl Lit {
     }
 }
 
-/// Returns [`Lit::sent`] of a surface; `seen` holds the cosine of each direction to the normal, 0 for hidden
+/// Returns [`ReflectedLight::sent`] of a surface; `seen` holds the cosine of each direction to the normal, 0 for hidden
 /// directions.
 fn sent(shape: [f32; 2], normal: Vec3, seen: &[[f32; AZIMUTHS]; SLANTS]) -> Table {
     let mut sent = [[0.0; TURNS]; PAIRS];
@@ -209,13 +209,13 @@ impl Heights {
     }
 
     /// Returns the light at a sample, with the normal from the neighbouring samples.
-    pub(super) fn lit(&self, i: usize, j: usize, sigma: f32) -> Lit {
+    pub(super) fn lit(&self, i: usize, j: usize, sigma: f32) -> ReflectedLight {
         let x = self.sample(i + 1, j) - self.sample(i + self.side - 1, j);
         let y = self.sample(i, j + 1) - self.sample(i, j + self.side - 1);
         let p = Vec2::new(i as f32, j as f32) * self.step;
         let own = self.sample(i, j);
-        let reach = Reach { from: self.step, to: self.step * self.side as f32 };
-        Lit::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, reach, |d| self.at(p + d) - own)
+        let reach = HorizonRange { from: self.step, to: self.step * self.side as f32 };
+        ReflectedLight::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, reach, |d| self.at(p + d) - own)
     }
 }
 
@@ -229,8 +229,8 @@ mod tests {
     /// of a cone and of a plane, means over azimuths; Lambertian facets.
     #[test]
     fn surfaces_have_the_light_that_their_closed_forms_say() {
-        let reach = Reach { from: 1.5e-3, to: 0.06 };
-        let lit = |normal: Vec3, horizon: f32| Lit::of(normal, 0.0, reach, |d| d.length() * horizon);
+        let reach = HorizonRange { from: 1.5e-3, to: 0.06 };
+        let lit = |normal: Vec3, horizon: f32| ReflectedLight::of(normal, 0.0, reach, |d| d.length() * horizon);
         let level = lit(Vec3::Z, 0.0);
         assert!((level.sky - 1.0).abs() < 4e-3 && level.missed < 4e-3 && level.slope == 0.0, "{level:?}");
         assert!(level.sent.iter().flatten().chain(&level.shown).all(|sent| (sent - 1.0).abs() < 1e-4), "{level:?}");
@@ -250,7 +250,7 @@ mod tests {
             }
         }
         let (sin, cos) = 20f32.to_radians().sin_cos();
-        let tilted = Lit::of(Vec3::new(sin, 0.0, cos), 0.0, reach, |_| 0.0);
+        let tilted = ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.0, reach, |_| 0.0);
         assert!((tilted.sky - 0.5 * (1.0 + cos)).abs() < 0.01, "{tilted:?}");
         let high = SLANTS - 2;
         let from_above = tilted.sent[Shadowing::pair(high, SLANTS - 1)];
@@ -261,7 +261,7 @@ mod tests {
         let tan_2 = Shadowing::cosine(high).powi(-2) - 1.0;
         assert!((back - cos * (1.0 + 0.5 * (sin / cos).powi(2) * tan_2)).abs() < 2e-3, "{back}");
         assert!((tilted.slope - 0.5 * (sin / cos).powi(2)).abs() < 1e-4, "{tilted:?}");
-        assert!(Lit::of(Vec3::new(sin, 0.0, cos), 0.35, reach, |_| 0.0).sky > tilted.sky + 0.005);
+        assert!(ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.35, reach, |_| 0.0).sky > tilted.sky + 0.005);
     }
 
     /// Expected: a block of 4 mm on a square of 10 mm has the height of its lid inside, 0 outside, and the mean

@@ -56,9 +56,9 @@ struct Detail {
 }
 
 impl Detail {
-    /// Returns the level of detail for a width in millimetres; `told` is the smallest resolved length, mm.
-    fn of(width_mm: f32, told: f32) -> Self {
-        Self { fine: width_mm >= FINE * told }
+    /// Returns the level of detail for a width in millimetres; `resolved_mm` is the smallest resolved length, mm.
+    fn of(width_mm: f32, resolved_mm: f32) -> Self {
+        Self { fine: width_mm >= FINE * resolved_mm }
     }
 
     fn parts(self) -> u8 {
@@ -101,7 +101,7 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
     let mut all = Vec::new();
     let child = |k| own(stream, k);
     let drawn = LitterRecord::draw(desc, stream);
-    let told = ground.sizes.told;
+    let resolved_mm = ground.sizes.resolved_mm;
     let straws = straws_per_m2(desc, &drawn, stream);
     for (kind, per_m2, k) in [
         (DebrisKind::Stick, drawn.sticks_per_m2, 4),
@@ -113,9 +113,9 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
                 break;
             }
             let thing = match kind {
-                DebrisKind::Stick => stick(desc, told, pile, at, &mut s),
-                DebrisKind::Straw => straw(desc, (drawn.weathering, told), pile, at, &mut s),
-                _ => bit(desc, (drawn.weathering, told), pile, at, &mut s),
+                DebrisKind::Stick => stick(desc, resolved_mm, pile, at, &mut s),
+                DebrisKind::Straw => straw(desc, (drawn.weathering, resolved_mm), pile, at, &mut s),
+                _ => bit(desc, (drawn.weathering, resolved_mm), pile, at, &mut s),
             };
             all.push(Debris { dust: desc.dust.draw32(&mut s), ..thing });
         }
@@ -131,9 +131,9 @@ fn straws_per_m2(desc: &LitterDesc, drawn: &LitterRecord, stream: &Stream) -> f3
     -(1.0 - drawn.straw_cover.min(0.95)).ln() / one
 }
 
-/// Estimates the costs of straw, sticks and bits on `area`, a fraction `made` of which gets meshes; `told` is the
+/// Estimates the costs of straw, sticks and bits on `area`, a fraction `made` of which gets meshes; `resolved_mm` is the
 /// smallest resolved length, mm.
-pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), told: f32, stream: &Stream) -> [Cost; 3] {
+pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f32, stream: &Stream) -> [Cost; 3] {
     let drawn = LitterRecord::draw(desc, stream);
     let s = own(stream, 8);
     let mean = |of: &dyn Fn(&mut Stream) -> usize| {
@@ -141,17 +141,17 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), told: f32, str
     };
     let straw = mean(&|s| {
         let points = straw_points(desc.straw_mm.draw32(s) * 1e-3);
-        let detail = Detail::of(desc.straw_width_mm.draw32(s), told);
+        let detail = Detail::of(desc.straw_width_mm.draw32(s), resolved_mm);
         swept(detail.points(points), detail.arc())
     });
     let stick = mean(&|s| {
         let points = stick_points(desc.stick_mm.draw32(s) * 1e-3);
-        let detail = Detail::of(desc.stick_width_mm.draw32(s), told);
+        let detail = Detail::of(desc.stick_width_mm.draw32(s), resolved_mm);
         swept(detail.points(points), detail.corners(ROUND).into())
     });
     let stubs = mean(&|s| desc.stubs.draw(s) as usize) * swept(STUB_POINTS, STUB.into()) as f64;
     let bit = mean(&|s| {
-        let detail = Detail::of(0.3 * desc.bit_mm.draw32(s), told);
+        let detail = Detail::of(0.3 * desc.bit_mm.draw32(s), resolved_mm);
         swept(detail.points(BIT_POINTS), detail.arc())
     });
     // Each piece raises the pile along its path.
@@ -296,11 +296,17 @@ fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut
     Debris { kind, mesh, albedo, tint, dust: 0.0, hue: s.uniform32(), centre, radius }
 }
 
-fn straw(desc: &LitterDesc, (weathering, told): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn straw(
+    desc: &LitterDesc,
+    (weathering, resolved_mm): (f32, f32),
+    pile: &mut Pile,
+    at: Vec2,
+    s: &mut Stream,
+) -> Debris {
     let length = desc.straw_mm.draw32(s) * 1e-3;
     let width = desc.straw_width_mm.draw32(s) * 1e-3;
     let n = straw_points(length);
-    let detail = Detail::of(1e3 * width, told);
+    let detail = Detail::of(1e3 * width, resolved_mm);
     let opening = s.range32(0.9, 4.2);
     let points = path(at, length, 0.25, n, s);
     let path = lay(&points, 0.2 * width, 0.85, pile);
@@ -317,11 +323,11 @@ fn straw(desc: &LitterDesc, (weathering, told): (f32, f32), pile: &mut Pile, at:
     debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s)
 }
 
-fn stick(desc: &LitterDesc, told: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn stick(desc: &LitterDesc, resolved_mm: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.stick_mm.draw32(s) * 1e-3;
     let half = 0.5e-3 * desc.stick_width_mm.draw32(s);
     let n = stick_points(length);
-    let detail = Detail::of(2e3 * half, told);
+    let detail = Detail::of(2e3 * half, resolved_mm);
     let points = path(at, length, 0.5, n, s);
     let path = lay(&points, half, 0.9, pile);
     let knots = (s.range32(0.0, TAU), s.range32(20.0, 60.0));
@@ -342,10 +348,10 @@ fn stick(desc: &LitterDesc, told: f32, pile: &mut Pile, at: Vec2, s: &mut Stream
     debris(DebrisKind::Stick, mesh, WOOD, &path, s)
 }
 
-fn bit(desc: &LitterDesc, (weathering, told): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
+fn bit(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.bit_mm.draw32(s) * 1e-3;
     let half = 0.5 * length * s.range32(0.12, 0.5);
-    let detail = Detail::of(2e3 * half, told);
+    let detail = Detail::of(2e3 * half, resolved_mm);
     let points = path(at, length, 0.5, BIT_POINTS, s);
     let mut path = lay(&points, 1e-4, 0.6, pile);
     // Dry leaves curl up at both ends.

@@ -10,14 +10,14 @@
 //! Clods that are bodies at full detail but not here also shade themselves and each other. Their effect is computed for
 //! level ground, from their heights alone.
 
-use super::bake::{Painted, Shade, closing, wet};
+use super::bake::{Shade, UnshadedMaps, closing, wet};
 use super::ground::Ground;
-use super::lit::{Heights, Lit, Reach};
+use super::lit::{Heights, HorizonRange, ReflectedLight};
 use super::pile::Pile;
 use super::site::{FULL_CELL_M, FULL_TEXEL_M, Sizes};
 use super::{Canopy, InView, LayerMaps, Rect};
 use furrow_base::math::{Vec2, Vec3, vec2};
-use furrow_optics::optics::LostRelief;
+use furrow_optics::optics::UnmeshedRelief;
 use furrow_optics::optics::shadowing::{PAIRS, SLANTS, Shadowing, TURNS, Table};
 use furrow_optics::optics::soil::FACETS;
 use furrow_optics::texture::ground::GroundMaps;
@@ -31,7 +31,7 @@ const AROUND_M: f32 = 0.06;
 
 /// Number of sample points per patch, and the range of the horizon search there, metres.
 const SAMPLES: usize = 800;
-const HORIZON: Reach = Reach { from: 1.5e-3, to: AROUND_M };
+const HORIZON: HorizonRange = HorizonRange { from: 1.5e-3, to: AROUND_M };
 
 /// Total side length of the sample squares for clods along each side of the ground, metres, and the limits of their
 /// number.
@@ -62,7 +62,7 @@ const HALVINGS: usize = 16;
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     /// Light, shadowed by the relief of the mesh.
-    lit: Lit,
+    lit: ReflectedLight,
     /// Depth below its surroundings, metres.
     pit: f32,
     /// Fraction of the ground's moisture that is left.
@@ -74,7 +74,7 @@ struct Sample {
 }
 
 /// Clods that are bodies at full detail, but not here.
-pub(super) struct LostClods {
+pub(super) struct UnmeshedClods {
     /// Samples of level ground with these clods.
     samples: Vec<Sample>,
     /// Fraction of the ground that they cover.
@@ -106,12 +106,17 @@ impl Squares {
 impl Ground {
     /// Returns the darkening by pits and missing relief: [`Shade::FULL`] at full detail; on coarse ground, the values
     /// with which it reflects the same light and holds the same water as at full detail.
-    pub(super) fn shade<L: LayerMaps + Sync>(&self, maps: &[L], painted: &Painted, clods: &LostClods) -> Shade {
+    pub(super) fn shade<L: LayerMaps + Sync>(
+        &self,
+        maps: &[L],
+        painted: &UnshadedMaps,
+        clods: &UnmeshedClods,
+    ) -> Shade {
         let full = Shade::FULL;
         if self.is_full(painted.maps.texel_m) {
             return full;
         }
-        let LostClods { samples: clods, cover, .. } = clods;
+        let UnmeshedClods { samples: clods, cover, .. } = clods;
         let texel = painted.maps.texel_m.min(FULL_TEXEL_M);
         let patches = self.patches();
         let fine: Vec<Sample> = (patches.iter())
@@ -159,7 +164,7 @@ impl Ground {
         Shade {
             sky,
             wet: solve(|half| wetness(&coarse, half) > damp),
-            lost: Some(LostRelief {
+            lost: Some(UnmeshedRelief {
                 open: darker * (1.0 - reflectance * back),
                 back,
                 shadowing: Shadowing::new(&factors),
@@ -186,23 +191,24 @@ impl Ground {
         let Sizes { crumbs, unseen, clods, .. } = self.sizes;
         let (crumb, clod) = (unseen[0].0, unseen[1].0);
         let none = (clod, clod);
-        let sizes = Sizes { crumbs: (crumb, crumbs.1), drawn: none, unseen: [(crumb, crumb), none], clods, told: 0.0 };
+        let sizes =
+            Sizes { crumbs: (crumb, crumbs.1), drawn: none, unseen: [(crumb, crumb), none], clods, resolved_mm: 0.0 };
         self.piece(maps, area, self.step.min(FULL_CELL_M), sizes)
     }
 
     /// Returns `true` if no relief is missing.
     fn is_full(&self, texel_m: f32) -> bool {
         let as_fine = self.step <= FULL_CELL_M && texel_m <= FULL_TEXEL_M;
-        self.sizes.told <= 0.0 || as_fine && self.sizes.unseen[1].0 >= self.sizes.drawn.1
+        self.sizes.resolved_mm <= 0.0 || as_fine && self.sizes.unseen[1].0 >= self.sizes.drawn.1
     }
 
     /// Returns the clods that are bodies at full detail, but not on this ground, whose texels are at most `texel_m`
     /// wide.
-    pub(super) fn lost_clods<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> LostClods {
+    pub(super) fn unmeshed_clods<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> UnmeshedClods {
         let Sizes { drawn, unseen, .. } = self.sizes;
         let (shortest, longest) = (unseen[1].0, drawn.1);
         if self.is_full(texel_m) || self.flat || shortest >= longest {
-            return LostClods { samples: Vec::new(), cover: 0.0, laid: 1.0 };
+            return UnmeshedClods { samples: Vec::new(), cover: 0.0, laid: 1.0 };
         }
         let (corner, size) = (self.area().corners()[0], self.area().size());
         let patches = self.patches();
@@ -214,7 +220,7 @@ impl Ground {
         let Squares { many, side } = Squares::of(size, per_m2, longest);
         let none = (shortest, shortest);
         let clods = (shortest, longest);
-        let sizes = Sizes { crumbs: none, drawn: none, unseen: [none; 2], clods, told: 0.0 };
+        let sizes = Sizes { crumbs: none, drawn: none, unseen: [none; 2], clods, resolved_mm: 0.0 };
         let inner = (CLOD_SAMPLES / 4..CLOD_SAMPLES - CLOD_SAMPLES / 4).step_by(CLOD_EVERY);
         let places: Vec<[usize; 2]> = inner.clone().flat_map(|j| inner.clone().map(move |i| [i, j])).collect();
         let square = |middle: Vec2| {
@@ -241,16 +247,16 @@ impl Ground {
         // Resolved clods have the density of the size distribution and may overlap.
         let left = -(1.0 - cover).max(f32::MIN_POSITIVE).ln() - law(drawn);
         let laid = (left / law(unseen[1]).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        LostClods { samples: samples.concat(), cover, laid }
+        UnmeshedClods { samples: samples.concat(), cover, laid }
     }
 
     /// Samples a patch, at the same points on every ground: the R₂ sequence (Roberts 2018).
-    fn samples(&self, painted: &Painted, patch: Rect) -> Vec<Sample> {
+    fn samples(&self, painted: &UnshadedMaps, patch: Rect) -> Vec<Sample> {
         let place = |k: usize| patch.corners()[0] + patch.size() * (vec2(0.754_877_7, 0.569_840_3) * k as f32).fract();
         (0..SAMPLES).into_par_iter().map(|k| self.sample(painted, place(k))).collect()
     }
 
-    fn sample(&self, painted: &Painted, p: Vec2) -> Sample {
+    fn sample(&self, painted: &UnshadedMaps, p: Vec2) -> Sample {
         let (k, slope) = painted.at(p);
         let mesh = if self.flat { Vec3::Z } else { self.normal(p.x, p.y) };
         let normal = Vec3::new(mesh.x - slope.x * mesh.z, mesh.y - slope.y * mesh.z, mesh.z).normalize();
@@ -258,7 +264,7 @@ impl Ground {
         let height = self.height(p.x, p.y);
         let rise = |d: Vec2| if self.flat { 0.0 } else { self.height(p.x + d.x, p.y + d.y) - height };
         Sample {
-            lit: Lit::of(normal, FACETS, HORIZON, rise),
+            lit: ReflectedLight::of(normal, FACETS, HORIZON, rise),
             pit: painted.pits[k],
             left: painted.left(k),
             albedo,
@@ -375,7 +381,7 @@ mod tests {
         assert!((of(9.0, 1e30).side - 0.03).abs() < 1e-6);
     }
 
-    fn light(lit: &Lit) -> Light {
+    fn light(lit: &ReflectedLight) -> Light {
         Light::of(&[Sample { lit: *lit, pit: 0.0, left: 1.0, albedo: 3.0, raised: false }; 3], 1.0, 0.4)
     }
 
@@ -383,7 +389,8 @@ mod tests {
     /// not brighter than that of level ground.
     #[test]
     fn what_is_shown_too_much_is_put_right() {
-        let mut lit = Lit { sky: 1.0, sent: [[1.0; TURNS]; PAIRS], shown: [1.0; SLANTS], missed: 0.0, slope: 0.0 };
+        let mut lit =
+            ReflectedLight { sky: 1.0, sent: [[1.0; TURNS]; PAIRS], shown: [1.0; SLANTS], missed: 0.0, slope: 0.0 };
         lit.shown[0] = 1.1;
         for k in 0..SLANTS {
             lit.sent[Shadowing::pair(0, k)] = [if k == 0 { 1.21 } else { 1.1 }; TURNS];
@@ -396,8 +403,8 @@ mod tests {
     #[test]
     fn what_misses_the_sky_is_lit_by_the_ground() {
         let shown = [1.0; SLANTS];
-        let lit = Lit { sky: 0.5, sent: [[0.75; TURNS]; PAIRS], shown, missed: 0.5, slope: 0.0 };
-        let dark = Lit { sent: [[0.75, 0.75, 0.75, 0.0]; PAIRS], ..lit };
+        let lit = ReflectedLight { sky: 0.5, sent: [[0.75; TURNS]; PAIRS], shown, missed: 0.5, slope: 0.0 };
+        let dark = ReflectedLight { sent: [[0.75, 0.75, 0.75, 0.0]; PAIRS], ..lit };
         let light = light(&lit);
         let e = light.sky;
         assert!((e - 0.5 / 0.8).abs() < 1e-6, "{light:?}");

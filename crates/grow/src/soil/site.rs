@@ -54,7 +54,7 @@ pub(super) struct Sizes {
     /// Bodies.
     pub(super) clods: (f32, f32),
     /// Smallest resolved length, mm; bodies need no finer shape. 0: no limit.
-    pub(super) told: f32,
+    pub(super) resolved_mm: f32,
 }
 
 impl Site {
@@ -71,7 +71,7 @@ impl Site {
             drawn,
             unseen: [(crumb, crumbs.0), (clod, drawn.0)],
             clods: (body, most),
-            told: self.smallest_mm,
+            resolved_mm: self.smallest_mm,
         }
     }
 }

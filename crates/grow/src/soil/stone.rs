@@ -1,6 +1,6 @@
 //! Stones: worn bodies, placed before anything else.
 
-use super::body::{self, Cut, Pose, Shape};
+use super::body::{self, Pose, Shape, ShapeParameters};
 use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
 use furrow_base::geometry::{Cost, Mesh};
@@ -8,7 +8,8 @@ use furrow_base::math::{Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of stones.
-const CUT: Cut = Cut { planes: (5, 9), distance: (0.7, 1.0), sharpness: (4.0, 9.0), lumps: 0.12, rough: 0.04 };
+const CUT: ShapeParameters =
+    ShapeParameters { planes: (5, 9), distance: (0.7, 1.0), sharpness: (4.0, 9.0), lumps: 0.12, rough: 0.04 };
 
 /// Ratios of the middle to the long axis and of the short to the middle axis: an estimate for field stones.
 const AXES: (f32, f32) = (0.75, 0.65);
@@ -66,13 +67,14 @@ fn density(desc: &StonesDesc, stream: &Stream) -> (f32, f32) {
     (-(1.0 - cover.min(0.98)).ln() / (disc * group), group)
 }
 
-/// Estimates the cost of a population on `area`, a fraction `made` of which gets meshes; `told` is the smallest
+/// Estimates the cost of a population on `area`, a fraction `made` of which gets meshes; `resolved_mm` is the smallest
 /// resolved length, mm.
-pub(super) fn cost(desc: &StonesDesc, (area, made): (Rect, f64), told: f32, stream: &Stream) -> Cost {
+pub(super) fn cost(desc: &StonesDesc, (area, made): (Rect, f64), resolved_mm: f32, stream: &Stream) -> Cost {
     let (per_m2, group) = density(desc, stream);
     let number = f64::from(area.area()) * f64::from(per_m2) * f64::from(group);
     let mut s = stream.child(Purpose::Page, 2);
-    let triangles = (0..512).map(|_| body::triangles(level(length(desc, &mut s), told))).sum::<usize>() as f64 / 512.0;
+    let triangles =
+        (0..512).map(|_| body::triangles(level(length(desc, &mut s), resolved_mm))).sum::<usize>() as f64 / 512.0;
     // Each stone builds its whole shape; triangles below the ground are then left out of the mesh.
     Cost::of(0.75 * triangles, 1.0) * (number * made) + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
 }
@@ -109,9 +111,9 @@ fn disc_m2(mm: f32) -> f32 {
     std::f32::consts::FRAC_PI_4 * AXES.0 * (mm * 1e-3).powi(2)
 }
 
-/// Returns the level of detail of a stone. `told` is the smallest resolved length, mm: about four triangles per such
+/// Returns the level of detail of a stone. `resolved_mm` is the smallest resolved length, mm: about four triangles per such
 /// length.
-fn level(mm: f32, told: f32) -> usize {
+fn level(mm: f32, resolved_mm: f32) -> usize {
     let own = match mm {
         ..2.5 => 0,
         2.5..6.0 => 1,
@@ -119,7 +121,7 @@ fn level(mm: f32, told: f32) -> usize {
         _ => 3,
     };
     // Without a smallest resolved length the ratio is infinite.
-    let seen = match mm / told {
+    let seen = match mm / resolved_mm {
         ..4.0 => 0,
         4.0..8.0 => 1,
         8.0..16.0 => 2,
@@ -129,7 +131,7 @@ fn level(mm: f32, told: f32) -> usize {
 }
 
 fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
-    let shape = Shape::new(level(mm, ground.sizes.told), CUT, s);
+    let shape = Shape::new(level(mm, ground.sizes.resolved_mm), CUT, s);
     let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
     let middle = vary(AXES.0);
     let axes = vec3(1.0, middle, middle * vary(AXES.1)) * (0.5e-3 * mm);

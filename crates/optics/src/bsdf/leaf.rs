@@ -103,7 +103,7 @@ pub struct Leaf {
 }
 
 /// Probabilities to sample each lobe; they sum to one.
-struct Chances {
+struct LobeProbabilities {
     coat: f32,
     reflect: f32,
     transmit: f32,
@@ -132,18 +132,18 @@ impl Leaf {
     }
 
     #[inline]
-    fn chances(&self, side: &Side, cos_o: f32) -> Chances {
+    fn chances(&self, side: &Side, cos_o: f32) -> LobeProbabilities {
         let coat = side.coat.map_or(0.0, |c| fresnel::dielectric(cos_o, c.ior).max(side.albedo));
         // Red, green and near infrared matter equally, so each lobe is weighted by its mean over the bands.
         let reflect = side.diffuse.mean() + side.layer.map_or(0.0, |layer| layer.albedo(cos_o).mean());
         let transmit = self.transmittance.mean();
         let total = (coat + reflect + transmit).max(1e-6);
-        Chances { coat: coat / total, reflect: reflect / total, transmit: transmit / total }
+        LobeProbabilities { coat: coat / total, reflect: reflect / total, transmit: transmit / total }
     }
 
     /// Returns f · |cos θi| and the density for two directions outside the plane of the leaf.
     #[inline]
-    fn both(&self, chances: &Chances, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
+    fn both(&self, chances: &LobeProbabilities, wo: Vec3, wi: Vec3) -> (Spectrum, f32) {
         let (near, far) = self.sides(wo);
         let lambert = wi.z.abs() * FRAC_1_PI;
         let through = near.through(wo.z.abs()) * lambert;

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_spectrum_is_told() {
+    fn invalid_spectra_are_reported() {
         for (text, words) in [
             ("", "no line with numbers"),
             ("400,0.1\n700,x\n", "row 2 is not two numbers"),

@@ -19,4 +19,4 @@ pub mod soil;
 pub use leaf::{Leaf, LeafOptics};
 pub use munsell::Munsell;
 pub use pigments::{LeafBands, Pigments};
-pub use shadowing::{LostRelief, Shadowing};
+pub use shadowing::{Shadowing, UnmeshedRelief};

@@ -38,7 +38,7 @@ const STORED_FACTORS: usize = SLANTED * TURNS + SLANTS;
 
 /// Effect on light of fine relief that is not meshed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LostRelief {
+pub struct UnmeshedRelief {
     /// Radiant exitance under a uniform sky relative to the surface without relief, without interreflection.
     pub open: f32,
     /// Fraction of the reflected light that hits the surface again.
@@ -49,7 +49,7 @@ pub struct LostRelief {
     pub slope: f32,
 }
 
-impl LostRelief {
+impl UnmeshedRelief {
     /// Returns the reflectance, seen from above under a uniform sky, of a surface whose reflectance is `r` when flat:
     /// `r open / (1 − r back)`.
     pub fn darken(&self, r: f32) -> f32 {
@@ -126,14 +126,14 @@ impl Shadowing {
         ((1.0 - s) * near + s * far) / STORED
     }
 
-    /// Returns the cosine-weighted mean over a uniform sky of a quantity given by `told` at each of the table's zenith
+    /// Returns the cosine-weighted mean over a uniform sky of a quantity given by `value_at` at each of the table's zenith
     /// angles.
-    pub fn under_even_sky(told: impl Fn(usize) -> f32) -> f32 {
+    pub fn under_even_sky(value_at: impl Fn(usize) -> f32) -> f32 {
         const STEPS: usize = 64;
         let cosine = |step: usize| (step as f32 + 0.5) / STEPS as f32;
         let at = |cos: f32| {
             let (k, t) = place(cos);
-            2.0 * cos * ((1.0 - t) * told(k) + t * told(k + 1))
+            2.0 * cos * ((1.0 - t) * value_at(k) + t * value_at(k + 1))
         };
         (0..STEPS).map(|step| at(cosine(step))).sum::<f32>() / STEPS as f32
     }

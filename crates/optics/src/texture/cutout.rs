@@ -6,7 +6,7 @@
 //! where the base is. Without one, the narrower end is the base, on the long axis from the second moments, or on the
 //! axis of symmetry if the leaf is about as wide as long.
 
-use super::draw::Drawn;
+use super::draw::GeneratedTexture;
 use super::grid::{flood, middle};
 use super::petiole::{self, Petiole};
 use super::srgb::{ColorSpace, decode};
@@ -27,7 +27,7 @@ const ROOM: f32 = 0.02;
 
 /// Options for extracting a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cutting {
+pub struct CutoutOptions {
     /// Whether the base is at the other end than the one found.
     pub flip: bool,
     /// Whether the petiole is kept. A species file generates its own petiole, so its textures show the blade alone.
@@ -48,7 +48,7 @@ const ANOTHER: f64 = 0.15;
 const CUT: f64 = 0.002;
 
 /// Returns warnings about a photograph, one sentence each, for problems that `cut_out` does not return as errors. `flip`
-/// is that of [`Cutting`].
+/// is that of [`CutoutOptions`].
 pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]], flip: bool) -> Vec<String> {
     let (width, height) = (width as usize, height as usize);
     let mut green = green(rgb);
@@ -73,7 +73,7 @@ pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]], flip: bool) -> Vec<Strin
 }
 
 /// Extracts the leaf of a photograph, upright and with opacity, in sRGB.
-pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> Result<Drawn> {
+pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &CutoutOptions) -> Result<GeneratedTexture> {
     let mut leaf = largest(&green(rgb), width as usize, height as usize);
     let count = leaf.iter().filter(|in_it| **in_it).count();
     if (count as f64) < LEAST * rgb.len() as f64 {
@@ -96,7 +96,7 @@ pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> R
         }
         foot = None;
     }
-    let stance = Stance::of(&leaf, width as usize, up, foot);
+    let stance = LeafPose::of(&leaf, width as usize, up, foot);
     let leaf = leaf;
     let there = |x: i64, y: i64| {
         (0..i64::from(width)).contains(&x)
@@ -118,7 +118,7 @@ pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> R
             rgba.extend(sample(rgb, width, at, &there, gain));
         }
     }
-    Ok(Drawn { width: w, height: h, rgba, opaque: false, relief: None })
+    Ok(GeneratedTexture { width: w, height: h, rgba, opaque: false, relief: None })
 }
 
 /// Returns the bilinear colour and the opacity at a point of the photograph. Texels outside the leaf do not contribute,
@@ -147,7 +147,7 @@ fn sample(rgb: &[[u8; 3]], width: u32, at: Vec2, there: &dyn Fn(i64, i64) -> boo
 }
 
 /// Returns the factors on linear R, G, B that map the grey reference to its reflectance.
-fn gain(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &Cutting) -> Result<[f32; 3]> {
+fn gain(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &CutoutOptions) -> Result<[f32; 3]> {
     let Some(([x, y, w, h], reflectance)) = cutting.grey else { return Ok([1.0; 3]) };
     if w == 0 || h == 0 || x.saturating_add(w) > width || y.saturating_add(h) > height {
         return Err(Error::misuse(format!("the grey area is not inside the photograph of {width} × {height} pixels"))
@@ -248,7 +248,7 @@ fn fill(leaf: &mut [bool], width: usize, height: usize) {
 }
 
 /// Position and orientation of a leaf in its photograph, in pixels.
-struct Stance {
+struct LeafPose {
     foot: Vec2,
     /// Unit vector from the foot to the tip.
     up: Vec2,
@@ -316,7 +316,7 @@ fn symmetry(leaf: &[bool], width: usize, centre: Vec2) -> Vec2 {
     direction((0..ANGLES).max_by_key(alike).unwrap_or(0))
 }
 
-impl Stance {
+impl LeafPose {
     /// Returns the stance of a leaf. `foot` is a point above or below the foot; by default it is the middle of the
     /// lowest slice.
     fn of(leaf: &[bool], width: usize, up: Vec2, foot: Option<Vec2>) -> Self {
@@ -371,8 +371,8 @@ mod tests {
     fn a_leaf_comes_out_upright_whichever_way_it_lies() {
         for k in 0..8 {
             let photo = photograph(k as f32 * 0.8);
-            let leaf = cut_out(400, 400, &photo, &Cutting { stalk: true, ..Cutting::default() }).unwrap();
-            let blade = cut_out(400, 400, &photo, &Cutting::default()).unwrap();
+            let leaf = cut_out(400, 400, &photo, &CutoutOptions { stalk: true, ..CutoutOptions::default() }).unwrap();
+            let blade = cut_out(400, 400, &photo, &CutoutOptions::default()).unwrap();
             assert!((blade.height as f32 - 187.0).abs() < 8.0, "{k}: the petiole is removed: {}", blade.height);
             let (w, h) = (leaf.width as usize, leaf.height as usize);
             assert!((h as f32 - 250.0).abs() < 8.0 && (w as f32 - 100.0).abs() < 8.0, "{k}: {w} × {h}");
@@ -389,7 +389,7 @@ mod tests {
     /// Expected: no warning for one leaf in the middle; a warning for a second leaf beside it, but not for a speck; a
     /// warning for a leaf cut by the border.
     #[test]
-    fn what_a_photograph_should_not_show_is_told() {
+    fn unusable_photographs_are_warned_of() {
         let photo = photograph(0.0);
         assert_eq!(doubts(400, 400, &photo, false), Vec::<String>::new());
         let green = |size: usize| {
@@ -402,10 +402,10 @@ mod tests {
             doubts(400, 400, &photo, false)
         };
         assert_eq!(green(10), Vec::<String>::new());
-        let told = green(80);
-        assert!(told.len() == 1 && told[0].contains("more than one leaf"), "{told:?}");
-        let told = doubts(400, 250, &photo[150 * 400..], false);
-        assert!(told.len() == 1 && told[0].contains("border"), "{told:?}");
+        let messages = green(80);
+        assert!(messages.len() == 1 && messages[0].contains("more than one leaf"), "{messages:?}");
+        let messages = doubts(400, 250, &photo[150 * 400..], false);
+        assert!(messages.len() == 1 && messages[0].contains("border"), "{messages:?}");
     }
 
     /// Draws an ovate, pointed leaf of length 200 and a brown petiole on paper: widest near the base, with this half width.
@@ -439,21 +439,21 @@ mod tests {
             let photo = ovate(half, turn, 100.0);
             assert_eq!(doubts(600, 600, &photo, false), Vec::<String>::new(), "{half} {turn}");
             let blade = photo.iter().filter(|p| p[1] == 130).count() as f64;
-            let of = |cutting: Cutting| cut_out(600, 600, &photo, &cutting).unwrap();
-            let row = |leaf: &Drawn, part: f32| {
+            let of = |cutting: CutoutOptions| cut_out(600, 600, &photo, &cutting).unwrap();
+            let row = |leaf: &GeneratedTexture, part: f32| {
                 let (w, y) = (leaf.width as usize, (part * leaf.height as f32) as usize);
                 (0..w).filter(|x| leaf.rgba[4 * (y * w + x) + 3] > 127).count()
             };
-            let leaf = of(Cutting::default());
+            let leaf = of(CutoutOptions::default());
             assert!(row(&leaf, 0.08) < row(&leaf, 0.9), "{half} {turn}: the tip is up");
             let (w, h) = (leaf.width as usize, leaf.height as usize);
             let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
             let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
             let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count() as f64;
             assert!((all / blade - 1.0).abs() < 0.02 && unlike / all < 0.06, "{half} {turn}: {all} {blade} {unlike}");
-            let flipped = of(Cutting { flip: true, ..Cutting::default() });
+            let flipped = of(CutoutOptions { flip: true, ..CutoutOptions::default() });
             assert!(row(&flipped, 0.08) > row(&flipped, 0.9), "{half} {turn}: flipped");
-            let kept = of(Cutting { stalk: true, ..Cutting::default() });
+            let kept = of(CutoutOptions { stalk: true, ..CutoutOptions::default() });
             assert!(kept.height > leaf.height + 80, "{half} {turn}: {} {}", kept.height, leaf.height);
         }
     }
@@ -464,10 +464,10 @@ mod tests {
     fn a_leaf_without_a_petiole_is_warned_of() {
         for half in [50.0, 95.0] {
             let photo = ovate(half, 0.5, 0.0);
-            let told = doubts(600, 600, &photo, false);
-            assert!(told.len() == 1 && told[0].contains("no petiole"), "{told:?}");
+            let messages = doubts(600, 600, &photo, false);
+            assert!(messages.len() == 1 && messages[0].contains("no petiole"), "{messages:?}");
             assert_eq!(doubts(600, 600, &photo, true), Vec::<String>::new());
-            let leaf = cut_out(600, 600, &photo, &Cutting { flip: true, ..Cutting::default() }).unwrap();
+            let leaf = cut_out(600, 600, &photo, &CutoutOptions { flip: true, ..CutoutOptions::default() }).unwrap();
             let (w, h) = (leaf.width as usize, leaf.height as usize);
             let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
             let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
@@ -479,20 +479,24 @@ mod tests {
     #[test]
     fn a_grey_area_makes_reflectances() {
         let photo = photograph(0.3);
-        let cutting =
-            Cutting { grey: Some(([2, 2, 20, 20], 0.85)), height: Some(120), stalk: true, ..Cutting::default() };
+        let cutting = CutoutOptions {
+            grey: Some(([2, 2, 20, 20], 0.85)),
+            height: Some(120),
+            stalk: true,
+            ..CutoutOptions::default()
+        };
         let leaf = cut_out(400, 400, &photo, &cutting).unwrap();
         assert!(leaf.height.abs_diff(120) <= 1);
         let middle = 4 * (leaf.height as usize / 3 * leaf.width as usize + leaf.width as usize / 2);
         let linear = |v: u8| decode(f32::from(v) / 255.0);
         let wanted = linear(120) * 0.85 / linear(232);
         assert!((linear(leaf.rgba[middle + 1]) - wanted).abs() < 0.01);
-        assert!(cut_out(400, 400, &photo, &Cutting { grey: Some(([390, 0, 20, 20], 0.8)), ..cutting }).is_err());
+        assert!(cut_out(400, 400, &photo, &CutoutOptions { grey: Some(([390, 0, 20, 20], 0.8)), ..cutting }).is_err());
     }
 
     #[test]
     fn paper_alone_has_no_leaf() {
         let paper = vec![[230, 231, 229]; 64 * 64];
-        assert!(cut_out(64, 64, &paper, &Cutting::default()).is_err());
+        assert!(cut_out(64, 64, &paper, &CutoutOptions::default()).is_err());
     }
 }

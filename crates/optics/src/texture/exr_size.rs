@@ -35,12 +35,12 @@ pub fn check(bytes: &[u8]) -> Result<(), String> {
         };
         most = most.max(ratio.saturating_mul(bytes.len() as u64));
     }
-    let told = meta.headers.first().map_or((0, 0), |header| (header.layer_size.0, header.layer_size.1));
+    let header_size = meta.headers.first().map_or((0, 0), |header| (header.layer_size.0, header.layer_size.1));
     if all > most.min(LARGEST) {
         return Err(format!(
             "its header declares {} × {} pixels, {:.1} GiB: more than its {} bytes can hold or above the limit",
-            told.0,
-            told.1,
+            header_size.0,
+            header_size.1,
             all as f64 / f64::from(1 << 30),
             bytes.len()
         ));

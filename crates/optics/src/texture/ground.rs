@@ -1,6 +1,6 @@
 //! Maps of a ground: reflectance, moisture and fine relief, texel by texel.
 
-use crate::optics::LostRelief;
+use crate::optics::UnmeshedRelief;
 use furrow_base::math::{Spectrum, Vec2};
 
 /// Maximum number of layers of a ground.
@@ -31,7 +31,7 @@ pub struct GroundMaps {
     /// Mean reflectance of the dry soil; its ratio of NIR to red applies to every texel.
     pub like: Spectrum,
     /// Relief that is in neither the mesh nor the maps; `None` at full detail.
-    pub lost: Option<LostRelief>,
+    pub lost: Option<UnmeshedRelief>,
 }
 
 impl GroundMaps {

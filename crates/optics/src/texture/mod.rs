@@ -26,10 +26,10 @@ mod srgb;
 mod surface;
 mod texels;
 
-pub use cutout::{Cutting, cut_out, doubts};
+pub use cutout::{CutoutOptions, cut_out, doubts};
 pub use height::Height;
 pub use maps::{AmbientOcclusion, HeightFromBrightness, Maps, NormalMap};
-pub use need::{Allowance, Header, Need};
+pub use need::{Header, MemoryLimit, Need};
 pub use pyramid::Wrap;
 pub use srgb::ColorSpace;
 pub use surface::{NormalTexture, Surface, Transmission};

@@ -187,14 +187,14 @@ fn maps(pixels: f64, beside: f64) -> Need {
 
 /// Memory limit for images, and the memory already counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Allowance {
+pub struct MemoryLimit {
     /// Limit in bytes.
     pub most: f64,
     /// Memory counted so far.
     pub taken: Need,
 }
 
-impl Allowance {
+impl MemoryLimit {
     /// Help text for a refused image.
     pub const HELP: &'static str = "scale the image down; --memory sets the limit, in GiB";
 
@@ -259,9 +259,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_much_is_told_and_not_counted() {
+    fn surplus_is_reported_and_not_counted() {
         let of = header(11_000, 3);
-        let mut allowance = Allowance { most: 1024.0 * MIB, taken: Need::default() };
+        let mut allowance = MemoryLimit { most: 1024.0 * MIB, taken: Need::default() };
         let words = allowance.take(&of, of.layer(None)).unwrap_err();
         assert_eq!(words, "11000 × 11000 pixels would take about 4.5 GiB of memory; the limit is 1.0 GiB");
         assert_eq!(allowance.taken, Need::default());
@@ -269,7 +269,7 @@ mod tests {
         allowance.take(&small, small.color()).unwrap();
         let words = allowance.take(&of, of.color()).unwrap_err();
         assert!(words.contains("beside 81 MiB of other images"), "{words}");
-        let mut unlimited = Allowance::UNLIMITED;
+        let mut unlimited = MemoryLimit::UNLIMITED;
         assert!(unlimited.take(&of, of.color()).is_ok());
     }
 

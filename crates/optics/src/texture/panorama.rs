@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_panorama_is_told() {
+    fn invalid_panoramas_are_reported() {
         for (bytes, words) in [
             (radiance(6, 4, |_| [1; 4]), "twice as wide as high"),
             (radiance(0, 0, |_| [1; 4]), "twice as wide as high"),

@@ -3,8 +3,8 @@
 //! A device processes one image at a time, so concurrent images have separate devices, each with the number of threads
 //! of its image.
 
+use super::noisy_image::{NoisyImage, Rgb};
 use super::oidn::{Device, Oidn};
-use super::picture::{Picture, Rgb};
 use furrow_base::Result;
 use furrow_render::accel::prepare_thread;
 use std::path::Path;
@@ -28,7 +28,7 @@ impl Library {
     }
 
     /// Denoises an image on `threads` threads (0: all).
-    pub(super) fn denoise(&self, picture: &Picture<'_>, threads: usize) -> Result<Vec<Rgb>> {
+    pub(super) fn denoise(&self, picture: &NoisyImage<'_>, threads: usize) -> Result<Vec<Rgb>> {
         let idle = {
             let mut idle = self.idle();
             idle.iter().position(|(of, _)| *of == threads).map(|place| idle.swap_remove(place).1)

@@ -14,15 +14,15 @@
 //! | `program.rs` | the program, which is started for each image and exchanges files |
 
 mod library;
+mod noisy_image;
 mod oidn;
-mod picture;
 mod program;
 
 use furrow_base::math::Spectrum;
 use furrow_base::{Error, Result};
 use furrow_render::film::{Film, Pixel};
 use library::Library;
-use picture::{Kind, Picture, Rgb};
+use noisy_image::{Kind, NoisyImage, Rgb};
 use program::Program;
 use std::path::PathBuf;
 
@@ -98,7 +98,7 @@ impl Job<'_> {
     fn clean(&self, kind: Kind<'_>, of: impl Fn(&Pixel) -> Rgb) -> Result<Vec<Rgb>> {
         let noisy: Vec<Rgb> = self.film.pixels.iter().map(of).collect();
         let size = [self.film.window.width(), self.film.window.height()];
-        let picture = Picture { size, noisy: &noisy, kind };
+        let picture = NoisyImage { size, noisy: &noisy, kind };
         match self.way {
             Way::Library(library) => library.denoise(&picture, self.threads),
             Way::Program(program) => program.denoise(&picture, self.threads),

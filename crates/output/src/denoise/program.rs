@@ -2,7 +2,7 @@
 //!
 //! Source: Open Image Denoise, documentation, "oidnDenoise"; PFM as defined by Debevec's HDR Shop.
 
-use super::picture::{Kind, Picture, Rgb};
+use super::noisy_image::{Kind, NoisyImage, Rgb};
 use furrow_base::{Error, Result};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ impl Program {
     }
 
     /// Denoises an image on `threads` threads (0: all).
-    pub(super) fn denoise(&self, picture: &Picture<'_>, threads: usize) -> Result<Vec<Rgb>> {
+    pub(super) fn denoise(&self, picture: &NoisyImage<'_>, threads: usize) -> Result<Vec<Rgb>> {
         picture.pixels();
         let folder = scratch(&std::env::temp_dir())?;
         let [w, h] = picture.size;
@@ -60,9 +60,9 @@ impl Program {
         if done.status.success() {
             return Ok(());
         }
-        let said =
+        let message =
             String::from_utf8_lossy(if done.stderr.is_empty() { &done.stdout } else { &done.stderr }).into_owned();
-        Err(Error::failed(format!("{} failed ({}): {}", self.0.display(), done.status, said.trim())))
+        Err(Error::failed(format!("{} failed ({}): {}", self.0.display(), done.status, message.trim())))
     }
 }
 

@@ -17,7 +17,7 @@
 //! The document is built here, because the crate `gltf` reads documents but does not write them (tests read these with
 //! it).
 
-mod look;
+mod materials;
 mod pack;
 mod skins;
 
@@ -32,7 +32,7 @@ use furrow_grow::model::{Label, glb};
 use furrow_optics::light::Form;
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Part, Scene};
-use look::Looks;
+use materials::Materials;
 use pack::Pack;
 use serde_json::{Map, Value, json};
 use skins::Skins;
@@ -63,7 +63,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     let mut skins = Skins::new(plants);
     // Children of the root node.
     let mut top = Vec::new();
-    let mut looks = Looks::new(scene);
+    let mut looks = Materials::new(scene);
     let mut document = Document {
         asset: Asset {
             version: "2.0".into(),

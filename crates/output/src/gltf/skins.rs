@@ -18,7 +18,7 @@ use furrow_render::scene::tag::Tag;
 use std::collections::BTreeMap;
 
 /// Plant and leaf number; leaf 0 is the stem.
-type Whose = (u32, u16);
+type PlantLeaf = (u32, u16);
 
 /// Joints of a skin, and the joint of the plant's stem that bears the first one.
 #[derive(Clone, Copy)]
@@ -28,7 +28,7 @@ struct Rig<'a> {
 }
 
 /// Skin that has been written.
-struct Written {
+struct WrittenSkin {
     number: usize,
     /// Node index of its first joint.
     first: usize,
@@ -38,8 +38,8 @@ struct Written {
 
 /// Skins of a document under construction.
 pub(super) struct Skins<'a> {
-    rigs: BTreeMap<Whose, Rig<'a>>,
-    written: BTreeMap<Whose, Written>,
+    rigs: BTreeMap<PlantLeaf, Rig<'a>>,
+    written: BTreeMap<PlantLeaf, WrittenSkin>,
 }
 
 impl<'a> Skins<'a> {
@@ -77,7 +77,7 @@ impl<'a> Skins<'a> {
         let mut places: Vec<DMat4> = Vec::with_capacity(rig.len());
         for (k, joint) in rig.iter().enumerate() {
             let above = match joint.parent.map(usize::from) {
-                Some(k) => Some(Above { node: first + k, place: places[k], joint: &rig[k] }),
+                Some(k) => Some(ParentJoint { node: first + k, place: places[k], joint: &rig[k] }),
                 None => bearer.and_then(|bearer| self.bearer(tag.plant, bearer)),
             };
             let (rotation, translation) = step(joint, above.as_ref().map(|above| above.joint));
@@ -106,20 +106,20 @@ impl<'a> Skins<'a> {
             joints: (first..document.nodes.len()).collect(),
         });
         let number = document.skins.len() - 1;
-        self.written.insert(whose, Written { number, first, places });
+        self.written.insert(whose, WrittenSkin { number, first, places });
         Some(number)
     }
 
     /// Returns a joint of a plant's stems, if they are written.
-    fn bearer(&self, plant: u32, bearer: u16) -> Option<Above<'a>> {
+    fn bearer(&self, plant: u32, bearer: u16) -> Option<ParentJoint<'a>> {
         let (rig, written) = (self.rigs.get(&(plant, 0))?, self.written.get(&(plant, 0))?);
         let k = usize::from(bearer);
-        Some(Above { node: written.first + k, place: *written.places.get(k)?, joint: rig.joints.get(k)? })
+        Some(ParentJoint { node: written.first + k, place: *written.places.get(k)?, joint: rig.joints.get(k)? })
     }
 }
 
 /// Parent of a joint.
-struct Above<'a> {
+struct ParentJoint<'a> {
     node: usize,
     place: DMat4,
     joint: &'a RigJoint,

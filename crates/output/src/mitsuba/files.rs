@@ -1,7 +1,7 @@
 //! Shared parts of a Mitsuba scene export: length unit, bands, folder.
 
 use super::xml::Element;
-use crate::{Together, exr};
+use crate::{FileSet, exr};
 use furrow_base::Result;
 use furrow_base::math::{Spectrum, Vec3};
 use std::path::Path;
@@ -50,7 +50,7 @@ pub(super) enum Plugins {
 /// Files of the export: written to temporary names first, and renamed when all are complete.
 pub(super) struct Files<'a> {
     pub(super) folder: &'a Path,
-    pub(super) together: Together,
+    pub(super) together: FileSet,
 }
 
 impl Files<'_> {

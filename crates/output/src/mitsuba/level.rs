@@ -27,7 +27,7 @@ impl Leveled {
         let of_parts = scene.parts.iter().map(|part| {
             let material = &scene.materials[part.material as usize];
             let level = match material.varies() {
-                Varies::Picture(w, h) => Some(level(&part.in_world(), w.max(h), &scene.camera)),
+                Varies::Texture(w, h) => Some(level(&part.in_world(), w.max(h), &scene.camera)),
                 Varies::Nowhere | Varies::Raster(..) | Varies::Place => None,
             };
             let tint = part.tint();

@@ -38,7 +38,7 @@ struct Lamp {
 
 enum Dome {
     Constant(Spectrum),
-    Picture(String),
+    Texture(String),
 }
 
 impl Lights {
@@ -74,7 +74,7 @@ impl Lights {
             };
             let pixels: Vec<Spectrum> = (0..w * h).map(at).collect();
             files.spectra("textures/sky", w, h, &pixels)?;
-            Some(Dome::Picture("textures/sky".into()))
+            Some(Dome::Texture("textures/sky".into()))
         };
         Ok(of)
     }
@@ -108,7 +108,7 @@ impl Lights {
             }
             // Mitsuba's sphere has y upwards and starts at −z; it is rotated so that its columns are azimuths from
             // north through east.
-            Some(Dome::Picture(stem)) => all.push(
+            Some(Dome::Texture(stem)) => all.push(
                 Element::plugin("emitter", "envmap")
                     .string("filename", band.path(stem))
                     .inside([matrix([Vec3::X, Vec3::Z, Vec3::NEG_Y], Vec3::ZERO)]),

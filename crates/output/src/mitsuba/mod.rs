@@ -27,14 +27,14 @@
 mod files;
 mod level;
 mod light;
-mod look;
 mod mean;
 mod ply;
+mod scattering;
 mod surface;
 mod xml;
 
-use super::png::{self, Picture};
-use super::{Export, Together, unheld};
+use super::png::{self, ImageData};
+use super::{Export, FileSet, unheld};
 use files::{Band, Files, Plugins, SCALE, matrix};
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::Spectrum;
@@ -45,9 +45,9 @@ use furrow_render::material::Varies;
 use furrow_render::scene::{Part, Scene};
 pub use level::{Leveled, fix_levels};
 use light::Lights;
-use look::Look;
-pub use look::relief;
 pub use mean::{Crossing, Directions, Pair};
+use scattering::ScatteringMap;
+pub use scattering::relief;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
@@ -80,7 +80,7 @@ struct Key {
 /// `directions`; `text` is stored in the files as their provenance. `scene.xml` is written last, so its presence means
 /// that the export is complete.
 pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Directions, text: &str) -> Result<Export> {
-    let mut files = Files { folder, together: Together::default() };
+    let mut files = Files { folder, together: FileSet::default() };
     let mut warnings = camera_warnings(scene);
     let groups = groups(scene, leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
@@ -93,7 +93,7 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
-        let look = Look::of(&leveled.materials[group.material as usize]);
+        let look = ScatteringMap::of(&leveled.materials[group.material as usize]);
         let factor = Surface::corner_factor(&look, directions);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
@@ -106,7 +106,8 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     }
     warnings.extend(summary(&lost));
     let notes = if warnings.is_empty() { String::new() } else { format!("\n\n{}", warnings.join("\n")) };
-    let whole = Whole { scene, groups: &groups, surfaces: &surfaces, lights: &lights, notes: format!("{text}{notes}") };
+    let whole =
+        ExportContext { scene, groups: &groups, surfaces: &surfaces, lights: &lights, notes: format!("{text}{notes}") };
     files.write("scene-exact.xml", whole.document(Band::Color, Plugins::Own).as_bytes())?;
     files.write("scene-nir.xml", whole.document(Band::Nir, Plugins::BuiltIn).as_bytes())?;
     files.write("scene.xml", whole.document(Band::Color, Plugins::BuiltIn).as_bytes())?;
@@ -134,10 +135,10 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
     let parts = scene.parts.iter().zip(&leveled.of_parts);
     for (part, &index) in parts.filter(|(p, _)| !p.mesh.triangles.is_empty()) {
         let material = &leveled.materials[index as usize];
-        let colors = (material.varies() == Varies::Place).then(|| look::colors(material, &part.in_world()));
+        let colors = (material.varies() == Varies::Place).then(|| scattering::colors(material, &part.in_world()));
         let look = match &colors {
             None => Ok(index),
-            Some(_) => Err(surface::rough(&Look::of(material))?),
+            Some(_) => Err(surface::rough(&ScatteringMap::of(material))?),
         };
         let key = Key { class: part.tag.class.name(), plant: part.tag.plant, look, mask: address(part) };
         match known.entry(key) {
@@ -187,7 +188,7 @@ fn mask_file(
     let (w, h) = mask.size();
     let opaque = |i: u32| if mask.texel((i % w) as i32, (i / w) as i32) { 255 } else { 0 };
     let pixels: Vec<u8> = (0..w * h).map(opaque).collect();
-    files.write(&name, &png::encode(w, h, &Picture::Gray(&pixels), text)?)?;
+    files.write(&name, &png::encode(w, h, &ImageData::Gray(&pixels), text)?)?;
     known.insert(address, name.clone());
     Ok(name)
 }
@@ -216,7 +217,7 @@ fn camera_warnings(scene: &Scene) -> Vec<String> {
 }
 
 /// Data for all documents.
-struct Whole<'a> {
+struct ExportContext<'a> {
     scene: &'a Scene,
     groups: &'a [Group],
     surfaces: &'a [Surface],
@@ -224,7 +225,7 @@ struct Whole<'a> {
     notes: String,
 }
 
-impl Whole<'_> {
+impl ExportContext<'_> {
     fn document(&self, band: Band, plugins: Plugins) -> String {
         let default = |name: &'static str, value: &str| Element::new("default").with("name", name).with("value", value);
         let mut root = Element::new("scene").with("version", "3.0.0").comment(&self.notes).inside([

@@ -21,8 +21,8 @@
 //! parameters.
 
 use super::files::{Band, Files, Plugins};
-use super::look::{Kind, Look, Texel};
 use super::mean::{Cover, Directions};
+use super::scattering::{Kind, ScatteringMap, Texel};
 use super::xml::Element;
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::{Error, Result};
@@ -44,14 +44,14 @@ enum Paint {
     /// The same value everywhere.
     Plain(Spectrum),
     /// `STEM.exr` holds R, G, B and `STEM-nir.exr` the near infrared.
-    Picture(String),
+    Texture(String),
     /// The values are attributes of the mesh's vertices.
     Corners,
 }
 
 /// Reflectance of the upper and lower side, and transmittance.
 #[derive(Clone, Debug)]
-struct Shares {
+struct Reflectances {
     reflect: [Paint; 2],
     transmit: Option<Paint>,
 }
@@ -63,11 +63,11 @@ pub(super) struct Surface {
     /// `false` for a Lambertian replacement of scattering that the format does not represent.
     held: bool,
     /// Diffuse reflectance of both sides times `factor`, and transmittance times `through`, of the tissue alone.
-    bare: Shares,
+    bare: Reflectances,
     factor: [f32; 2],
     through: f32,
     /// The same with hairs and bloom included, for Mitsuba's own plugins.
-    covered: Option<Shares>,
+    covered: Option<Reflectances>,
     /// Fraction under water divided by its weight, as an image's stem.
     film: Option<String>,
     /// Shading normals, as an image's stem.
@@ -76,9 +76,9 @@ pub(super) struct Surface {
     mask: Option<String>,
 }
 
-impl Shares {
+impl Reflectances {
     /// Writes the images of varying quantities.
-    fn write(look: &Look, factor: [f32; 2], through: f32, stem: &str, files: &mut Files<'_>) -> Result<Self> {
+    fn write(look: &ScatteringMap, factor: [f32; 2], through: f32, stem: &str, files: &mut Files<'_>) -> Result<Self> {
         let mut paint = |what: &str, scale: f32, of: &dyn Fn(usize) -> Spectrum| -> Result<Paint> {
             let all: Vec<Spectrum> = (0..look.texels.len()).map(|i| of(i) * scale).collect();
             match all.first() {
@@ -87,7 +87,7 @@ impl Shares {
                 _ => {
                     let stem = format!("textures/{stem}-{what}");
                     files.spectra(&stem, look.width, look.height, &all)?;
-                    Ok(Paint::Picture(stem))
+                    Ok(Paint::Texture(stem))
                 }
             }
         };
@@ -105,7 +105,7 @@ impl Shares {
 impl Surface {
     /// Writes the images of a look; their names start with `stem`.
     pub(super) fn write(
-        look: &Look,
+        look: &ScatteringMap,
         stem: &str,
         mask: Option<String>,
         mean: &Directions,
@@ -119,7 +119,7 @@ impl Surface {
                 (coats.map(side), mean.coats(coats, true) / THROUGH)
             }
         };
-        let bare = Shares::write(look, factor, through, stem, files)?;
+        let bare = Reflectances::write(look, factor, through, stem, files)?;
         let covered = match look.kind {
             Kind::Sheet { layers, coats } if layers.iter().any(Option::is_some) => {
                 let mut cover = mean.cover(layers);
@@ -128,8 +128,8 @@ impl Surface {
                     side.1 *= 1.0 / mean.coats([coat; 2], false);
                 }
                 let texels = look.texels.iter().map(|texel| under(texel, &cover)).collect();
-                let below = Look { texels, ..look.clone() };
-                Some(Shares::write(&below, factor, through, &format!("{stem}-covered"), files)?)
+                let below = ScatteringMap { texels, ..look.clone() };
+                Some(Reflectances::write(&below, factor, through, &format!("{stem}-covered"), files)?)
             }
             _ => None,
         };
@@ -154,7 +154,12 @@ impl Surface {
 
     /// Creates a rough surface whose reflectance, times [`Surface::corner_factor`], is stored at the mesh's vertices,
     /// with a uniform film of water.
-    pub(super) fn of_corners(look: &Look, stem: &str, mean: &Directions, files: &mut Files<'_>) -> Result<Self> {
+    pub(super) fn of_corners(
+        look: &ScatteringMap,
+        stem: &str,
+        mean: &Directions,
+        files: &mut Files<'_>,
+    ) -> Result<Self> {
         let kind = look.kind;
         let share = look.texels.first().map_or(0.0, |t| t.film);
         let film = (share > 0.0).then(|| format!("textures/{stem}-film"));
@@ -164,7 +169,7 @@ impl Surface {
         Ok(Self {
             kind,
             held: look.held,
-            bare: Shares { reflect: [Paint::Corners, Paint::Corners], transmit: None },
+            bare: Reflectances { reflect: [Paint::Corners, Paint::Corners], transmit: None },
             factor: [Self::corner_factor(look, mean); 2],
             through: 0.0,
             covered: None,
@@ -175,7 +180,7 @@ impl Surface {
     }
 
     /// Returns the factor on reflectances at a mesh's vertices.
-    pub(super) fn corner_factor(look: &Look, mean: &Directions) -> f32 {
+    pub(super) fn corner_factor(look: &ScatteringMap, mean: &Directions) -> f32 {
         match look.kind {
             Kind::Soil { shape, film, shadowing } => {
                 let below = film.map(|coat| (coat, look.mean_film()));
@@ -348,8 +353,8 @@ fn gloss(coat: Ggx, weight: Element) -> Element {
 fn paint(name: &str, paint: &Paint, band: Band) -> Element {
     match (paint, band) {
         (Paint::Plain(s), _) => band.rgb(name, *s),
-        (Paint::Picture(stem), Band::Color) => picture(name, &format!("{stem}.exr"), "bilinear"),
-        (Paint::Picture(stem), Band::Nir) => picture(name, &format!("{stem}-nir.exr"), "bilinear"),
+        (Paint::Texture(stem), Band::Color) => picture(name, &format!("{stem}.exr"), "bilinear"),
+        (Paint::Texture(stem), Band::Nir) => picture(name, &format!("{stem}-nir.exr"), "bilinear"),
         (Paint::Corners, band) => {
             let attribute = if band == Band::Color { "vertex_color" } else { "vertex_nir" };
             Element::plugin("texture", "mesh_attribute").with("name", name).string("name", attribute)
@@ -369,7 +374,7 @@ fn picture(name: &str, path: &str, filter: &str) -> Element {
 
 /// Returns the properties that distinguish surfaces with vertex colours: roughness, and the coverage and gloss of their
 /// film, as bits. Returns an error if a material varies in world space in another way.
-pub(super) fn rough(look: &Look) -> Result<[u32; 4]> {
+pub(super) fn rough(look: &ScatteringMap) -> Result<[u32; 4]> {
     match look.kind {
         Kind::Soil { shape: [a, b], film, .. } => {
             let share = look.texels.first().map_or(0.0, |t| t.film);

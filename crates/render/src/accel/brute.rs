@@ -6,11 +6,11 @@ use furrow_base::math::Vec3;
 use glam::DVec3;
 
 /// Brute-force intersector. Exact where Embree is fast.
-pub struct Brute<'a> {
+pub struct BruteForce<'a> {
     surfaces: &'a [Surface<'a>],
 }
 
-impl<'a> Brute<'a> {
+impl<'a> BruteForce<'a> {
     /// Builds an intersector over `surfaces`.
     pub fn new(surfaces: &'a [Surface<'a>]) -> Self {
         Self { surfaces }
@@ -49,7 +49,7 @@ fn intersect(ray: &Ray, [a, b, c]: [Vec3; 3]) -> Option<(f64, f64, f64)> {
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t < f64::from(ray.t_max)).then_some((t, u, v))
 }
 
-impl Intersect for Brute<'_> {
+impl Intersect for BruteForce<'_> {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let parts = self.surfaces.iter().enumerate();
         let all = parts.flat_map(|(p, s)| (0..s.mesh.triangles.len() as u32).map(move |t| (p as u32, t)));

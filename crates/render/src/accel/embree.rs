@@ -25,7 +25,7 @@ const ISA: &str = "avx2";
 
 /// A committed Embree scene, and the mapping from its ids back to parts and triangles.
 pub struct EmbreeAccel {
-    scene: embree::Scene<Cut>,
+    scene: embree::Scene<AlphaTest>,
     slots: Vec<Slot>,
     /// Instances; their geometry ids follow those of the slots.
     instances: Vec<Instance>,
@@ -50,17 +50,17 @@ struct Instance {
 type Group<'a> = (u32, &'a [Surface<'a>], &'a Placement);
 
 /// Geometries of a scene, ordered by geometry id.
-type Geometries = Vec<Arc<embree::Geometry<Cut>>>;
+type Geometries = Vec<Arc<embree::Geometry<AlphaTest>>>;
 
 /// Scene of parts shared by several plants, and its slots, with part numbers relative to the first part.
-type Shared = (Arc<embree::Scene<Cut>>, Arc<[Slot]>);
+type Shared = (Arc<embree::Scene<AlphaTest>>, Arc<[Slot]>);
 
 /// One geometry of a part, and its triangle indices as in [`Slot`].
-type Piece = (Arc<embree::Geometry<Cut>>, Option<Arc<[u32]>>);
+type Piece = (Arc<embree::Geometry<AlphaTest>>, Option<Arc<[u32]>>);
 
 /// Previous build to reuse. For each surface, the index of the previous surface with the very same mesh and mask, if
 /// there is one.
-pub struct Before<'a> {
+pub struct PreviousBuild<'a> {
     /// The previous accelerator.
     pub accel: &'a EmbreeAccel,
     /// Index of the matching previous surface, one entry per surface.
@@ -68,13 +68,13 @@ pub struct Before<'a> {
 }
 
 /// Data of the alpha test of a masked geometry: texture coordinates of the vertices by primitive, and the mask.
-struct Cut {
+struct AlphaTest {
     uvs: Box<[[Vec2; 3]]>,
     mask: Arc<AlphaMask>,
 }
 
-impl embree::Filter for Cut {
-    fn keeps(&self, primitive: u32, u: f32, v: f32) -> bool {
+impl embree::Filter for AlphaTest {
+    fn accepts(&self, primitive: u32, u: f32, v: f32) -> bool {
         let [a, b, c] = self.uvs[primitive as usize];
         self.mask.opaque_at(a * (1.0 - u - v) + b * u + c * v)
     }
@@ -128,7 +128,7 @@ impl EmbreeAccel {
         surfaces: &[Surface<'_>],
         threads: u32,
         outdated: Option<&AtomicBool>,
-        before: Option<&Before<'_>>,
+        before: Option<&PreviousBuild<'_>>,
     ) -> Result<Self> {
         Self::built(surfaces, threads, outdated, before, false)
     }
@@ -143,7 +143,7 @@ impl EmbreeAccel {
         surfaces: &[Surface<'_>],
         threads: u32,
         outdated: Option<&AtomicBool>,
-        before: Option<&Before<'_>>,
+        before: Option<&PreviousBuild<'_>>,
         quick: bool,
     ) -> Result<Self> {
         let device = match before {
@@ -268,7 +268,7 @@ fn pieces(device: &Arc<embree::Device>, Surface { mesh, mask, .. }: &Surface<'_>
     }
     if !mixed.is_empty() {
         let uvs = mixed.iter().map(|i| mesh.triangles[*i as usize].map(|k| mesh.uvs[k as usize])).collect();
-        pieces.push(new(&mixed, Some(Cut { uvs, mask: Arc::clone(mask) }))?);
+        pieces.push(new(&mixed, Some(AlphaTest { uvs, mask: Arc::clone(mask) }))?);
     }
     Ok(pieces)
 }

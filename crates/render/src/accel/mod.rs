@@ -7,8 +7,8 @@ use furrow_base::geometry::{AlphaMask, Mesh, Placement};
 use furrow_base::math::Vec3;
 use std::sync::Arc;
 
-pub use brute::Brute;
-pub use embree::{Before, EmbreeAccel, prepare_thread, version};
+pub use brute::BruteForce;
+pub use embree::{EmbreeAccel, PreviousBuild, prepare_thread, version};
 
 /// Geometry of one part. Its part index is its position in the slice that an accelerator is built from.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Debug images that show properties of the first surface in false colours.
 
-use super::{FirstHit, Integrator, Sample, Sighting, World};
+use super::{CameraSample, FirstHit, Integrator, Sample, World};
 
 use furrow_base::math::{Spectrum, Vec3};
 
@@ -22,9 +22,9 @@ pub enum FalseColor {
 }
 
 impl Integrator for FalseColor {
-    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting {
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> CameraSample {
         let ray = &sample.ray;
-        let Some((hit, at)) = world.interact(ray, 0.0, spread) else { return Sighting::default() };
+        let Some((hit, at)) = world.interact(ray, 0.0, spread) else { return CameraSample::default() };
         let wo = -ray.direction;
         let part = &world.scene.parts[hit.part as usize];
         let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
@@ -41,6 +41,6 @@ impl Integrator for FalseColor {
             Self::Albedo => albedo,
             Self::Depth => Spectrum::splat(1.0 / (1.0 + hit.t)),
         };
-        Sighting { radiance, first: Some(FirstHit { part: hit.part, distance: hit.t, normal, albedo }) }
+        CameraSample { radiance, first: Some(FirstHit { part: hit.part, distance: hit.t, normal, albedo }) }
     }
 }

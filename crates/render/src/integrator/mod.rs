@@ -40,7 +40,7 @@ impl World<'_> {
 
 /// Result of one camera sample.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sighting {
+pub struct CameraSample {
     /// Radiance along the ray.
     pub radiance: Spectrum,
     /// First surface hit, if any.
@@ -72,11 +72,11 @@ pub struct Sample {
 /// Estimates the radiance along camera rays. `spread` is the growth of a ray's width in metres per metre.
 pub trait Integrator: Sync {
     /// Estimates the radiance of one sample.
-    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting;
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> CameraSample;
 
     /// Estimates the radiance of several samples of one pixel. Their nearly parallel rays are traced faster as a
     /// packet. Empty lanes return the default.
-    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [Sighting; PACKET] {
-        samples.map(|sample| sample.map_or_else(Sighting::default, |sample| self.li(world, &sample, spread)))
+    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [CameraSample; PACKET] {
+        samples.map(|sample| sample.map_or_else(CameraSample::default, |sample| self.li(world, &sample, spread)))
     }
 }

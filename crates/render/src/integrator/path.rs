@@ -9,7 +9,7 @@
 
 use super::roulette::RouletteSplitting;
 use super::vertex::Vertex;
-use super::{Integrator, Sample, Sighting, World};
+use super::{CameraSample, Integrator, Sample, World};
 use furrow_base::geometry::{PACKET, Ray};
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::sampling::{Sampler, sets};
@@ -60,12 +60,12 @@ struct Origin {
     normal: Vec3,
     two_sided: bool,
     pdf: f32,
-    asked: Asked,
+    asked: LightStrategy,
 }
 
 /// Light sampling strategy of a surface.
 #[derive(Clone, Copy)]
-enum Asked {
+enum LightStrategy {
     /// All lights are sampled. `rays` is the expected number of scattered rays per sample of a wide light.
     All { rays: f32 },
     /// One light is sampled, with probability proportional to its importance.
@@ -76,7 +76,7 @@ enum Asked {
 #[derive(Clone, Copy)]
 struct Direct {
     found: Spectrum,
-    /// Same as in [`Asked::All`].
+    /// Same as in [`LightStrategy::All`].
     rays: f32,
 }
 
@@ -90,7 +90,7 @@ impl Default for Direct {
 type Seen = [Option<(Vertex, Sampler)>; PACKET];
 
 /// A scattered ray.
-struct Flight {
+struct ScatteredRay {
     ray: Ray,
     /// Width at the origin, metres.
     width: f32,
@@ -100,10 +100,10 @@ struct Flight {
     from: Origin,
 }
 
-impl Flight {
+impl ScatteredRay {
     /// Samples a ray scattered at `vertex` with the numbers `u`, before Russian roulette.
     #[inline]
-    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked: Asked) -> Option<Self> {
+    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked: LightStrategy) -> Option<Self> {
         let s = vertex.sample(u)?;
         let at = &vertex.at;
         let (normal, two_sided) = (vertex.normal(), vertex.bsdf.transmits());
@@ -156,8 +156,8 @@ impl PathTracer {
             (true, false) => 0.0,
             (true, true) => {
                 let (rays, asks) = match from.asked {
-                    Asked::All { rays } => (if light.is_narrow() { 1.0 } else { rays }, 1.0),
-                    Asked::One => {
+                    LightStrategy::All { rays } => (if light.is_narrow() { 1.0 } else { rays }, 1.0),
+                    LightStrategy::One => {
                         let total = total_importance(world, from.p, from.normal, from.two_sided);
                         let own = light.importance(from.p, from.normal, from.two_sided);
                         (1.0, own / total.max(f32::MIN_POSITIVE))
@@ -171,7 +171,14 @@ impl PathTracer {
     /// Samples `light`, which was selected with probability `chance`. Returns the contribution if unoccluded, and the
     /// shadow ray. `rays` is the expected number of scattered rays for the MIS weight.
     #[inline(always)]
-    fn ask(&self, vertex: &Vertex, light: &Light, chance: f32, rays: f32, u: [f32; 2]) -> Option<(Spectrum, Ray)> {
+    fn sample_light(
+        &self,
+        vertex: &Vertex,
+        light: &Light,
+        chance: f32,
+        rays: f32,
+        u: [f32; 2],
+    ) -> Option<(Spectrum, Ray)> {
         let s = light.sample_li(vertex.at.p, u)?;
         let (f, bsdf_pdf) = vertex.eval_pdf(s.wi);
         if f.is_black() || s.pdf <= 0.0 {
@@ -186,7 +193,7 @@ impl PathTracer {
     /// Computes direct light at the first surfaces of a packet. Lights are sampled in order, each with a probability
     /// that depends on its contribution relative to the light found before. The sample position on light `narrow` is
     /// stratified jointly with the pixel position, because both move its shadow edges.
-    fn ask_all(
+    fn sample_all_lights(
         &self,
         world: &World<'_>,
         seen: &Seen,
@@ -223,7 +230,7 @@ impl PathTracer {
                 let rays = if light.is_narrow() { 1.0 } else { *rays };
                 // The MIS weight of scattered rays does not know this probability, so it is divided out here, outside
                 // the weight.
-                if let Some((light, ray)) = self.ask(vertex, light, 1.0, rays, place) {
+                if let Some((light, ray)) = self.sample_light(vertex, light, 1.0, rays, place) {
                     brings[i] = light * (1.0 / chance);
                     shadow[i] = Some(ray);
                 }
@@ -244,7 +251,7 @@ impl PathTracer {
 
     /// Direct light at a later surface: samples one light in proportion to its importance there.
     #[inline]
-    fn ask_one(&self, world: &World<'_>, vertex: &Vertex, u: [f32; 3]) -> Spectrum {
+    fn sample_one_light(&self, world: &World<'_>, vertex: &Vertex, u: [f32; 3]) -> Spectrum {
         let (p, normal, two_sided) = (vertex.at.p, vertex.normal(), vertex.bsdf.transmits());
         let total = total_importance(world, p, normal, two_sided);
         if total <= 0.0 {
@@ -262,7 +269,7 @@ impl PathTracer {
                 }
             }
         }
-        match chosen.and_then(|(light, chance)| self.ask(vertex, light, chance, 1.0, [u[1], u[2]])) {
+        match chosen.and_then(|(light, chance)| self.sample_light(vertex, light, chance, 1.0, [u[1], u[2]])) {
             Some((light, ray)) if !world.geometry.occluded(&ray) => light,
             _ => Spectrum::ZERO,
         }
@@ -273,7 +280,7 @@ impl PathTracer {
     fn follow(
         &self,
         world: &World<'_>,
-        mut flight: Flight,
+        mut flight: ScatteredRay,
         roulette: &RouletteSplitting,
         sampler: Sampler,
         branch: u32,
@@ -281,7 +288,7 @@ impl PathTracer {
     ) -> Spectrum {
         let mut radiance = Spectrum::ZERO;
         for depth in 1..=self.max_depth {
-            let Flight { ray, throughput, ref from, .. } = flight;
+            let ScatteredRay { ray, throughput, ref from, .. } = flight;
             let met = world.interact(&ray, flight.width, flight.spread);
             radiance +=
                 throughput * self.lamps(world, &ray, from, met.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.t));
@@ -294,10 +301,10 @@ impl PathTracer {
             let vertex = Vertex::new(world, &ray, &hit, at);
             let lights = sampler.get4(sets::light(branch, depth));
             if self.technique.light_sampling {
-                radiance += throughput * self.ask_one(world, &vertex, [lights[0], lights[1], lights[2]]);
+                radiance += throughput * self.sample_one_light(world, &vertex, [lights[0], lights[1], lights[2]]);
             }
             let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
-            let Some(next) = Flight::leave(&vertex, [lobe, u, v], throughput, Asked::One) else { break };
+            let Some(next) = ScatteredRay::leave(&vertex, [lobe, u, v], throughput, LightStrategy::One) else { break };
             flight = next;
             let chance = roulette.survive(flight.throughput, found + radiance);
             if lights[3] >= chance {
@@ -335,7 +342,8 @@ impl PathTracer {
                     [lobe, u, v]
                 }
             };
-            let Some(flight) = Flight::leave(vertex, [lobe, u, v], Spectrum::splat(1.0 / mean), Asked::All { rays })
+            let Some(flight) =
+                ScatteredRay::leave(vertex, [lobe, u, v], Spectrum::splat(1.0 / mean), LightStrategy::All { rays })
             else {
                 continue;
             };
@@ -351,13 +359,13 @@ fn total_importance(world: &World<'_>, p: Vec3, normal: Vec3, two_sided: bool) -
 }
 
 impl Integrator for PathTracer {
-    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> Sighting {
+    fn li(&self, world: &World<'_>, sample: &Sample, spread: f32) -> CameraSample {
         let mut alone = [None; PACKET];
         alone[0] = Some(*sample);
         self.li_packet(world, &alone, spread)[0]
     }
 
-    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [Sighting; PACKET] {
+    fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [CameraSample; PACKET] {
         let hits = world.geometry.closest_packet(&samples.map(|sample| sample.map(|s| s.ray)));
         let mut seen: Seen = [None; PACKET];
         for i in 0..PACKET {
@@ -368,11 +376,11 @@ impl Integrator for PathTracer {
         let roulette = RouletteSplitting::new(world, self.technique.roulette);
         let narrow = world.scene.lights.iter().position(Light::is_narrow).filter(|_| self.technique.light_sampling);
         let direct = if self.technique.light_sampling {
-            self.ask_all(world, &seen, &roulette, narrow)
+            self.sample_all_lights(world, &seen, &roulette, narrow)
         } else {
             [Direct::default(); PACKET]
         };
-        let mut sightings = [Sighting::default(); PACKET];
+        let mut sightings = [CameraSample::default(); PACKET];
         for i in 0..PACKET {
             let Some(sample) = &samples[i] else { continue };
             let (radiance, first) = match (&seen[i], &hits[i]) {
@@ -382,7 +390,7 @@ impl Integrator for PathTracer {
                 }
                 _ => (self.escaped(world, &sample.ray, None), None),
             };
-            sightings[i] = Sighting { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
+            sightings[i] = CameraSample { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
         }
         sightings
     }

@@ -51,7 +51,7 @@ impl RouletteSplitting {
 
     /// Contribution of `radiance` relative to the light `found` so far, in the band that gains most.
     #[inline]
-    fn worth(&self, radiance: Spectrum, found: Spectrum) -> f32 {
+    fn relative_gain(&self, radiance: Spectrum, found: Spectrum) -> f32 {
         let beside = found + self.usual * DARK;
         (radiance / (beside + Spectrum::splat(f32::MIN_POSITIVE))).max()
     }
@@ -62,7 +62,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        self.worth(albedo * (irradiance * FRAC_1_PI), found).sqrt().clamp(LEAST, 1.0)
+        self.relative_gain(albedo * (irradiance * FRAC_1_PI), found).sqrt().clamp(LEAST, 1.0)
     }
 
     /// Mean number of rays to scatter from the first surface, which returns about `albedo` of the incident light.
@@ -71,7 +71,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        (SPLIT * self.worth(albedo * self.usual, found)).sqrt().clamp(LEAST, MOST)
+        (SPLIT * self.relative_gain(albedo * self.usual, found)).sqrt().clamp(LEAST, MOST)
     }
 
     /// Probability of continuing a path whose next light arrives with `throughput`. It is bounded so that roulette
@@ -81,7 +81,7 @@ impl RouletteSplitting {
         if !self.on {
             return 1.0;
         }
-        (SURVIVAL * self.worth(throughput * self.usual, found)).sqrt().max(LEAST * throughput.max()).min(1.0)
+        (SURVIVAL * self.relative_gain(throughput * self.usual, found)).sqrt().max(LEAST * throughput.max()).min(1.0)
     }
 }
 

@@ -116,7 +116,7 @@ fn mix(a: Leaf, b: Leaf, t: f32) -> Leaf {
 
 /// Tissue at a point of a leaf with a condition.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Worn {
+pub(super) struct DamagedTissue {
     /// Tissue under the soil, if any.
     pub(super) tissue: Leaf,
     /// Tissue as seen from above, including soil.
@@ -198,14 +198,14 @@ impl ConditionOptics {
     }
 
     /// Applies the condition to `leaf` at `uv`; `picture` is the image it was read from.
-    pub(super) fn at(&self, leaf: Leaf, uv: Vec2, picture: Option<&Texture>) -> Worn {
+    pub(super) fn at(&self, leaf: Leaf, uv: Vec2, picture: Option<&Texture>) -> DamagedTissue {
         let inner = &*self.0;
         let vein = self.vein(picture, uv);
         let mut tissue = leaf;
         if let Some(red) = inner.red {
             tissue = inner.tones.reddened(tissue, red, vein);
         }
-        let Some(marks) = &inner.marks else { return Worn { tissue, upper: tissue, waxy: true } };
+        let Some(marks) = &inner.marks else { return DamagedTissue { tissue, upper: tissue, waxy: true } };
         let t = marks.tissue(uv, &inner.noise);
         let yellow = yellowness(&t, vein);
         if yellow > 0.0 {
@@ -221,10 +221,10 @@ impl ConditionOptics {
         }
         tissue = held(tissue);
         if t.soil <= 0.0 {
-            return Worn { tissue, upper: tissue, waxy: true };
+            return DamagedTissue { tissue, upper: tissue, waxy: true };
         }
         let soil = Leaf { reflectance: inner.soil * t.shade.clamp(0.4, 1.4), transmittance: Spectrum::ZERO };
-        Worn { tissue, upper: held(mix(tissue, soil, t.soil)), waxy: t.soil < BURIED }
+        DamagedTissue { tissue, upper: held(mix(tissue, soil, t.soil)), waxy: t.soil < BURIED }
     }
 }
 

@@ -14,5 +14,5 @@ pub enum Feature {
     Relief,
     /// Colours of a leaf image. Without them the leaf has the uniform colour of its pigments; outline and relief are
     /// kept.
-    Picture,
+    Texture,
 }

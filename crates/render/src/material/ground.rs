@@ -132,7 +132,7 @@ impl Ground {
         match feature {
             Feature::Facets => self.facets = None,
             Feature::Relief => self.relief = false,
-            Feature::Transmission | Feature::Coat | Feature::Picture => {}
+            Feature::Transmission | Feature::Coat | Feature::Texture => {}
         }
     }
 

@@ -2,7 +2,7 @@
 //! transmission.
 
 use super::Damage;
-use super::condition::{ConditionOptics, Worn};
+use super::condition::{ConditionOptics, DamagedTissue};
 use super::feature::Feature;
 use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
@@ -106,7 +106,7 @@ impl Default for LeafDesc {
 
 /// An image with its derived maps; decoded once and shared by all specimens.
 #[derive(Debug)]
-pub struct Picture {
+pub struct LeafTexture {
     /// Colour and opacity.
     pub color: Texture,
     /// Normal, height and occlusion.
@@ -116,7 +116,7 @@ pub struct Picture {
 /// A leaf material, prepared for shading. Clones share the image and the tables.
 #[derive(Clone, Debug)]
 pub struct LeafMaterial {
-    picture: Option<Arc<Picture>>,
+    picture: Option<Arc<LeafTexture>>,
     optics: Arc<LeafOptics>,
     upper: Side,
     lower: Side,
@@ -138,7 +138,7 @@ pub struct LeafMaterial {
 
 impl LeafMaterial {
     /// Builds the material from its description and its image.
-    pub fn new(desc: &LeafDesc, picture: Option<Arc<Picture>>) -> Self {
+    pub fn new(desc: &LeafDesc, picture: Option<Arc<LeafTexture>>) -> Self {
         let across = desc.roughness.f32().max(0.02);
         let along = desc.roughness_along.map_or(across, |r| r.f32().max(0.02));
         let back = desc.roughness_back.f32().max(0.02);
@@ -215,7 +215,7 @@ impl LeafMaterial {
                     [self.upper, self.lower].map(|side| Side::bare(Spectrum::ZERO).layered(side.layer()));
             }
             Feature::Relief => self.relief = 0.0,
-            Feature::Picture => self.pictured = false,
+            Feature::Texture => self.pictured = false,
             Feature::Facets => {}
         }
     }
@@ -226,9 +226,9 @@ impl LeafMaterial {
     }
 
     /// Tissue at `uv` with the leaf's condition applied.
-    fn worn_at(&self, leaf: Leaf, uv: Vec2) -> Worn {
+    fn worn_at(&self, leaf: Leaf, uv: Vec2) -> DamagedTissue {
         match &self.condition {
-            None => Worn { tissue: leaf, upper: leaf, waxy: true },
+            None => DamagedTissue { tissue: leaf, upper: leaf, waxy: true },
             Some(condition) => {
                 let picture = self.picture.as_ref().filter(|_| self.pictured);
                 condition.at(leaf, uv, picture.map(|p| &p.color))
@@ -281,13 +281,18 @@ impl LeafMaterial {
     }
 
     /// Swatch of a leaf with a condition: an image of its own, including the tint.
-    fn condition_swatch<'a>(&'a self, picture: &'a Picture, condition: &ConditionOptics, roughness: f32) -> Swatch<'a> {
+    fn condition_swatch<'a>(
+        &'a self,
+        picture: &'a LeafTexture,
+        condition: &ConditionOptics,
+        roughness: f32,
+    ) -> Swatch<'a> {
         let size = condition.picture_size((picture.color.width(), picture.color.height()));
         let lod = picture.color.lod(1.0 / size.0.max(size.1) as f32);
         let tone = move |uv: Vec2| {
             let [r, g, b, _] = picture.color.sample(uv, lod);
             let leaf = self.optics.at((Vec3::new(r, g, b) * self.exposure * self.tint).to_array());
-            let Worn { upper, waxy, .. } = self.worn_at(leaf, uv);
+            let DamagedTissue { upper, waxy, .. } = self.worn_at(leaf, uv);
             self.tone(upper, waxy)
         };
         // Mean over the opaque points of a grid.
@@ -314,7 +319,7 @@ impl LeafMaterial {
         let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
         let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
             let leaf = self.optics.at((self.plain() * self.tint).to_array());
-            let Worn { upper, waxy, .. } = self.worn_at(leaf, Vec2::splat(0.5));
+            let DamagedTissue { upper, waxy, .. } = self.worn_at(leaf, Vec2::splat(0.5));
             return Swatch::plain(self.tone(upper, waxy), roughness).paler_below(self.back_paleness);
         };
         if let Some(condition) = &self.condition {
@@ -361,7 +366,7 @@ impl LeafMaterial {
                 (self.optics.at((color * tint).to_array()), bump(at, tangents, slope))
             }
         };
-        let Worn { tissue, upper: leaf, waxy } = self.worn_at(leaf, at.uv);
+        let DamagedTissue { tissue, upper: leaf, waxy } = self.worn_at(leaf, at.uv);
         // The lower side reflects more visible light, limited by energy conservation. No soil falls on it.
         let room = Spectrum::splat(0.99) - leaf.transmittance;
         let [r, g, b, nir] = tissue.reflectance.to_array();

@@ -5,7 +5,7 @@ mod damage;
 mod feature;
 pub mod ground;
 pub mod leaf;
-mod painted;
+mod model_surface;
 mod shading;
 mod solid;
 pub mod swatch;
@@ -20,8 +20,8 @@ pub use condition::{ConditionOptics, Tones, tissues};
 pub use damage::Damage;
 pub use feature::Feature;
 pub use ground::{BakedGround, Ground};
-pub use leaf::{LeafDesc, LeafMaterial, Picture};
-pub use painted::{Painted, Repaint};
+pub use leaf::{LeafDesc, LeafMaterial, LeafTexture};
+pub use model_surface::{ModelSurface, SurfaceOverride};
 pub use solid::Solid;
 pub use varies::Varies;
 
@@ -35,7 +35,7 @@ pub enum Material {
     /// Stone, wood, straw: one rough colour.
     Solid(Solid),
     /// Surfaces of models loaded from disk.
-    Painted(Painted),
+    ModelSurface(ModelSurface),
     /// A uniform BSDF, for tests and teaching.
     Plain(Bsdf),
 }
@@ -48,7 +48,7 @@ impl Material {
         let mut same = self.clone();
         match &mut same {
             Self::Leaf(m) => m.fix_level(level),
-            Self::Painted(m) => m.fix_level(level),
+            Self::ModelSurface(m) => m.fix_level(level),
             Self::Ground(_) | Self::Solid(_) | Self::Plain(_) => {}
         }
         same
@@ -59,7 +59,7 @@ impl Material {
     pub fn tinted(&self, factor: Vec3) -> Self {
         match self {
             Self::Leaf(m) => Self::Leaf(m.tinted(factor)),
-            Self::Ground(_) | Self::Solid(_) | Self::Painted(_) | Self::Plain(_) => self.clone(),
+            Self::Ground(_) | Self::Solid(_) | Self::ModelSurface(_) | Self::Plain(_) => self.clone(),
         }
     }
 
@@ -78,7 +78,7 @@ impl Material {
             Self::Leaf(m) => m.varies(),
             Self::Ground(m) => m.varies(),
             Self::Solid(m) => m.varies(),
-            Self::Painted(m) => m.varies(),
+            Self::ModelSurface(m) => m.varies(),
             Self::Plain(_) => Varies::Nowhere,
         }
     }
@@ -92,7 +92,7 @@ impl Material {
             Self::Leaf(m) => m.scatter(at, wo),
             Self::Ground(m) => m.scatter(at, wo),
             Self::Solid(m) => m.scatter(at, wo),
-            Self::Painted(m) => m.scatter(at, wo),
+            Self::ModelSurface(m) => m.scatter(at, wo),
             Self::Plain(bsdf) => (*bsdf, shading::grained_frame(at, at.ns, at.tangents().0, wo)),
         }
     }
@@ -101,7 +101,7 @@ impl Material {
     pub fn damage(&self, at: &Interaction, direction: Vec3) -> Damage {
         match self {
             Self::Leaf(m) => m.damage(at.uv, direction.dot(at.ng) < 0.0),
-            Self::Ground(_) | Self::Solid(_) | Self::Painted(_) | Self::Plain(_) => Damage::default(),
+            Self::Ground(_) | Self::Solid(_) | Self::ModelSurface(_) | Self::Plain(_) => Damage::default(),
         }
     }
 
@@ -111,7 +111,7 @@ impl Material {
             Self::Leaf(m) => m.leave_out(feature),
             Self::Ground(m) => m.leave_out(feature),
             Self::Solid(m) => m.leave_out(feature),
-            Self::Painted(m) => m.leave_out(feature),
+            Self::ModelSurface(m) => m.leave_out(feature),
             Self::Plain(_) => {}
         }
     }
@@ -122,7 +122,7 @@ impl Material {
             Self::Leaf(m) => m.swatch(),
             Self::Ground(m) => m.swatch(),
             Self::Solid(m) => m.swatch(),
-            Self::Painted(m) => m.swatch(),
+            Self::ModelSurface(m) => m.swatch(),
             Self::Plain(bsdf) => {
                 let tone = Tone { reflectance: bsdf.reflectance(1.0), transmittance: bsdf.transmittance() };
                 Swatch::plain(tone, 1.0)

@@ -1,10 +1,10 @@
 //! Renders one image of a scene: shadow maps, labels, ambient occlusion, shading, and readback.
 
-use super::Drawn;
+use super::LabelledImage;
 use super::gpu::{Gpu, view};
 use super::lights::{Lights, SHADOW_SIZE};
 use super::pipelines::{AMBIENT_OCCLUSION, DEPTH, NORMALS, PARTS, POSITIONS, Pipelines, RADIANCE, SAMPLES};
-use super::sheets::Sheets;
+use super::textures::SceneTextures;
 use super::vertices::Vertices;
 use crate::film::{Accumulator, Film};
 use crate::render::{LabelMap, label};
@@ -42,14 +42,14 @@ struct Stage<'a> {
 }
 
 /// Renders a scene.
-pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: &Techniques) -> Result<Drawn> {
+pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: &Techniques) -> Result<LabelledImage> {
     let limits = gpu.device.limits();
     let size = (scene.camera.width(), scene.camera.height());
     if size.0.max(size.1) > limits.max_texture_dimension_2d {
         return Err(Error::missing(format!("{} × {} pixels are more than {} supports", size.0, size.1, gpu.name()))
             .help(format!("use at most {} in each direction", limits.max_texture_dimension_2d)));
     }
-    let sheets = Sheets::new(scene, gpu, limits.max_texture_dimension_2d);
+    let sheets = SceneTextures::new(scene, gpu, limits.max_texture_dimension_2d);
     let vertices = Vertices::new(scene, &sheets.worn, sheets.all.len());
     let lights = Lights::new(scene, &vertices.corners, techniques);
     let corners = bytemuck::cast_slice(&vertices.corners);
@@ -103,7 +103,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: 
     gpu.queue.submit([encoder.finish()]);
     let radiance = gpu.read(&picture)?;
     gpu.check()?;
-    Ok(Drawn { film: film(scene, &labels, &radiance, 1.0 / scale), labels })
+    Ok(LabelledImage { film: film(scene, &labels, &radiance, 1.0 / scale), labels })
 }
 
 /// Factor that scales radiance to about one.

@@ -40,9 +40,9 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&wanted))
             .map_err(|e| Error::missing(format!("{name} cannot be used: {e}")).help("update its driver"))?;
         let fault = Arc::new(Mutex::new(None));
-        let told = Arc::clone(&fault);
+        let first_fault = Arc::clone(&fault);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
-            told.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| e.to_string());
+            first_fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| e.to_string());
         }));
         Ok(Self { device, queue, name, fault })
     }

@@ -18,18 +18,18 @@
 //!
 //! Depth of field is not rendered, and the pixel filter is the box of MSAA instead of the path tracer's.
 
-mod drawn;
 mod frame;
 mod gpu;
+mod labelled_image;
 mod lights;
 mod pipelines;
-mod sheets;
+mod textures;
 mod vertices;
 
 use crate::scene::Scene;
 use crate::settings::Techniques;
-pub use drawn::Drawn;
 use furrow_base::Result;
+pub use labelled_image::LabelledImage;
 
 use gpu::Gpu;
 use pipelines::Pipelines;
@@ -55,7 +55,7 @@ impl Rasterizer {
 
     /// Renders the whole camera image. Returns [`Kind::Missing`](furrow_base::error::Kind::Missing) if the image is
     /// larger than the GPU supports.
-    pub fn draw(&self, scene: &Scene, techniques: &Techniques) -> Result<Drawn> {
+    pub fn draw(&self, scene: &Scene, techniques: &Techniques) -> Result<LabelledImage> {
         frame::draw(&self.gpu, &self.pipelines, scene, techniques)
     }
 }

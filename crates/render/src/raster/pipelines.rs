@@ -96,36 +96,39 @@ impl Pipelines {
         };
         let scene = module(concat!(include_str!("view.wgsl"), include_str!("scene.wgsl")));
         let occlusion = module(concat!(include_str!("view.wgsl"), include_str!("occlusion.wgsl")));
-        let pass = |of: &Pass<'_>| of.pipeline(gpu);
+        let pass = |of: &PipelineParameters<'_>| of.pipeline(gpu);
         let all = [Some(&frame), Some(&sheet), Some(&around)];
-        let draw = Pass { vertex: "corner", corners: true, ..Pass::of(&scene, &all) };
-        let back = Pass { depth: Some(CompareFunction::Always), ..Pass::of(&scene, &all) };
-        let nearest = SAMPLES.map(|samples| pass(&Pass { fragment: "nearest", samples, layouts: &all[..2], ..draw }));
+        let draw = PipelineParameters { vertex: "corner", corners: true, ..PipelineParameters::of(&scene, &all) };
+        let back = PipelineParameters { depth: Some(CompareFunction::Always), ..PipelineParameters::of(&scene, &all) };
+        let nearest = SAMPLES
+            .map(|samples| pass(&PipelineParameters { fragment: "nearest", samples, layouts: &all[..2], ..draw }));
         let depth = Some(CompareFunction::Equal);
-        let shade =
-            SAMPLES.map(|samples| pass(&Pass { fragment: "shade", samples, targets: &[RADIANCE], depth, ..draw }));
-        let behind = SAMPLES
-            .map(|samples| pass(&Pass { vertex: "screen", fragment: "behind", samples, targets: &[RADIANCE], ..back }));
-        let label = pass(&Pass {
+        let shade = SAMPLES.map(|samples| {
+            pass(&PipelineParameters { fragment: "shade", samples, targets: &[RADIANCE], depth, ..draw })
+        });
+        let behind = SAMPLES.map(|samples| {
+            pass(&PipelineParameters { vertex: "screen", fragment: "behind", samples, targets: &[RADIANCE], ..back })
+        });
+        let label = pass(&PipelineParameters {
             vertex: "corner",
             fragment: "label",
             targets: &[PARTS, POSITIONS, NORMALS],
             corners: true,
-            ..Pass::of(&scene, &[Some(&frame), Some(&sheet)])
+            ..PipelineParameters::of(&scene, &[Some(&frame), Some(&sheet)])
         });
-        let shadow = pass(&Pass {
+        let shadow = pass(&PipelineParameters {
             vertex: "caster",
             fragment: "cover",
             depth: Some(CompareFunction::LessEqual),
             corners: true,
-            ..Pass::of(&scene, &[Some(&nothing), Some(&sheet), Some(&nothing), Some(&caster)])
+            ..PipelineParameters::of(&scene, &[Some(&nothing), Some(&sheet), Some(&nothing), Some(&caster)])
         });
-        let occlude = pass(&Pass {
+        let occlude = pass(&PipelineParameters {
             vertex: "screen",
             fragment: "occlude",
             targets: &[AMBIENT_OCCLUSION],
             depth: None,
-            ..Pass::of(&occlusion, &[Some(&frame), Some(&surface)])
+            ..PipelineParameters::of(&occlusion, &[Some(&frame), Some(&surface)])
         });
         Self { frame, sheet, around, caster, nothing, surface, shadow, label, occlude, nearest, shade, behind }
     }
@@ -133,7 +136,7 @@ impl Pipelines {
 
 /// Parameters of a pipeline.
 #[derive(Clone, Copy)]
-struct Pass<'a> {
+struct PipelineParameters<'a> {
     module: &'a ShaderModule,
     layouts: &'a [Option<&'a BindGroupLayout>],
     vertex: &'a str,
@@ -146,7 +149,7 @@ struct Pass<'a> {
     depth: Option<CompareFunction>,
 }
 
-impl<'a> Pass<'a> {
+impl<'a> PipelineParameters<'a> {
     fn of(module: &'a ShaderModule, layouts: &'a [Option<&'a BindGroupLayout>]) -> Self {
         Self {
             module,

@@ -55,7 +55,7 @@ impl Vertices {
 
     fn add(&mut self, mesh: &Mesh, part: u32, camera: &Camera) {
         let first = self.corners.len() as u32;
-        let places: Vec<Placed> = mesh.positions.iter().map(|p| Placed::new(camera, *p)).collect();
+        let places: Vec<ProjectedVertex> = mesh.positions.iter().map(|p| ProjectedVertex::new(camera, *p)).collect();
         for (i, placed) in places.iter().enumerate() {
             self.corners.push(corner(placed, mesh.positions[i], mesh.normals[i], mesh.uvs[i], part));
         }
@@ -64,7 +64,7 @@ impl Vertices {
             if bends && longest(&triangle.map(|i| &places[i as usize]), camera).is_some() {
                 let of = triangle.map(|i| {
                     let i = i as usize;
-                    Bare { position: mesh.positions[i], normal: mesh.normals[i], uv: mesh.uvs[i] }
+                    ObjectVertex { position: mesh.positions[i], normal: mesh.normals[i], uv: mesh.uvs[i] }
                 });
                 self.halve(&of, part, camera, 0);
             } else {
@@ -74,8 +74,8 @@ impl Vertices {
     }
 
     /// Bisects the longest edge of a triangle until no edge is too long.
-    fn halve(&mut self, of: &[Bare; 3], part: u32, camera: &Camera, depth: u32) {
-        let placed = of.each_ref().map(|b| Placed::new(camera, b.position));
+    fn halve(&mut self, of: &[ObjectVertex; 3], part: u32, camera: &Camera, depth: u32) {
+        let placed = of.each_ref().map(|b| ProjectedVertex::new(camera, b.position));
         match longest(&placed.each_ref(), camera) {
             Some(edge) if depth < HALVINGS => {
                 let (a, b, c) = (&of[edge], &of[(edge + 1) % 3], &of[(edge + 2) % 3]);
@@ -95,13 +95,13 @@ impl Vertices {
 
 /// A vertex before projection.
 #[derive(Clone, Copy)]
-struct Bare {
+struct ObjectVertex {
     position: Vec3,
     normal: Vec3,
     uv: Vec2,
 }
 
-impl Bare {
+impl ObjectVertex {
     fn middle(&self, other: &Self) -> Self {
         Self {
             position: (self.position + other.position) * 0.5,
@@ -112,7 +112,7 @@ impl Bare {
 }
 
 /// A projected point.
-struct Placed {
+struct ProjectedVertex {
     /// Position in the image, pixels.
     at: [f64; 2],
     /// Depth along the optical axis, metres.
@@ -120,7 +120,7 @@ struct Placed {
     clip: [f32; 4],
 }
 
-impl Placed {
+impl ProjectedVertex {
     fn new(camera: &Camera, p: Vec3) -> Self {
         let [x, y, depth] = camera.pose().point_to_camera(p);
         let [fx, fy, cx, cy] = camera.intrinsics();
@@ -137,7 +137,7 @@ impl Placed {
 
 /// Returns the longest edge, by its first vertex, if it is too long. `None` for triangles behind the camera or outside
 /// the image.
-fn longest(of: &[&Placed; 3], camera: &Camera) -> Option<usize> {
+fn longest(of: &[&ProjectedVertex; 3], camera: &Camera) -> Option<usize> {
     let size = [f64::from(camera.width()), f64::from(camera.height())];
     let beside =
         |axis: usize| of.iter().all(|p| p.at[axis] < -MARGIN) || of.iter().all(|p| p.at[axis] > size[axis] + MARGIN);
@@ -152,7 +152,7 @@ fn longest(of: &[&Placed; 3], camera: &Camera) -> Option<usize> {
     (length(edge) > SPAN).then_some(edge)
 }
 
-fn corner(placed: &Placed, p: Vec3, n: Vec3, uv: Vec2, part: u32) -> [f32; STRIDE] {
+fn corner(placed: &ProjectedVertex, p: Vec3, n: Vec3, uv: Vec2, part: u32) -> [f32; STRIDE] {
     let [x, y, z, w] = placed.clip;
     [x, y, z, w, p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y, f32::from_bits(part)]
 }

@@ -7,7 +7,7 @@
 //!
 //! Tiles are independent of each other, so results do not depend on their order or the number of threads.
 
-use super::{Progressive, Settings, Watch};
+use super::{Progressive, RenderMonitor, Settings};
 use crate::film::{Film, Pixel, median_relative_error};
 use crate::integrator::{Integrator, World};
 use furrow_base::Result;
@@ -39,7 +39,7 @@ pub fn adaptive(
     settings: &Settings,
     error: f32,
     deadline: Option<Instant>,
-    watch: &Watch<'_>,
+    watch: &RenderMonitor<'_>,
 ) -> Result<Film> {
     let apart = Settings { seed: mix(settings.seed ^ OTHER), ..*settings };
     let mut look = Progressive::new(world, integrator, &apart);

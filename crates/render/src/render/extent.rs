@@ -6,7 +6,7 @@
 //! hit, so that rounding at an outline can never make the visible count exceed the total.
 
 use super::LabelMap;
-use crate::accel::Brute;
+use crate::accel::BruteForce;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, Scene};
 use furrow_base::geometry::{Ray, Window};
@@ -49,7 +49,7 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
     let organs: Vec<_> = (0..).zip(&scene.parts).filter(|(_, part)| part.tag.plant > 0).collect();
     let area = |(_, part): &(u32, &Part)| image_of(part.bounds(), &scene.camera).meet(reach);
     let areas: Vec<Area> = organs.par_iter().map(area).collect();
-    let mut things: BTreeMap<(u32, u16), Thing> = BTreeMap::new();
+    let mut things: BTreeMap<(u32, u16), LabelledObject> = BTreeMap::new();
     for ((i, part), area) in organs.into_iter().zip(areas) {
         things.entry((part.tag.plant, part.tag.leaf)).or_default().add(i, area);
     }
@@ -66,7 +66,7 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
     }
     let near: Vec<_> = things.iter().filter(|((plant, _), _)| !plants[plant].meet(window).is_empty()).collect();
     let surfaces = scene.surfaces();
-    let brute = Brute::new(&surfaces);
+    let brute = BruteForce::new(&surfaces);
     let masks: Vec<Mask> = near.par_iter().map(|(key, thing)| thing.mask(**key, scene, &brute, labels)).collect();
 
     let visible = |key| seen.get(&key).map_or(0, |(count, _)| *count);
@@ -182,20 +182,20 @@ fn image_of(bounds: Option<(Vec3, Vec3)>, camera: &Camera) -> Area {
 
 /// A leaf with its petiole, or the parts of a plant that are not leaves.
 #[derive(Default)]
-struct Thing {
+struct LabelledObject {
     parts: Vec<u32>,
     /// Pixels that it may cover.
     area: Area,
 }
 
-impl Thing {
+impl LabelledObject {
     fn add(&mut self, part: u32, area: Area) {
         self.parts.push(part);
         self.area = self.area.join(area);
     }
 
     /// Returns the pixels whose centres it covers.
-    fn mask(&self, key: (u32, u16), scene: &Scene, brute: &Brute<'_>, labels: &LabelMap) -> Mask {
+    fn mask(&self, key: (u32, u16), scene: &Scene, brute: &BruteForce<'_>, labels: &LabelMap) -> Mask {
         let mut mask = Mask::new(self.area);
         let window = Area::of(labels.window);
         mask.fill(self.area.meet(window), |x, y| {

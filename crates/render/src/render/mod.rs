@@ -42,14 +42,14 @@ pub struct Settings {
 }
 
 /// Progress callback and stop flag of a rendering.
-pub struct Watch<'a> {
+pub struct RenderMonitor<'a> {
     /// Called from any thread with the number of samples just finished.
     pub done: &'a (dyn Fn(u64) + Sync),
     /// Set this flag to stop the rendering.
     pub stop: &'a AtomicBool,
 }
 
-impl Default for Watch<'_> {
+impl Default for RenderMonitor<'_> {
     /// No progress callback; never stops.
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
@@ -57,7 +57,7 @@ impl Default for Watch<'_> {
     }
 }
 
-impl Watch<'_> {
+impl RenderMonitor<'_> {
     /// Returns `true` if the rendering must stop.
     fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
@@ -75,7 +75,12 @@ pub fn pool(threads: usize) -> Result<rayon::ThreadPool> {
 }
 
 /// Renders a window. Call it inside the `install` of a [`pool`].
-pub fn render(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, watch: &Watch<'_>) -> Result<Film> {
+pub fn render(
+    world: &World<'_>,
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    watch: &RenderMonitor<'_>,
+) -> Result<Film> {
     let tiles = tiles::tiles(settings.window);
     let rendered: Vec<Vec<Pixel>> = tiles
         .par_iter()

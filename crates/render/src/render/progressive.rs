@@ -1,7 +1,7 @@
 //! Progressive rendering: samples are added in passes over the whole image, with results bit-identical to a single
 //! pass. A time limit therefore changes only the number of samples.
 
-use super::{Settings, Watch, gather, tiles};
+use super::{RenderMonitor, Settings, gather, tiles};
 use crate::film::{Accumulator, Film, Pixel};
 use crate::integrator::{Integrator, World};
 use furrow_base::geometry::{PACKET, Window};
@@ -44,12 +44,12 @@ impl<'a> Progressive<'a> {
 
     /// Adds samples until every pixel has `spp`, which must be a multiple of [`PACKET`] if more samples are to follow.
     /// Call it inside the `install` of a pool.
-    pub fn advance(&mut self, spp: u32, watch: &Watch<'_>) -> Result<()> {
+    pub fn advance(&mut self, spp: u32, watch: &RenderMonitor<'_>) -> Result<()> {
         self.advance_each(|_| spp, watch)
     }
 
     /// Adds samples until the pixels of tile `i` have `goal(i)`. A tile that has more keeps them.
-    fn advance_each(&mut self, goal: impl Fn(usize) -> u32 + Sync, watch: &Watch<'_>) -> Result<()> {
+    fn advance_each(&mut self, goal: impl Fn(usize) -> u32 + Sync, watch: &RenderMonitor<'_>) -> Result<()> {
         let Self { world, integrator, settings, tiles } = self;
         tiles.par_iter_mut().enumerate().for_each(|(i, tile)| {
             let range = tile.done..goal(i).max(tile.done);
@@ -68,7 +68,12 @@ impl<'a> Progressive<'a> {
 
     /// Adds passes until each tile reaches its goal or time is up. Returns `true` if the goals are reached. At least
     /// one pass is made. Each pass brings all tiles to the same fraction of their goals, in whole packets.
-    pub(super) fn approach(&mut self, goals: &[u32], deadline: Option<Instant>, watch: &Watch<'_>) -> Result<bool> {
+    pub(super) fn approach(
+        &mut self,
+        goals: &[u32],
+        deadline: Option<Instant>,
+        watch: &RenderMonitor<'_>,
+    ) -> Result<bool> {
         let packets = |samples: u32| samples.div_ceil(PACKET as u32);
         let most = packets(goals.iter().copied().max().unwrap_or(0));
         let Some(deadline) = deadline else {
@@ -126,7 +131,7 @@ pub fn timed(
     integrator: &dyn Integrator,
     settings: &Settings,
     deadline: Instant,
-    watch: &Watch<'_>,
+    watch: &RenderMonitor<'_>,
 ) -> Result<Film> {
     let mut image = Progressive::new(world, integrator, settings);
     let goals = vec![settings.spp; image.tiles.len()];

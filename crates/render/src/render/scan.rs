@@ -103,14 +103,14 @@ fn echoes(world: &World<'_>, lidar: &Lidar, pulse: Pulse, errors: &mut Stream) -
         echo.range += (lidar.noise * errors.normal()) as f32;
     }
     // The LiDAR reports measured values: their order, and only those within its range.
-    all.retain(|echo| lidar.tells(echo.range));
+    all.retain(|echo| lidar.in_range(echo.range));
     all.sort_by(|a, b| a.range.total_cmp(&b.range));
     let count = all.len() as u8;
     for (number, echo) in (1..).zip(&mut all) {
         (echo.number, echo.count) = (number, count);
     }
     let intensities: Vec<f32> = all.iter().map(|echo| echo.intensity).collect();
-    lidar.returns.told(&intensities).into_iter().map(|k| all[k]).collect()
+    lidar.returns.reported(&intensities).into_iter().map(|k| all[k]).collect()
 }
 
 /// Traces the rays of a pulse and returns their glints in order.
@@ -147,7 +147,7 @@ fn echo(parts: &[Part], lidar: &Lidar, pulse: Pulse, cluster: &[Glint]) -> Optio
     let energy: f32 = cluster.iter().map(|glint| glint.energy).sum();
     let range = cluster.iter().map(|glint| glint.energy * glint.range).sum::<f32>() / energy;
     // A black surface returns nothing, so there is no range.
-    if !(energy > 0.0 && energy >= lidar.least && lidar.tells(range)) {
+    if !(energy > 0.0 && energy >= lidar.least && lidar.in_range(range)) {
         return None;
     }
     let tag = |glint: &Glint| parts[glint.part as usize].tag;

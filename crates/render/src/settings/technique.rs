@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_told_in_one_order() {
+    fn omissions_are_listed_in_a_fixed_order() {
         let a = Techniques::without(&[Technique::Qmc, Technique::Mis, Technique::Qmc]);
         let b = Techniques::without(&[Technique::Mis, Technique::Qmc]);
         assert_eq!(a, b);

@@ -4,7 +4,7 @@
 //! edges; labels are taken from the nearest pixel. Every image at every step has its own random stream, so neither threads nor
 //! restarts change the samples.
 
-use super::crop::{self, Crop, Moves, Placement};
+use super::crop::{self, Crop, GeometricAugmentation, Placement};
 use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
@@ -93,8 +93,8 @@ impl Augment {
     };
 
     /// Returns the geometric parts, which place a crop in its image.
-    fn moves(self) -> Moves {
-        Moves { flip: self.flip, rotate: self.rotate, scale: self.scale, shift: self.crop }
+    fn moves(self) -> GeometricAugmentation {
+        GeometricAugmentation { flip: self.flip, rotate: self.rotate, scale: self.scale, shift: self.crop }
     }
 
     /// Parses `all` (all except `erase`, `jpeg` and `fourier`), `none` or names separated by commas.

@@ -26,7 +26,7 @@ const FINEST: f32 = 8.0;
 /// Geometric augmentations that are enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent switch, not a state")]
-pub(super) struct Moves {
+pub(super) struct GeometricAugmentation {
     pub(super) flip: bool,
     pub(super) rotate: bool,
     pub(super) scale: bool,
@@ -62,7 +62,7 @@ impl Placement {
     /// Samples the placement of a crop. With a point `about` (relative to the image's centre), the crop contains that point. Returns
     /// `None` if the crop is the unchanged image.
     pub(super) fn draw(
-        moves: Moves,
+        moves: GeometricAugmentation,
         &Crop { image, size, ground, .. }: &Crop,
         about: Option<[f32; 2]>,
         stream: &mut Stream,
@@ -124,7 +124,7 @@ impl Placement {
                 let [column, row] = middle.map(|v| v as usize);
                 labels.push(example.labels[row.min(h as usize - 1) * w as usize + column.min(w as usize - 1)]);
                 if self.points == 1 {
-                    let around = Around::new(middle, (w, h));
+                    let around = BilinearTaps::new(middle, (w, h));
                     pixels.extend(example.planes.iter().map(|plane| around.value(plane)));
                     continue;
                 }
@@ -134,7 +134,7 @@ impl Placement {
                 let share = 1.0 / (self.points * self.points) as f32;
                 for k in 0..self.points * self.points {
                     let at = source(x as f32 + part(k % self.points), y as f32 + part(k / self.points));
-                    let around = Around::new(at, (w, h));
+                    let around = BilinearTaps::new(at, (w, h));
                     for (mean, plane) in pixels[first..].iter_mut().zip(&example.planes) {
                         *mean += share * around.value(plane);
                     }
@@ -146,13 +146,13 @@ impl Placement {
 }
 
 /// The four pixels around a point of an image, with interpolation weights.
-struct Around {
+struct BilinearTaps {
     columns: (usize, usize, f32),
     rows: (usize, usize, f32),
     width: usize,
 }
 
-impl Around {
+impl BilinearTaps {
     fn new([x, y]: [f32; 2], (w, h): (u32, u32)) -> Self {
         Self { columns: between(x, w), rows: between(y, h), width: w as usize }
     }

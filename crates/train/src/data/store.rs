@@ -114,22 +114,24 @@ impl Store {
                 sizes.push(sizes[*first]);
                 continue;
             }
-            let told = self.pixel_mm_of(place)?.filter(|mm| PIXEL_MM.contains(mm));
-            sizes.push(told.ok_or_else(|| self.untold(place))?);
+            let recorded_mm = self.pixel_mm_of(place)?.filter(|mm| PIXEL_MM.contains(mm));
+            sizes.push(recorded_mm.ok_or_else(|| self.no_pixel_size(place))?);
         }
         Ok(sizes)
     }
 
     /// Returns the number of the first image with a readable record that does not give its pixel size, or gives one outside
     /// [`PIXEL_MM`].
-    pub fn first_untold(&self) -> Option<u64> {
-        let is_told = |place: usize| self.pixel_mm_of(place).map(|told| told.is_some_and(|mm| PIXEL_MM.contains(&mm)));
-        let lacks = |place: &usize| self.same[*place] == *place && matches!(is_told(*place), Ok(false));
+    pub fn first_without_pixel_size(&self) -> Option<u64> {
+        let has_pixel_size = |place: usize| {
+            self.pixel_mm_of(place).map(|recorded_mm| recorded_mm.is_some_and(|mm| PIXEL_MM.contains(&mm)))
+        };
+        let lacks = |place: &usize| self.same[*place] == *place && matches!(has_pixel_size(*place), Ok(false));
         (0..self.images.len()).find(lacks).map(|place| self.images[place].1)
     }
 
     /// Returns the error for an image without a valid pixel size.
-    fn untold(&self, place: usize) -> Error {
+    fn no_pixel_size(&self, place: usize) -> Error {
         let (set, number) = self.images[place];
         let name = Set::name(number);
         Error::misuse(format!("--augment-scale: image {name} does not record its pixel size on the ground"))
@@ -169,7 +171,7 @@ impl Store {
     }
 
     /// Returns the folder of each dataset and its number of images, for reports.
-    pub fn told(&self) -> Vec<(String, usize)> {
+    pub fn image_counts(&self) -> Vec<(String, usize)> {
         let of = |(i, (set, ..)): (usize, &(Set, Map, f32))| {
             (set.folder.display().to_string(), self.images.iter().filter(|(s, _)| *s == i).count())
         };

@@ -18,9 +18,9 @@ use super::data::Band;
 use super::run::ModelCard;
 use serde::Serialize;
 
+pub mod input_images;
 pub mod onnx;
 pub mod overlay;
-pub mod pictures;
 #[cfg(feature = "torch")]
 pub mod predict;
 #[cfg(feature = "torch")]
@@ -28,7 +28,7 @@ pub mod torchscript;
 
 /// Metadata of an exported network.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Facts {
+pub struct ExportMetadata {
     /// Bands of the input, in order.
     pub bands: Vec<String>,
     /// Class names, in the order of the class numbers.
@@ -45,7 +45,7 @@ pub struct Facts {
     pub width: u32,
 }
 
-impl Facts {
+impl ExportMetadata {
     /// Returns the metadata of the model `card` for images of this width and height.
     pub fn of(card: &ModelCard, (width, height): (u32, u32)) -> Self {
         Self {

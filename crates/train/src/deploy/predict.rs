@@ -3,8 +3,8 @@
 //! Reader and writer threads run beside the network, so that it does not wait for input or output. An unreadable image is reported and does
 //! not stop the prediction of the others.
 
+use super::input_images::{InputImage, PREDICTION, Prediction, files};
 use super::overlay;
-use super::pictures::{PREDICTION, Picture, Prediction, files};
 use crate::data::resize::{self, Input};
 use crate::enlarge;
 use crate::ensemble::Ensemble;
@@ -15,7 +15,7 @@ use crate::torch::multiscale::{self, Scores};
 use crate::torch::{Model, device, guarded};
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
-use furrow_output::Picture as Png;
+use furrow_output::ImageData as Png;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,8 +53,8 @@ pub struct Predictions {
 }
 
 /// An image that has been read and prepared for the network.
-struct Ready<'a> {
-    picture: &'a Picture,
+struct PreparedImage<'a> {
+    picture: &'a InputImage,
     width: u32,
     height: u32,
     rgb: Vec<[u8; 3]>,
@@ -64,7 +64,7 @@ struct Ready<'a> {
 
 /// Returns the number of images that go through the network. Images that the appearance features are learnt from count twice.
 pub fn passes(card: &ModelCard, pictures: usize) -> usize {
-    pictures + multiscale::learnt_from(card.refine, pictures).len()
+    pictures + multiscale::training_images(card.refine, pictures).len()
 }
 
 /// Capacity of each queue between the network and a reader or writer thread, images.
@@ -74,7 +74,7 @@ const AHEAD: usize = 2;
 /// colours) and its overlay on the image. Fails if it would overwrite files that are not predictions of the same images.
 pub fn predict(
     trained: &Ensemble,
-    pictures: &[Picture],
+    pictures: &[InputImage],
     out: &Path,
     machine: &Machine,
     options: &Options<'_>,
@@ -84,7 +84,7 @@ pub fn predict(
 
 fn predict_here(
     trained: &Ensemble,
-    pictures: &[Picture],
+    pictures: &[InputImage],
     out: &Path,
     machine: &Machine,
     options: &Options<'_>,
@@ -144,8 +144,8 @@ fn predict_here(
     Ok(made)
 }
 
-impl<'a> Ready<'a> {
-    fn read(picture: &'a Picture, card: &ModelCard) -> Result<Self> {
+impl<'a> PreparedImage<'a> {
+    fn read(picture: &'a InputImage, card: &ModelCard) -> Result<Self> {
         let found = picture.read()?;
         let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
         let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
@@ -159,15 +159,15 @@ impl<'a> Ready<'a> {
 fn learn(
     models: &[Model],
     card: &ModelCard,
-    pictures: &[Picture],
+    pictures: &[InputImage],
     options: &Options<'_>,
 ) -> Result<(Option<Appearance>, usize)> {
-    let picked = multiscale::learnt_from(card.refine, pictures.len());
+    let picked = multiscale::training_images(card.refine, pictures.len());
     // After a stop request this ends early; the caller reports the stop.
     let going = |_: &(usize, &usize)| !options.stop.load(Ordering::Relaxed);
     let read = |(k, place): (usize, &usize)| {
         (options.done)(k);
-        Ready::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
+        PreparedImage::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
     };
     let inputs = picked.iter().enumerate().take_while(going).filter_map(read);
     let found = multiscale::learn(models, card.refine, &card.input.bands, inputs)?;
@@ -178,12 +178,12 @@ fn learn(
 fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
     card: &'a ModelCard,
-    pictures: impl Iterator<Item = &'a Picture> + Send + 's,
-) -> Result<Receiver<Result<Result<Ready<'a>>>>> {
+    pictures: impl Iterator<Item = &'a InputImage> + Send + 's,
+) -> Result<Receiver<Result<Result<PreparedImage<'a>>>>> {
     let (sender, receiver) = sync_channel(AHEAD);
     let work = move || {
         for picture in pictures {
-            let ready = supervised(|| Ready::read(picture, card)).map_err(|bug| bug.within(&picture.name));
+            let ready = supervised(|| PreparedImage::read(picture, card)).map_err(|bug| bug.within(&picture.name));
             // The receiver is gone: the prediction was stopped.
             if sender.send(ready).is_err() {
                 return;
@@ -195,7 +195,7 @@ fn read<'s, 'a: 's>(
 }
 
 /// Index of an image, the image, and its class scores.
-type Scored<'a> = (usize, Ready<'a>, Scores);
+type Scored<'a> = (usize, PreparedImage<'a>, Scores);
 /// Index of each image and the files written for it.
 type Written = Result<Vec<(usize, [PathBuf; 2])>>;
 
@@ -230,12 +230,15 @@ fn write<'s, 'a: 's>(
 fn infer<'a>(
     models: &[Model],
     refine: Refine,
-    batch: Vec<(usize, Ready<'a>)>,
+    batch: Vec<(usize, PreparedImage<'a>)>,
     writers: &[SyncSender<Scored<'a>>],
 ) -> Result<f64> {
     let begun = Instant::now();
     // Consecutive images go through the network together if there is one network and one input per image, of equal size.
-    let alike = |a: &(usize, Ready<'_>), b: &(usize, Ready<'_>)| match (a.1.inputs.as_slice(), b.1.inputs.as_slice()) {
+    let alike = |a: &(usize, PreparedImage<'_>), b: &(usize, PreparedImage<'_>)| match (
+        a.1.inputs.as_slice(),
+        b.1.inputs.as_slice(),
+    ) {
         ([a], [b]) => models.len() == 1 && a.size == b.size && !refine.appearance,
         _ => false,
     };
@@ -271,7 +274,7 @@ fn infer<'a>(
 fn draw(
     card: &ModelCard,
     out: &Path,
-    ready: &Ready<'_>,
+    ready: &PreparedImage<'_>,
     scores: &mut Scores,
     appearance: Option<&Appearance>,
 ) -> Result<[PathBuf; 2]> {

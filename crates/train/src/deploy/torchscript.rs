@@ -3,13 +3,13 @@
 //! The network is traced: the operations that it runs on one example image are recorded. Tracing fixes the height and width; the
 //! number of images stays free. The input is that of all exports ([`super`]). The output is one score per class and pixel, images ×
 //! classes × height × width, single precision. The metadata that an ONNX file contains are written to a JSON file beside it
-//! ([`super::Facts`]).
+//! ([`super::ExportMetadata`]).
 
-use super::Facts;
+use super::ExportMetadata;
 use crate::data::Normalization;
 use crate::data::normalise::LEAST;
 use crate::run::{TrainedModel, write_json};
-use crate::torch::{Model, Pass, Precision, Where, failed, guarded};
+use crate::torch::{Model, Pass, Placement, Precision, failed, guarded};
 use furrow_base::{Error, Result};
 use furrow_output::place_atomically;
 use std::path::{Path, PathBuf};
@@ -38,29 +38,29 @@ fn trace(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -> Re
             card.network.name()
         )));
     }
-    let place = Where { device: Device::Cpu, precision: Precision::Single };
+    let place = Placement { device: Device::Cpu, precision: Precision::Single };
     let mut model = Model::with(card.network, bands, card.classes.len(), &trained.values, place)?;
     model.check_inference(1, (width, height))?;
     model.freeze();
     let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
-    let taken_out = TakenOut::of(&card.normalization);
+    let taken_out = InputNormalization::of(&card.normalization);
     let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), Pass::Inference)];
     let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
     let module = module.map_err(|e| failed(&e))?;
     place_atomically(path, |path| module.save(path).map_err(|e| failed(&e)))?;
-    write_json(&facts_path(path), &Facts::of(card, (width, height)))
+    write_json(&facts_path(path), &ExportMetadata::of(card, (width, height)))
 }
 
 /// Mean and standard deviation of the input normalization. The constants are created before tracing starts: of a tensor created during
 /// tracing, the trace keeps only the shape, not the values.
-enum TakenOut<'a> {
+enum InputNormalization<'a> {
     /// Fixed means and standard deviations, one per band.
     Fixed(Tensor, Tensor),
     /// Computed from each image, over these axes.
     Own(&'a [i64]),
 }
 
-impl TakenOut<'_> {
+impl InputNormalization<'_> {
     fn of(how: &Normalization) -> Self {
         match how {
             Normalization::Fixed { mean, sd } => {

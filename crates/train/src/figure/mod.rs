@@ -6,12 +6,12 @@
 //! | `shots` | selection of the images to show |
 //! | `page` | numbers, curves and images of a run or an evaluation on one HTML page |
 
+mod layout;
 mod page;
-mod sheet;
-mod shot;
-mod shots;
+mod thumbnail;
+mod thumbnails;
 
+pub use layout::{Figure, compose};
 pub use page::{Page, Plot};
-pub use sheet::{Sheet, sheet};
-pub use shot::{Shot, spread};
-pub use shots::Shots;
+pub use thumbnail::{Thumbnail, spread};
+pub use thumbnails::Thumbnails;

@@ -1,11 +1,11 @@
 //! Report page of a run or an evaluation: numbers, curves and images in one self-contained HTML file.
 
-use super::shot::{CONFUSED, INVENTED, MISSED, Shot};
+use super::thumbnail::{CONFUSED, INVENTED, MISSED, Thumbnail};
 use crate::measure::report::ImageScores;
 use crate::measure::{Confusion, Interval, Report};
 use furrow_base::Result;
 use furrow_dataset::model::sample::IGNORE;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_report::chart::{Chart, Effect, forest};
 use furrow_report::{
     self, Number, Table, count, data_url, keyed, legend, number, numbers, pairs, percent, section, swatch, whole,
@@ -36,7 +36,7 @@ pub struct Page<'a> {
     /// Training curves.
     pub charts: &'a [Chart],
     /// Images with their predictions.
-    pub shots: &'a [Shot],
+    pub thumbnails: &'a [Thumbnail],
     /// Heads of the prediction columns; `prediction` for columns beyond the last.
     pub predictors: &'a [String],
     /// Colour of each class.
@@ -96,21 +96,21 @@ impl Page<'_> {
     }
 
     fn images(&self) -> Result<Markup> {
-        if self.shots.is_empty() {
+        if self.thumbnails.is_empty() {
             return Ok(html! {});
         }
-        let columns = self.shots.iter().map(|shot| shot.predictions.len()).max().unwrap_or(0);
-        let known = self.shots.iter().any(|shot| !shot.truth.is_empty());
+        let columns = self.thumbnails.iter().map(|thumbnail| thumbnail.predictions.len()).max().unwrap_or(0);
+        let known = self.thumbnails.iter().any(|thumbnail| !thumbnail.truth.is_empty());
         let mut heads = vec!["image"];
         heads.extend(known.then_some("truth"));
         for k in 0..columns {
             heads.push(self.predictors.get(k).map_or("prediction", String::as_str));
             heads.extend(known.then_some("errors"));
         }
-        let mut shots: Vec<&Shot> = self.shots.iter().collect();
+        let mut thumbnails: Vec<&Thumbnail> = self.thumbnails.iter().collect();
         // The worst first; images without a score come last, in their order.
-        shots.sort_by(|a, b| self.score(a).unwrap_or(f64::MAX).total_cmp(&self.score(b).unwrap_or(f64::MAX)));
-        let rows: Vec<Markup> = shots.into_iter().map(|shot| self.row(shot)).collect::<Result<_>>()?;
+        thumbnails.sort_by(|a, b| self.score(a).unwrap_or(f64::MAX).total_cmp(&self.score(b).unwrap_or(f64::MAX)));
+        let rows: Vec<Markup> = thumbnails.into_iter().map(|thumbnail| self.row(thumbnail)).collect::<Result<_>>()?;
         Ok(html! {
             (self.colors(known))
             p.reading {
@@ -134,32 +134,32 @@ impl Page<'_> {
         legend(classes.chain(errors).map(|(color, words)| (swatch(color), html! { (words) })))
     }
 
-    fn row(&self, shot: &Shot) -> Result<Markup> {
-        let (w, h) = (shot.width, shot.height);
+    fn row(&self, thumbnail: &Thumbnail) -> Result<Markup> {
+        let (w, h) = (thumbnail.width, thumbnail.height);
         // One colour for each of the 256 label values, so that label maps can be encoded unchanged.
         let mut palette = vec![[128; 3]; usize::from(IGNORE) + 1];
         palette[..self.palette.len()].copy_from_slice(self.palette);
-        let png = |picture: &Picture<'_>| -> Result<String> {
+        let png = |picture: &ImageData<'_>| -> Result<String> {
             Ok(data_url("png", &furrow_output::encode_png(w, h, picture, "")?))
         };
-        let mut cells = vec![("image", data_url("jpeg", &furrow_output::encode_jpeg(w, h, &shot.rgb, QUALITY)?))];
-        if !shot.truth.is_empty() {
-            cells.push(("truth", png(&Picture::Indexed(&shot.truth, &palette))?));
+        let mut cells = vec![("image", data_url("jpeg", &furrow_output::encode_jpeg(w, h, &thumbnail.rgb, QUALITY)?))];
+        if !thumbnail.truth.is_empty() {
+            cells.push(("truth", png(&ImageData::Indexed(&thumbnail.truth, &palette))?));
         }
-        for (k, map) in shot.predictions.iter().enumerate() {
-            cells.push(("prediction", png(&Picture::Indexed(map, &palette))?));
-            if !shot.truth.is_empty() {
-                cells.push(("errors", png(&Picture::Rgb(&shot.errors(k)))?));
+        for (k, map) in thumbnail.predictions.iter().enumerate() {
+            cells.push(("prediction", png(&ImageData::Indexed(map, &palette))?));
+            if !thumbnail.truth.is_empty() {
+                cells.push(("errors", png(&ImageData::Rgb(&thumbnail.errors(k)))?));
             }
         }
         Ok(html! {
             figure.row {
-                figcaption { b { (shot.name) } (self.words(shot)) }
+                figcaption { b { (thumbnail.name) } (self.words(thumbnail)) }
                 div {
                     @for (what, source) in &cells {
                         label {
-                            input type="checkbox" aria-label={ "enlarge " (what) " of " (shot.name) };
-                            img src=(source) width=(w) height=(h) alt={ (what) " of " (shot.name) };
+                            input type="checkbox" aria-label={ "enlarge " (what) " of " (thumbnail.name) };
+                            img src=(source) width=(w) height=(h) alt={ (what) " of " (thumbnail.name) };
                         }
                     }
                 }
@@ -168,17 +168,17 @@ impl Page<'_> {
     }
 
     /// Returns the report's scores of an image, if it has any.
-    fn known(&self, shot: &Shot) -> Option<&ImageScores> {
-        self.report?.images.iter().find(|image| image.name == shot.name)
+    fn known(&self, thumbnail: &Thumbnail) -> Option<&ImageScores> {
+        self.report?.images.iter().find(|image| image.name == thumbnail.name)
     }
 
-    fn score(&self, shot: &Shot) -> Option<f64> {
-        self.known(shot)?.mean_iou
+    fn score(&self, thumbnail: &Thumbnail) -> Option<f64> {
+        self.known(thumbnail)?.mean_iou
     }
 
     /// Returns the caption with the I/U of an image; empty if the report has no scores of it.
-    fn words(&self, shot: &Shot) -> String {
-        let Some(image) = self.known(shot) else { return String::new() };
+    fn words(&self, thumbnail: &Thumbnail) -> String {
+        let Some(image) = self.known(thumbnail) else { return String::new() };
         let classes = self.classes.iter().zip(&image.ious).map(|(name, iou)| (name.as_str(), *iou));
         let all = [("mean I/U", image.mean_iou)].into_iter().chain(classes);
         let words: Vec<String> = all.map(|(name, iou)| format!("{name} {}", share(iou))).collect();

@@ -88,7 +88,7 @@ pub struct Checkpoint {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Words {
+struct CheckpointText {
     step: u64,
     pending: (f64, u64),
     seconds: f64,
@@ -111,7 +111,7 @@ impl Checkpoint {
         ]
         .concat();
         let (step, pending, seconds, history) = (self.step, self.pending, self.seconds, self.history.clone());
-        let words = Words { step, pending, seconds, history, plan: plan.into() };
+        let words = CheckpointText { step, pending, seconds, history, plan: plan.into() };
         let text = serde_json::to_string(&words).map_err(|e| Error::failed(format!("cannot write JSON: {e}")))?;
         weights::write(&folder.join(FILE), &all, &text)
     }
@@ -127,7 +127,7 @@ impl Checkpoint {
             Err(e) if e.kind() == Kind::Damaged => return Err(restart(e)),
             other => other?,
         };
-        let words: Words =
+        let words: CheckpointText =
             serde_json::from_str(&text).map_err(|e| restart(Error::damaged(format!("not a checkpoint: {e}"))))?;
         if words.plan != plan {
             return Err(restart(Error::input("it belongs to another training")));
@@ -137,7 +137,7 @@ impl Checkpoint {
                 |a: &Array| Some(Array { name: a.name.strip_prefix(prefix)?.strip_prefix('/')?.into(), ..a.clone() });
             arrays.iter().filter_map(strip).collect()
         };
-        let Words { step, pending, seconds, history, .. } = words;
+        let CheckpointText { step, pending, seconds, history, .. } = words;
         let (values, average, memory, best) = (of("values"), of("average"), of("memory"), of("best"));
         Ok(Some(Self { step, pending, seconds, history, values, average, memory, best }))
     }

@@ -44,10 +44,10 @@ fn decay(most: f64, step: u64) -> f64 {
 mod tests {
     use super::*;
     use crate::net::Network;
-    use crate::torch::{Precision, Where};
+    use crate::torch::{Placement, Precision};
     use tch::Device;
 
-    const SINGLE: Where = Where { device: Device::Cpu, precision: Precision::Single };
+    const SINGLE: Placement = Placement { device: Device::Cpu, precision: Precision::Single };
 
     /// Expected: with weights w₁ … wₙ the average is w₀ Π dₖ + Σ wₖ (1 − dₖ) Πⱼ dⱼ with j > k, for trained weights and running
     /// statistics; an average that is saved and restored after each step ends with the same bits. Source: the unrolled recursion.

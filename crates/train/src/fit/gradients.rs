@@ -64,11 +64,11 @@ impl Gradients {
 mod tests {
     use super::*;
     use crate::net::Network;
-    use crate::torch::{Pass, Precision, Where};
+    use crate::torch::{Pass, Placement, Precision};
     use furrow_base::sampling::{Purpose, Stream};
     use tch::{Device, Kind, Reduction};
 
-    const SINGLE: Where = Where { device: Device::Cpu, precision: Precision::Single };
+    const SINGLE: Placement = Placement { device: Device::Cpu, precision: Precision::Single };
 
     /// Expected: with batch norms at their running statistics and equal numbers of labelled pixels, three batches of one image give
     /// the gradients of one batch of all three images, up to rounding. Source: linearity of the mean.

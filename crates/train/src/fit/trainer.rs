@@ -11,9 +11,9 @@ use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
 use crate::data::{Batch, BatchSettings, Loader, Normalization, Photos, PixelSizes, Store, Views, augment};
-use crate::figure::{Sheet, Shots, sheet};
+use crate::figure::{Figure, Thumbnails, compose};
 use crate::measure::{Confusion, Scores};
-use crate::torch::{Model, Pass, Where, classes, failed};
+use crate::torch::{Model, Pass, Placement, classes, failed};
 use crate::weights::Array;
 use furrow_base::{Error, Result};
 use furrow_dataset::model::sample::IGNORE;
@@ -88,7 +88,7 @@ pub fn train(
     hash: &str,
     data: &Data,
     begin: &[Array],
-    place: Where,
+    place: Placement,
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Outcome> {
@@ -288,12 +288,12 @@ fn validate(
     plan: &Plan,
     weights: &Tensor,
     step: u64,
-) -> Result<(ValidationPass, Sheet)> {
+) -> Result<(ValidationPass, Figure)> {
     let shape = val.shape();
     let size = (shape.width, shape.height);
     let mut confusion = Confusion::new(model.classes);
     let mut losses = Vec::new();
-    let mut shots = Shots::new(val.len(), SHOWN, LARGEST, &shape.bands);
+    let mut thumbnails = Thumbnails::new(val.len(), SHOWN, LARGEST, &shape.bands);
     for place in 0..val.len() {
         let example = val.get(place)?;
         let mut pixels = augment::interleave(&example, 1);
@@ -307,7 +307,7 @@ fn validate(
         }
         let predicted = classes(&scores)?;
         confusion.add(&example.labels, &predicted)?;
-        shots.see(&example, size, &predicted)?;
+        thumbnails.see(&example, size, &predicted)?;
     }
     let plants: Vec<bool> = (0..model.classes).map(|c| c > 0).collect();
     let scores = Scores::of(&confusion, &plants);
@@ -315,5 +315,5 @@ fn validate(
     let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
     let iou = scores.classes.iter().map(|c| c.iou).collect();
     let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64);
-    Ok((ValidationPass { step, ga, miou, iou, loss }, sheet(&shots.kept(), &plan.classes.colors(), false)))
+    Ok((ValidationPass { step, ga, miou, iou, loss }, compose(&thumbnails.kept(), &plan.classes.colors(), false)))
 }

@@ -38,8 +38,8 @@ mod tests {
     /// Expected: one warning for each setting without effect, and none for usual settings: an encoder that is frozen for part of the
     /// training or starts from weights, a style from a second image, a range with two different ends.
     #[test]
-    fn what_does_nothing_is_told() {
-        let told = |change: &dyn Fn(&mut Plan), images: usize, pixels: Option<&PixelSizes>| {
+    fn options_without_effect_are_reported() {
+        let warnings_of = |change: &dyn Fn(&mut Plan), images: usize, pixels: Option<&PixelSizes>| {
             let mut plan = Plan::default();
             plan.hyper.steps = 10;
             change(&mut plan);
@@ -54,18 +54,18 @@ mod tests {
         let sizes = |all: &[f64]| AugmentScale::Auto.of(|| Ok(all.to_vec())).unwrap();
         let (one, two) = (sizes(&[0.5, 0.5]), sizes(&[0.5, 0.6]));
         for words in [
-            told(&|_| (), 1, None),
-            told(&frozen(9), 1, None),
-            told(&begun, 1, None),
-            told(&fourier, 2, None),
-            told(&|_| (), 2, two.as_ref()),
+            warnings_of(&|_| (), 1, None),
+            warnings_of(&frozen(9), 1, None),
+            warnings_of(&begun, 1, None),
+            warnings_of(&fourier, 2, None),
+            warnings_of(&|_| (), 2, two.as_ref()),
         ] {
             assert!(words.is_empty(), "{words:?}");
         }
         for (words, part) in [
-            (told(&frozen(10), 2, None), "--freeze 10 freezes it for all of the 10 steps"),
-            (told(&fourier, 1, None), "--augment fourier has no effect"),
-            (told(&|_| (), 2, one.as_ref()), "pixels of 0.500 mm"),
+            (warnings_of(&frozen(10), 2, None), "--freeze 10 freezes it for all of the 10 steps"),
+            (warnings_of(&fourier, 1, None), "--augment fourier has no effect"),
+            (warnings_of(&|_| (), 2, one.as_ref()), "pixels of 0.500 mm"),
         ] {
             assert!(words.len() == 1 && words[0].contains(part), "{words:?}");
         }

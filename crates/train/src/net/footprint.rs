@@ -90,7 +90,7 @@ struct Walk;
 impl Operations for Walk {
     type Value = Map;
     /// The positions of the maxima, 64-bit integers, and the size before the pooling.
-    type Places = (Map, Map, [f64; 2]);
+    type PoolIndices = (Map, Map, [f64; 2]);
 
     fn conv(&mut self, x: &Map, _name: &str, conv: Conv) -> Map {
         let stride = conv.stride as f64;
@@ -121,12 +121,12 @@ impl Operations for Walk {
         a.with(a.channels + b.channels, a.height, a.width)
     }
 
-    fn pool(&mut self, x: &Map) -> (Map, Self::Places) {
+    fn pool(&mut self, x: &Map) -> (Map, Self::PoolIndices) {
         let half = || x.with(x.channels, (x.height / 2.0).floor(), (x.width / 2.0).floor());
         (half(), (half(), half(), [x.height, x.width]))
     }
 
-    fn unpool(&mut self, x: &Map, (_, _, [height, width]): Self::Places) -> Map {
+    fn unpool(&mut self, x: &Map, (_, _, [height, width]): Self::PoolIndices) -> Map {
         x.with(x.channels, height, width)
     }
 

@@ -98,7 +98,7 @@ pub trait Operations {
     /// Value, such as a tensor.
     type Value;
     /// Positions of the maxima of a pooling.
-    type Places;
+    type PoolIndices;
 
     /// Convolution with the parameters `name.weight` and `name.bias`.
     fn conv(&mut self, x: &Self::Value, name: &str, conv: Conv) -> Self::Value;
@@ -113,9 +113,9 @@ pub trait Operations {
     /// Concatenation of the channels of a and b.
     fn concat(&mut self, a: &Self::Value, b: &Self::Value) -> Self::Value;
     /// Max pooling of 2 × 2 pixels; also returns the positions of the maxima. An odd last row or column is dropped.
-    fn pool(&mut self, x: &Self::Value) -> (Self::Value, Self::Places);
+    fn pool(&mut self, x: &Self::Value) -> (Self::Value, Self::PoolIndices);
     /// Inverse of [`Self::pool`]: moves each value to its position; zero elsewhere. Restores the size before the pooling.
-    fn unpool(&mut self, x: &Self::Value, places: Self::Places) -> Self::Value;
+    fn unpool(&mut self, x: &Self::Value, places: Self::PoolIndices) -> Self::Value;
     /// Max pooling of 3 × 3 pixels with stride 2.
     fn pool3(&mut self, x: &Self::Value) -> Self::Value;
     /// Nearest-neighbour resize to the height and width of `like`.

@@ -119,7 +119,7 @@ impl List {
 
 impl Operations for List {
     type Value = ();
-    type Places = ();
+    type PoolIndices = ();
 
     fn conv(&mut self, (): &(), name: &str, conv: Conv) {
         self.note(

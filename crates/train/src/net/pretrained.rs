@@ -210,7 +210,7 @@ mod tests {
     /// random ones; a fourth band has the mean of the colour kernels and a gray image gives the same sums; missing arrays, wrong shapes
     /// and values that are not finite give errors.
     #[test]
-    fn an_encoder_begins_with_the_file_and_a_wrong_file_is_told() {
+    fn an_encoder_starts_from_the_file_and_a_wrong_file_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("encoder.safetensors");
         let mut arrays = published(Network::LiteUnet);
@@ -237,29 +237,29 @@ mod tests {
         assert_eq!(kernel("nir"), colour(9.0, 3.0));
         let sum = |values: Vec<f32>| values.iter().sum::<f32>();
         assert!((sum(kernel("rgbn")) - sum(kernel("rgb"))).abs() < 1e-2);
-        let told = |arrays: &[Array], network| {
+        let message_of = |arrays: &[Array], network| {
             weights::write(&path, arrays, "").unwrap();
             let error = from.begin(network, &Band::RGB, 3, 1).unwrap_err();
             assert_eq!(error.exit_code(), 2);
             error.to_string()
         };
-        assert!(told(&arrays, Network::Unet).contains("`conv1.weight` is missing"));
-        assert!(told(&arrays, Network::BasicSegnet).contains("no published weights"));
+        assert!(message_of(&arrays, Network::Unet).contains("`conv1.weight` is missing"));
+        assert!(message_of(&arrays, Network::BasicSegnet).contains("no published weights"));
         arrays[7].values[0] = f32::NAN;
-        assert!(told(&arrays, Network::LiteUnet).contains("not finite"));
+        assert!(message_of(&arrays, Network::LiteUnet).contains("not finite"));
         arrays[7].shape = vec![1, arrays[7].values.len()];
         arrays[7].values[0] = 0.0;
-        assert!(told(&arrays, Network::LiteUnet).contains(", not ["));
+        assert!(message_of(&arrays, Network::LiteUnet).contains(", not ["));
         std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
         assert!(from.begin(Network::LiteUnet, &Band::RGB, 3, 1).unwrap_err().to_string().contains("safetensors"));
     }
 
     /// Unit of an encoder: our name, torchvision's names of its convolution and batch norm, and the outputs, inputs and kernel size of
     /// the convolution.
-    type Known = (&'static str, &'static str, &'static str, [usize; 3]);
+    type EncoderUnit = (&'static str, &'static str, &'static str, [usize; 3]);
 
     /// All units of `torchvision.models.resnet18().state_dict()` except `fc` and batch counters.
-    const RESNET18: [Known; 20] = [
+    const RESNET18: [EncoderUnit; 20] = [
         ("stem", "conv1", "bn1", [64, 3, 7]),
         ("enc0_0.0", "layer1.0.conv1", "layer1.0.bn1", [64, 64, 3]),
         ("enc0_0.1", "layer1.0.conv2", "layer1.0.bn2", [64, 64, 3]),
@@ -283,7 +283,7 @@ mod tests {
     ];
 
     /// All units of `torchvision.models.vgg16_bn().features.state_dict()` except batch counters.
-    const VGG16_BN: [Known; 13] = [
+    const VGG16_BN: [EncoderUnit; 13] = [
         ("enc0_0", "features.0", "features.1", [64, 3, 3]),
         ("enc0_1", "features.3", "features.4", [64, 64, 3]),
         ("enc1_0", "features.7", "features.8", [128, 64, 3]),
@@ -301,7 +301,7 @@ mod tests {
 
     /// Returns torchvision's name, our name and the shape of every array of these units. `biases` adds the biases of convolutions, as in
     /// VGG.
-    fn arrays_of(known: &[Known], biases: bool) -> BTreeMap<String, (String, Vec<usize>)> {
+    fn arrays_of(known: &[EncoderUnit], biases: bool) -> BTreeMap<String, (String, Vec<usize>)> {
         let mut all = BTreeMap::new();
         for (ours, conv, norm, [outputs, inputs, kernel]) in known {
             let shape = vec![*outputs, *inputs, *kernel, *kernel];

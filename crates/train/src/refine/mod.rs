@@ -132,7 +132,7 @@ impl Refine {
         if !self.plants {
             return;
         }
-        let found = plants::Found::of(seen.extent(), probabilities, seen.finest);
+        let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
         if !self.rows {
             let classes = found.voted();
             return found.write(probabilities, |_, region| classes[region]);
@@ -150,7 +150,7 @@ impl Refine {
     pub fn examples(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> Option<Examples> {
         let features = seen.features.filter(|_| self.appearance)?;
         self.recolour(seen, probabilities);
-        let found = plants::Found::of(seen.extent(), probabilities, seen.finest);
+        let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
         Some(Examples::of(&found.regions, seen.extent(), &found.arranged(), features))
     }
 

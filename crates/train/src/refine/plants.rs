@@ -23,7 +23,7 @@ const CHANCE: f64 = 1.0;
 const SURE: f64 = 0.02;
 
 /// Plants of an image: regions of connected plant pixels, with the class probabilities that the network gives each.
-pub(super) struct Found {
+pub(super) struct PlantRegions {
     pub regions: Components,
     size: (usize, usize),
     classes: usize,
@@ -31,7 +31,7 @@ pub(super) struct Found {
     sums: Vec<f64>,
 }
 
-impl Found {
+impl PlantRegions {
     /// Finds the plants of an image. `probabilities` holds one plane per class, soil first, and defines the regions. The sums are
     /// taken over `finest`, which has the same layout, if it is given.
     pub(super) fn of(size: (usize, usize), probabilities: &[f32], finest: Option<&[f32]>) -> Self {

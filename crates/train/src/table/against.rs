@@ -8,9 +8,9 @@
 
 use super::experiment::{Experiment, TrainSet};
 use super::seen::{PERCENT, Seen, mean, scale, spread};
-use super::sets::Bound;
+use super::sets::BoundExperiment;
 use crate::data::Pick;
-use crate::figure::{Plot, Shot};
+use crate::figure::{Plot, Thumbnail};
 use crate::measure::Report;
 use crate::run;
 use furrow_base::Result;
@@ -46,7 +46,7 @@ fn others(experiment: &Experiment) -> Option<(usize, Vec<usize>)> {
 }
 
 /// Builds the table; returns `None` if the experiment has no reference training set.
-pub(super) fn table(bound: &Bound, seen: &[Seen], out: &Path) -> Result<Option<Table>> {
+pub(super) fn table(bound: &BoundExperiment, seen: &[Seen], out: &Path) -> Result<Option<Table>> {
     let experiment = &bound.experiment;
     let Some((base, others)) = others(experiment) else { return Ok(None) };
     let classes = experiment.plan.classes.names();
@@ -139,7 +139,7 @@ fn change(pairs: &[(&Seen, &Seen)], test: usize, class: Option<usize>) -> [Cell;
 
 /// Returns the mean core seconds per image of a rendered training set, from its timing log: wall time of the image times its number of
 /// threads. Returns `None` if no image was rendered.
-fn cost(bound: &Bound, train: &TrainSet) -> Result<Option<f64>> {
+fn cost(bound: &BoundExperiment, train: &TrainSet) -> Result<Option<f64>> {
     let Some(part) = train.from.first() else { return Ok(None) };
     let mut last: BTreeMap<u64, f64> = BTreeMap::new();
     for row in timing_log::rows(bound.folder(part.set))?.into_iter().filter(|row| row.draw_s > 0.0) {
@@ -162,16 +162,16 @@ struct Distance {
 }
 
 /// Two rendered datasets of the same fields.
-struct Both {
+struct DatasetPair {
     folders: [PathBuf; 2],
     prints: [String; 2],
     images: usize,
 }
 
-impl Both {
+impl DatasetPair {
     /// Opens the first datasets of two training sets. Returns `None` unless both exist and are rendered from the same scene file
     /// with the same seed and size.
-    fn of(bound: &Bound, base: usize, train: usize) -> Result<Option<Self>> {
+    fn of(bound: &BoundExperiment, base: usize, train: usize) -> Result<Option<Self>> {
         let first = |train: usize| bound.experiment.train[train].from.first().map(|part| bound.folder(part.set));
         let (Some(a), Some(b)) = (first(base), first(train)) else { return Ok(None) };
         if a == b || !a.join(FILE).is_file() || !b.join(FILE).is_file() {
@@ -190,23 +190,23 @@ impl Both {
 }
 
 /// Returns the path of the stored distance of a training set.
-fn place(bound: &Bound, out: &Path, train: usize) -> PathBuf {
+fn place(bound: &BoundExperiment, out: &Path, train: usize) -> PathBuf {
     out.join("distance").join(format!("{}.json", bound.experiment.train[train].slug))
 }
 
 /// Reads the stored distance of a training set; `None` if there is none or it was measured on other datasets.
-fn known(bound: &Bound, out: &Path, base: usize, train: usize) -> Result<Option<Distance>> {
+fn known(bound: &BoundExperiment, out: &Path, base: usize, train: usize) -> Result<Option<Distance>> {
     let path = place(bound, out, train);
-    let Some(both) = Both::of(bound, base, train)?.filter(|_| path.is_file()) else { return Ok(None) };
+    let Some(both) = DatasetPair::of(bound, base, train)?.filter(|_| path.is_file()) else { return Ok(None) };
     let found = run::read_json::<Distance>(&path).ok();
     Ok(found.filter(|d| d.of == both.prints && d.images == both.images as u64))
 }
 
 /// Measures and stores the distances that are missing.
-pub(super) fn measure(bound: &Bound, out: &Path) -> Result<()> {
+pub(super) fn measure(bound: &BoundExperiment, out: &Path) -> Result<()> {
     let Some((base, others)) = others(&bound.experiment) else { return Ok(()) };
     for train in others {
-        let Some(both) = Both::of(bound, base, train)? else { continue };
+        let Some(both) = DatasetPair::of(bound, base, train)? else { continue };
         if known(bound, out, base, train)?.is_some() {
             continue;
         }
@@ -226,7 +226,7 @@ pub(super) fn measure(bound: &Bound, out: &Path) -> Result<()> {
 }
 
 /// Returns, for each training set, the centre of its first image beside that of the reference training set, with the labels of both.
-pub(super) fn shots(bound: &Bound) -> Result<Vec<Shot>> {
+pub(super) fn thumbnails(bound: &BoundExperiment) -> Result<Vec<Thumbnail>> {
     let experiment = &bound.experiment;
     let Some((base, others)) = others(experiment) else { return Ok(Vec::new()) };
     let first = |train: usize| -> Result<Option<(Set, u64)>> {
@@ -235,32 +235,32 @@ pub(super) fn shots(bound: &Bound) -> Result<Vec<Shot>> {
         Ok(numbers.first().map(|n| (set, *n)))
     };
     let Some((set, number)) = first(base)? else { return Ok(Vec::new()) };
-    let left = Middle::of(&set, number)?;
-    let mut shots = Vec::new();
+    let left = CentreCrop::of(&set, number)?;
+    let mut thumbnails = Vec::new();
     for train in others {
         let Some((set, _)) = first(train)? else { continue };
         if number >= set.recipe.count {
             continue;
         }
-        let right = Middle::of(&set, number)?;
+        let right = CentreCrop::of(&set, number)?;
         let edit = set.recipe.rendering().ok().map(Rendering::edit).transpose()?;
         if (left.width, left.height) == (right.width, right.height) {
             let about = edit.map(|edit| format!(": {}", edit.about)).unwrap_or_default();
-            shots.push(left.beside(&right, format!("{}{about}", experiment.train[train].name)));
+            thumbnails.push(left.beside(&right, format!("{}{about}", experiment.train[train].name)));
         }
     }
-    Ok(shots)
+    Ok(thumbnails)
 }
 
 /// Centre crop of an image, at most [`SHOWN`] pixels.
-struct Middle {
+struct CentreCrop {
     width: u32,
     height: u32,
     rgb: Vec<[u8; 3]>,
     labels: Vec<u8>,
 }
 
-impl Middle {
+impl CentreCrop {
     fn of(set: &Set, number: u64) -> Result<Self> {
         let sample = set.sample(number)?;
         let (w, h) = sample.size();
@@ -272,8 +272,8 @@ impl Middle {
     }
 
     /// Joins two crops side by side.
-    fn beside(&self, right: &Self, name: String) -> Shot {
-        Shot {
+    fn beside(&self, right: &Self, name: String) -> Thumbnail {
+        Thumbnail {
             name,
             width: 2 * self.width + GAP,
             height: self.height,

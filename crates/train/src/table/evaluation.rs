@@ -65,7 +65,7 @@ pub(super) fn path(folder: &Path, test: &str) -> PathBuf {
 
 /// Result of looking for a stored evaluation.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Known {
+pub(super) enum StoredState {
     /// The evaluation.
     Here(Box<StoredEvaluation>),
     /// There is no file.
@@ -77,22 +77,22 @@ pub(super) enum Known {
 impl StoredEvaluation {
     /// Reads the evaluation of the model `of` on `images`. If `on` is given, the fingerprint of the dataset and the image numbers
     /// must match it.
-    pub(super) fn find(path: &Path, of: &Evaluated, images: Pick, on: Option<&(String, Vec<u64>)>) -> Known {
+    pub(super) fn find(path: &Path, of: &Evaluated, images: Pick, on: Option<&(String, Vec<u64>)>) -> StoredState {
         if !path.exists() {
-            return Known::Missing;
+            return StoredState::Missing;
         }
         let found: Self = match run::read_json(path) {
             Ok(found) => found,
-            Err(e) => return Known::Wrong(e.to_string().split("\n help").next().unwrap_or_default().to_owned()),
+            Err(e) => return StoredState::Wrong(e.to_string().split("\n help").next().unwrap_or_default().to_owned()),
         };
-        let wrong = |what: &str| Known::Wrong(format!("{}: this is {what}", path.display()));
+        let wrong = |what: &str| StoredState::Wrong(format!("{}: this is {what}", path.display()));
         if found.of != *of {
             return wrong("an evaluation of other weights");
         }
         if found.images != images || on.is_some_and(|on| found.on != *on) {
             return wrong("an evaluation on other images");
         }
-        Known::Here(Box::new(found))
+        StoredState::Here(Box::new(found))
     }
 
     /// Writes an evaluation; its times go to a separate file.

@@ -76,7 +76,7 @@ pub enum Source {
 
 /// Selection of images of a dataset.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct ImageSelection {
     /// Index of the dataset in [`Experiment::sets`].
     pub set: usize,
     /// Images to use.
@@ -95,9 +95,9 @@ pub struct TrainSet {
     /// Folder name.
     pub slug: String,
     /// Training images.
-    pub from: Vec<Part>,
+    pub from: Vec<ImageSelection>,
     /// Validation images.
-    pub validation: Vec<Part>,
+    pub validation: Vec<ImageSelection>,
     /// The experiment's plan with the hyper-parameters of this training set.
     pub plan: Plan,
 }
@@ -110,7 +110,7 @@ pub struct TestSet {
     /// Base name of its evaluation files.
     pub slug: String,
     /// Images to evaluate on.
-    pub part: Part,
+    pub part: ImageSelection,
 }
 
 impl Experiment {
@@ -359,7 +359,7 @@ impl Checker<'_> {
         Err(self.fault(at, format!("an image cannot have {width} × {height} pixels"), "write sides from 1 to 16384"))
     }
 
-    fn part(&self, desc: &PartDesc, otherwise: Pick, at: At<'_>, sets: &[(String, Source)]) -> Result<Part> {
+    fn part(&self, desc: &PartDesc, otherwise: Pick, at: At<'_>, sets: &[(String, Source)]) -> Result<ImageSelection> {
         let step = |field| [at, &[Step::Field(field)]].concat();
         if desc.repeat == 0 {
             return Err(self.fault(
@@ -378,7 +378,7 @@ impl Checker<'_> {
             return Err(self.fault(&step("dilate_px"), what, format!("write a number from -{MOST} to {MOST}")));
         }
         let (set, pick) = self.images(&desc.set, desc.images.as_deref(), otherwise, at, sets)?;
-        Ok(Part { set, pick, margin, repeat: desc.repeat })
+        Ok(ImageSelection { set, pick, margin, repeat: desc.repeat })
     }
 
     /// Resolves a dataset and a selection of its images; without `images` the selection is `otherwise`.
@@ -422,7 +422,7 @@ impl Checker<'_> {
                     "give a dataset: [(set: \"NAME\")]",
                 ));
             }
-            let parts = |parts: &[PartDesc], field: &'static str, otherwise| -> Result<Vec<Part>> {
+            let parts = |parts: &[PartDesc], field: &'static str, otherwise| -> Result<Vec<ImageSelection>> {
                 let one = |(k, part): (usize, &PartDesc)| {
                     let at = [at[0], at[1], Step::Field(field), Step::Item(k)];
                     self.part(part, otherwise, &at, sets)
@@ -434,7 +434,7 @@ impl Checker<'_> {
                 parts(validation, "validation", Pick::Split(Val))?
             } else {
                 let open = desc.from.iter().zip(&from).filter(|(desc, _)| desc.images.is_none());
-                open.map(|(_, part)| Part { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
+                open.map(|(_, part)| ImageSelection { pick: Pick::Split(Val), repeat: 1, ..part.clone() }).collect()
             };
             let plan = self.own_plan(&desc.hyperparameters, &step("hyperparameters"), plan)?;
             all.push(TrainSet { name: desc.name.clone(), slug, from, validation, plan });
@@ -469,7 +469,11 @@ impl Checker<'_> {
             let step = |field| [at[0], at[1], Step::Field(field)];
             let slug = self.title(&desc.name, all.iter().map(|t| t.slug.as_str()), &step("name"))?;
             let (set, pick) = self.images(&desc.set, desc.images.as_deref(), Pick::All, &at, sets)?;
-            all.push(TestSet { name: desc.name.clone(), slug, part: Part { set, pick, margin: 0.0, repeat: 1 } });
+            all.push(TestSet {
+                name: desc.name.clone(),
+                slug,
+                part: ImageSelection { set, pick, margin: 0.0, repeat: 1 },
+            });
         }
         if all.is_empty() {
             let help = "give at least one: [(name: \"Test\", set: \"NAME\")]";

@@ -54,10 +54,10 @@ mod work;
 
 pub use desc::{ExperimentDesc, Named, PartDesc, ScaleDesc, SetDesc, TestDesc, TrainDesc};
 pub use evaluation::StoredEvaluation;
-pub use experiment::{Experiment, Part, Source, TestSet, TrainSet};
+pub use experiment::{Experiment, ImageSelection, Source, TestSet, TrainSet};
 pub use names::slug;
 pub use pixels::check_pixel_sizes;
 pub use print::{RUNS, TIMES, Tables, listing, tables};
 pub use rows::{Learner, Row, rows};
-pub use sets::{Bound, Real};
-pub use work::{Callbacks, Only, PAGE, Predictor, State, TableOptions, check_weights, run};
+pub use sets::{BoundExperiment, RealSet};
+pub use work::{Callbacks, PAGE, Predictor, State, TableOptions, WorkPart, check_weights, run};

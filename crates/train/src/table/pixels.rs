@@ -2,8 +2,8 @@
 //! checked by their metadata, scenes that are not rendered yet by their cameras.
 
 use super::desc::ExperimentDesc;
-use super::experiment::{Part, Source, TrainSet};
-use super::sets::Bound;
+use super::experiment::{ImageSelection, Source, TrainSet};
+use super::sets::BoundExperiment;
 use crate::data::{Pick, Store};
 use crate::run::PIXEL_MM;
 use furrow_base::ron_file::{RonFile, Step};
@@ -21,10 +21,10 @@ const ASKED: u64 = 64;
 ///
 /// # Errors
 /// Returns an error for the first training set with an image that lacks it, at the value of `augment_scale` in the experiment file.
-pub fn check_pixel_sizes(bound: &Bound, page: &RonFile) -> Result<()> {
+pub fn check_pixel_sizes(bound: &BoundExperiment, page: &RonFile) -> Result<()> {
     let experiment = &bound.experiment;
     for train in experiment.train.iter().filter(|train| !train.plan.hyper.augment_scale.is_relative()) {
-        let Some(lack) = train.from.iter().find_map(|part| untold(bound, train, part)) else { continue };
+        let Some(lack) = train.from.iter().find_map(|part| lacking(bound, train, part)) else { continue };
         let scale = train.plan.hyper.augment_scale.name();
         let name = &train.name;
         let what = format!("`{name}` cannot be trained with \"{scale}\": {lack} its ground sampling distance");
@@ -51,18 +51,18 @@ fn place(desc: &ExperimentDesc, train: &TrainSet, scale: Option<&str>) -> Vec<St
 
 /// Returns the beginning of a message about the first image of a part without a ground sampling distance, up to the verb. Returns `None` if
 /// no such image is known.
-fn untold(bound: &Bound, train: &TrainSet, part: &Part) -> Option<String> {
+fn lacking(bound: &BoundExperiment, train: &TrainSet, part: &ImageSelection) -> Option<String> {
     let (name, source) = &bound.experiment.sets[part.set];
     if bound.is_imported(part.set) {
         return Some(format!("no image of the set `{name}` records"));
     }
-    let there = untold_there(bound, train, part);
-    let number = there.or_else(|| untold_of_scene(source, part.pick, train.plan.shape.width))?;
+    let there = first_stored_without(bound, train, part);
+    let number = there.or_else(|| first_rendered_without(source, part.pick, train.plan.shape.width))?;
     Some(format!("image {} of the set `{name}` does not record", Set::name(number)))
 }
 
 /// Returns the number of the first existing image without a ground sampling distance.
-fn untold_there(bound: &Bound, train: &TrainSet, part: &Part) -> Option<u64> {
+fn first_stored_without(bound: &BoundExperiment, train: &TrainSet, part: &ImageSelection) -> Option<u64> {
     if !bound.folder(part.set).join(recipe::FILE).is_file() {
         return None;
     }
@@ -70,12 +70,12 @@ fn untold_there(bound: &Bound, train: &TrainSet, part: &Part) -> Option<u64> {
     let seeds = bound.experiment.seeds.iter().take(if matches!(part.pick, Pick::Random(_)) { usize::MAX } else { 1 });
     let (selection, plan) = ([bound.selection(part)], &train.plan);
     let open = |seed: u64| Store::open(&selection, Pick::All, seed, &plan.classes, &plan.shape, false, 0).ok();
-    seeds.copied().filter_map(open).find_map(|store| store.first_untold())
+    seeds.copied().filter_map(open).find_map(|store| store.first_without_pixel_size())
 }
 
 /// Returns the number of the first image to be rendered whose camera gives no ground sampling distance in range, for network inputs `width`
 /// pixels wide. If images are picked at random, returns one only if no camera gives any.
-fn untold_of_scene(source: &Source, pick: Pick, width: u32) -> Option<u64> {
+fn first_rendered_without(source: &Source, pick: Pick, width: u32) -> Option<u64> {
     let Source::Scene { file, count, size, seed, edit, split, .. } = source else { return None };
     let edit = edit.map_or(Ok(&FULL), Edit::named).ok()?;
     let scene = SceneFile::edited(file, edit).ok()?.seed(*seed).width(size.0).height(size.1);
@@ -86,7 +86,7 @@ fn untold_of_scene(source: &Source, pick: Pick, width: u32) -> Option<u64> {
         Pick::Range(from, to) => (from..to).contains(&number),
         Pick::Every(first, of) => number % of == first,
     };
-    let (mut first, mut any_tells) = (None, false);
+    let (mut first, mut any_known) = (None, false);
     for field in 0..count.div_ceil(captures).min(ASKED) {
         let numbers = field * captures..((field + 1) * captures).min(*count);
         // Images of a field are ordered by day, then by camera.
@@ -94,11 +94,11 @@ fn untold_of_scene(source: &Source, pick: Pick, width: u32) -> Option<u64> {
         for (number, camera) in numbers.zip(cameras.iter().cycle()).filter(|(number, _)| is_picked(*number)) {
             let mm = camera.pixel_m().map(|m| 1e3 * m * f64::from(size.0) / f64::from(width));
             if mm.is_some_and(|mm| PIXEL_MM.contains(&mm)) {
-                any_tells = true;
+                any_known = true;
             } else {
                 first = first.or(Some(number));
             }
         }
     }
-    first.filter(|_| !any_tells || !matches!(pick, Pick::Random(_)))
+    first.filter(|_| !any_known || !matches!(pick, Pick::Random(_)))
 }

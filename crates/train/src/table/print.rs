@@ -5,7 +5,7 @@ use super::evaluation;
 use super::experiment::Experiment;
 use super::rows::{self, Learner, Row};
 use super::seen::{PERCENT, Seen, mean, median, scale, see, spread};
-use super::sets::Bound;
+use super::sets::BoundExperiment;
 use crate::figure;
 use crate::measure::Report;
 use crate::run::{self, Results};
@@ -50,12 +50,12 @@ struct Line<'a> {
 }
 
 /// Builds the tables of the results so far; returns them with warnings about evaluations that are left out.
-pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
+pub fn tables(bound: &BoundExperiment, out: &Path) -> Result<(Tables, Vec<String>)> {
     let experiment = &bound.experiment;
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     let seen = rows::rows(experiment)
         .into_iter()
-        .map(|row| see(experiment, row, out, &mut told))
+        .map(|row| see(experiment, row, out, &mut notes))
         .collect::<Result<Vec<_>>>()?;
     let lines = lines(experiment, &seen);
     let mut all = vec![
@@ -68,7 +68,7 @@ pub fn tables(bound: &Bound, out: &Path) -> Result<(Tables, Vec<String>)> {
     if let Some(table) = against::table(bound, &seen, out)? {
         all.insert(0, (AGAINST, table));
     }
-    Ok((Tables(all), told))
+    Ok((Tables(all), notes))
 }
 
 /// Returns the lines of the tables: networks, then baselines, each with all training sets, in the order of the experiment file.
@@ -163,7 +163,7 @@ fn classes(experiment: &Experiment, lines: &[Line<'_>]) -> Table {
 }
 
 /// Writes the report page `results.html` with all tables but times; returns its path.
-pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf> {
+pub(super) fn page(bound: &BoundExperiment, tables: &Tables, out: &Path) -> Result<PathBuf> {
     let experiment = &bound.experiment;
     let plan = &experiment.plan;
     let fact = |name: &str, value: String| (name.to_owned(), value);
@@ -188,7 +188,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
             "Means over seeds; a network that scores below the ExG baselines has learned nothing about shape.",
         ),
     };
-    let shots = against::shots(bound)?;
+    let thumbnails = against::thumbnails(bound)?;
     let predictors: [String; 1] = ["labels".into()];
     let page = figure::Page {
         kind: "Experiment",
@@ -198,7 +198,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
         effects,
         plots: &plots,
         tables: &shown,
-        shots: &shots,
+        thumbnails: &thumbnails,
         predictors: &predictors,
         palette: &Classes::default().colors(),
         classes: &Classes::default().names(),
@@ -210,7 +210,7 @@ pub(super) fn page(bound: &Bound, tables: &Tables, out: &Path) -> Result<PathBuf
 }
 
 /// Returns a table of all rows with their numbers and progress.
-pub fn listing(bound: &Bound, out: &Path) -> Result<Table> {
+pub fn listing(bound: &BoundExperiment, out: &Path) -> Result<Table> {
     let experiment = &bound.experiment;
     let mut table = Table::new("Rows", ["row", "network", "trained on", "seed", "training", "tests evaluated"]);
     for (i, row) in rows::rows(experiment).into_iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Results of the rows of an experiment that exist so far, and statistics over them; the tables are built from these.
 
-use super::evaluation::{self, Known, StoredEvaluation};
+use super::evaluation::{self, StoredEvaluation, StoredState};
 use super::experiment::{Experiment, TestSet};
 use super::rows::Row;
 use crate::measure::Report;
@@ -28,9 +28,9 @@ pub(super) fn see(experiment: &Experiment, row: Row, out: &Path, warnings: &mut 
     let mut report = |test: &TestSet| {
         let who = who.as_ref()?;
         match StoredEvaluation::find(&evaluation::path(&folder, &test.slug), who, test.part.pick, None) {
-            Known::Here(found) => Some(found.report),
-            Known::Missing => None,
-            Known::Wrong(why) => {
+            StoredState::Here(found) => Some(found.report),
+            StoredState::Missing => None,
+            StoredState::Wrong(why) => {
                 warnings.push(format!("{why}; the tables leave it out"));
                 None
             }

@@ -1,6 +1,6 @@
 //! Datasets of an experiment: bound to folders, and rendered or imported if they are missing.
 
-use super::experiment::{Experiment, Part, Source};
+use super::experiment::{Experiment, ImageSelection, Source};
 use super::names::unknown;
 use crate::data::Selection;
 use furrow_base::error::Kind;
@@ -24,14 +24,14 @@ use std::time::{Duration, Instant};
 
 /// Folder of a real dataset: `NAME=DIR` on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Real {
+pub struct RealSet {
     /// The set's name in the experiment file.
     pub name: String,
     /// A dataset, or a folder with `images/` and `labels/`.
     pub folder: PathBuf,
 }
 
-impl Real {
+impl RealSet {
     /// Parses `NAME=DIR`.
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
@@ -60,7 +60,7 @@ enum Origin {
 
 /// Experiment whose datasets are bound to folders.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bound {
+pub struct BoundExperiment {
     /// The experiment, without the training and test sets that were left out.
     pub experiment: Experiment,
     /// Names of the training sets, then of the test sets, that were left out.
@@ -69,10 +69,10 @@ pub struct Bound {
     sets: Vec<(PathBuf, Origin)>,
 }
 
-impl Bound {
+impl BoundExperiment {
     /// Binds the datasets of an experiment in the folder `out`. Training and test sets that need a dataset in `without` are left
     /// out. Fails on unknown names, or if no training set or no test set is left.
-    pub fn new(mut experiment: Experiment, reals: &[Real], without: &[String], out: &Path) -> Result<Self> {
+    pub fn new(mut experiment: Experiment, reals: &[RealSet], without: &[String], out: &Path) -> Result<Self> {
         let names: Vec<&str> = experiment.sets.iter().map(|(name, _)| name.as_str()).collect();
         let wrong = |(what, help): (String, String)| Error::input(what).help(help);
         if let Some(name) = without.iter().find(|w| !names.contains(&w.as_str())) {
@@ -80,7 +80,7 @@ impl Bound {
         }
         let is_real =
             |name: &str| experiment.sets.iter().any(|(n, source)| n == name && matches!(source, Source::Real { .. }));
-        for (i, Real { name, .. }) in reals.iter().enumerate() {
+        for (i, RealSet { name, .. }) in reals.iter().enumerate() {
             if !is_real(name) {
                 let real: Vec<&str> = names.iter().copied().filter(|n| is_real(n)).collect();
                 return Err(wrong(unknown("real set", &real, name)));
@@ -99,7 +99,7 @@ impl Bound {
                 (Source::Real { .. }, Some(real)) => real_set(real, own)?,
             });
         }
-        let out = |part: &Part| without.contains(&experiment.sets[part.set].0);
+        let out = |part: &ImageSelection| without.contains(&experiment.sets[part.set].0);
         let mut left_out = Vec::new();
         experiment.train =
             split(&experiment.train, &mut left_out, |t| t.from.iter().chain(&t.validation).any(out), |t| &t.name);
@@ -123,8 +123,8 @@ impl Bound {
     }
 
     /// Returns the selection of images that a training or an evaluation opens.
-    pub fn selection(&self, part: &Part) -> Selection {
-        let Part { set, pick, margin, repeat } = *part;
+    pub fn selection(&self, part: &ImageSelection) -> Selection {
+        let ImageSelection { set, pick, margin, repeat } = *part;
         Selection { folder: self.folder(set).into(), pick: Some(pick), margin, repeat }
     }
 
@@ -141,14 +141,14 @@ impl Bound {
     pub fn check(&self) -> Result<()> {
         let missing: Vec<_> = self.used().into_iter().filter(|i| self.sets[*i].1 == Origin::Unknown).collect();
         let Some(first) = missing.first() else { return Ok(()) };
-        let told = |i: &usize| match &self.experiment.sets[*i] {
+        let described = |i: &usize| match &self.experiment.sets[*i] {
             (name, Source::Real { about }) if !about.is_empty() => format!("`{name}` ({about})"),
             (name, _) => format!("`{name}`"),
         };
         let name = &self.experiment.sets[*first].0;
         Err(Error::input(format!(
             "no folder is given for the images of {}",
-            missing.iter().map(told).collect::<Vec<_>>().join(" and of ")
+            missing.iter().map(described).collect::<Vec<_>>().join(" and of ")
         ))
         .help(format!("give it with --real {name}=DIR, or leave out what needs them with --without {name}")))
     }
@@ -185,7 +185,7 @@ impl Bound {
     pub(super) fn make(
         &self,
         set: usize,
-        tell: &(dyn Fn(&str) + Sync),
+        message: &(dyn Fn(&str) + Sync),
         warn: &(dyn Fn(&str) + Sync),
         stop: &Arc<AtomicBool>,
     ) -> Result<()> {
@@ -194,11 +194,11 @@ impl Bound {
         if !matches!(origin, Origin::Rendered | Origin::Imported(_)) {
             return Ok(());
         }
-        let _lock = lock(folder, name, tell, stop)?;
+        let _lock = lock(folder, name, message, stop)?;
         if !folder.join(furrow_dataset::model::recipe::MANIFEST).exists() {
-            tell(&format!("making the set `{name}`"));
+            message(&format!("making the set `{name}`"));
         }
-        let progress = Progress::new(name, tell);
+        let progress = Progress::new(name, message);
         let made = match (source, origin) {
             (Source::Scene { file, count, size, spp, seed, edit, split }, _) => {
                 let order = furrow_dataset::Order {
@@ -256,7 +256,7 @@ fn import(
 /// Progress of making a dataset, reported at intervals.
 struct Progress<'a> {
     name: &'a str,
-    tell: &'a (dyn Fn(&str) + Sync),
+    message: &'a (dyn Fn(&str) + Sync),
     total: AtomicUsize,
     done: AtomicUsize,
     last: Mutex<Instant>,
@@ -266,8 +266,8 @@ impl<'a> Progress<'a> {
     /// Interval between two progress messages.
     const EVERY: Duration = Duration::from_secs(30);
 
-    fn new(name: &'a str, tell: &'a (dyn Fn(&str) + Sync)) -> Self {
-        Self { name, tell, total: AtomicUsize::new(0), done: AtomicUsize::new(0), last: Mutex::new(Instant::now()) }
+    fn new(name: &'a str, message: &'a (dyn Fn(&str) + Sync)) -> Self {
+        Self { name, message, total: AtomicUsize::new(0), done: AtomicUsize::new(0), last: Mutex::new(Instant::now()) }
     }
 
     fn expect(&self, total: usize) {
@@ -279,7 +279,7 @@ impl<'a> Progress<'a> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if last.elapsed() >= Self::EVERY {
             *last = Instant::now();
-            (self.tell)(&format!("set `{}`: {done} of {} images", self.name, self.total.load(Ordering::Relaxed)));
+            (self.message)(&format!("set `{}`: {done} of {} images", self.name, self.total.load(Ordering::Relaxed)));
         }
     }
 }
@@ -297,8 +297,8 @@ fn split<T: Clone>(
 }
 
 /// Returns the folder and origin of a real dataset: a dataset is used in place, images and masks are imported into `own`.
-fn real_set(real: &Real, own: PathBuf) -> Result<(PathBuf, Origin)> {
-    let Real { name, folder } = real;
+fn real_set(real: &RealSet, own: PathBuf) -> Result<(PathBuf, Origin)> {
+    let RealSet { name, folder } = real;
     if folder.join(recipe::FILE).is_file() {
         return Ok((folder.clone(), Origin::There));
     }
@@ -310,8 +310,8 @@ fn real_set(real: &Real, own: PathBuf) -> Result<(PathBuf, Origin)> {
 }
 
 /// Locks a dataset for this process; waits while another process makes it.
-fn lock(folder: &Path, name: &str, tell: &(dyn Fn(&str) + Sync), stop: &AtomicBool) -> Result<Lock> {
-    let waits = || tell(&format!("waiting for another process that is making the set `{name}`"));
+fn lock(folder: &Path, name: &str, message: &(dyn Fn(&str) + Sync), stop: &AtomicBool) -> Result<Lock> {
+    let waits = || message(&format!("waiting for another process that is making the set `{name}`"));
     let path = folder.with_file_name(format!("{name}.lock"));
     Lock::wait(&path, waits, || stop.load(Ordering::Relaxed))?.ok_or_else(|| {
         Error::stopped(format!("stopped before the set `{name}` was made")).help("run the same command again to resume")

@@ -1,11 +1,11 @@
 //! Runs the missing parts of an experiment: datasets, then training and evaluations row by row, then tables.
 
 use super::against;
-use super::evaluation::{self, BASELINE, Evaluated, Known, StoredEvaluation};
-use super::experiment::{Experiment, Part, TrainSet};
+use super::evaluation::{self, BASELINE, Evaluated, StoredEvaluation, StoredState};
+use super::experiment::{Experiment, ImageSelection, TrainSet};
 use super::print;
 use super::rows::{self, Learner, Row};
-use super::sets::Bound;
+use super::sets::BoundExperiment;
 use crate::baseline::{Baseline, Kind, files};
 use crate::data::{Pick, Selection, Shape, Store};
 use crate::fit::Plan;
@@ -27,7 +27,7 @@ pub const PAGE: &str = "report.html";
 
 /// A part of the work, to be done alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Only {
+pub enum WorkPart {
     /// The datasets.
     Sets,
     /// The tables of the results so far.
@@ -38,7 +38,7 @@ pub enum Only {
 #[derive(Clone, Copy, Debug)]
 pub struct TableOptions<'a> {
     /// The experiment and its datasets.
-    pub bound: &'a Bound,
+    pub bound: &'a BoundExperiment,
     /// Folder of the experiment.
     pub out: &'a Path,
     /// Text of the experiment file, copied into the folder.
@@ -46,7 +46,7 @@ pub struct TableOptions<'a> {
     /// Shard of the rows to run.
     pub shard: Shard,
     /// Part of the work to do; all of it if `None`.
-    pub only: Option<Only>,
+    pub only: Option<WorkPart>,
     /// Time limit of each training run, seconds.
     pub seconds: Option<u64>,
     /// Number of compute threads of new training runs; a run that was started before keeps its number.
@@ -66,7 +66,7 @@ pub struct Callbacks<'a> {
     /// Called before each training run with its description and the progress of the experiment.
     pub training: &'a dyn Fn(&str, &State),
     /// Called with a message about other work.
-    pub tell: &'a (dyn Fn(&str) + Sync),
+    pub message: &'a (dyn Fn(&str) + Sync),
     /// Called with a warning.
     pub warn: &'a (dyn Fn(&str) + Sync),
     /// Set by the caller to stop early.
@@ -92,10 +92,10 @@ pub struct State {
     pub left: Option<f64>,
 }
 
-/// Runs everything that is missing; returns the paths of the tables (with [`Only::Sets`], of the datasets' recipes).
+/// Runs everything that is missing; returns the paths of the tables (with [`WorkPart::Sets`], of the datasets' recipes).
 pub fn run(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<PathBuf>> {
     let TableOptions { bound, out, .. } = *order;
-    if order.only == Some(Only::Tables) {
+    if order.only == Some(WorkPart::Tables) {
         return tables(order, callbacks);
     }
     bound.check()?;
@@ -105,9 +105,9 @@ pub fn run(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<Pa
         check_pretrained(&bound.experiment, &rows)?;
     }
     for set in bound.used() {
-        bound.make(set, callbacks.tell, callbacks.warn, callbacks.stop)?;
+        bound.make(set, callbacks.message, callbacks.warn, callbacks.stop)?;
     }
-    if order.only == Some(Only::Sets) {
+    if order.only == Some(WorkPart::Sets) {
         return Ok(bound
             .used()
             .into_iter()
@@ -117,11 +117,11 @@ pub fn run(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<Pa
     // All rows are checked before hours are spent on the first one.
     let mut todo = Vec::new();
     for (_, row) in &rows {
-        let work = Work { order, callbacks, row: *row, folder: row.folder(&bound.experiment, out) };
+        let work = RowWork { order, callbacks, row: *row, folder: row.folder(&bound.experiment, out) };
         work.check()?;
         todo.push(work);
     }
-    let trainings: Vec<&Work<'_>> = todo.iter().filter(|w| w.network().is_some()).collect();
+    let trainings: Vec<&RowWork<'_>> = todo.iter().filter(|w| w.network().is_some()).collect();
     let mut number = 0;
     for work in &todo {
         if work.network().is_some() {
@@ -158,7 +158,7 @@ fn check_pretrained(experiment: &Experiment, rows: &[(usize, Row)]) -> Result<()
 ///
 /// # Errors
 /// Returns an error for the first weights that are missing or do not fit.
-pub fn check_weights(bound: &Bound) -> Result<()> {
+pub fn check_weights(bound: &BoundExperiment) -> Result<()> {
     check_pretrained(&bound.experiment, &rows::of_shard(&bound.experiment, Shard::ALL))
 }
 
@@ -168,8 +168,8 @@ fn tables(order: &TableOptions<'_>, callbacks: &Callbacks<'_>) -> Result<Vec<Pat
     if order.shard == Shard::ALL {
         against::measure(order.bound, order.out)?;
     }
-    let (tables, told) = print::tables(order.bound, order.out)?;
-    for words in told {
+    let (tables, notes) = print::tables(order.bound, order.out)?;
+    for words in notes {
         (callbacks.warn)(&words);
     }
     alone(order.out, || {
@@ -192,7 +192,7 @@ fn alone<T>(out: &Path, write: impl FnOnce() -> Result<T>) -> Result<T> {
 }
 
 /// Work on one row.
-struct Work<'a> {
+struct RowWork<'a> {
     order: &'a TableOptions<'a>,
     callbacks: &'a Callbacks<'a>,
     row: Row,
@@ -210,7 +210,7 @@ struct Fitted {
     baseline: Baseline,
 }
 
-impl Work<'_> {
+impl RowWork<'_> {
     fn network(&self) -> Option<(Network, u64)> {
         match self.row.learner {
             Learner::Network(network, seed) => Some((network, seed)),
@@ -227,13 +227,13 @@ impl Work<'_> {
         &self.order.bound.experiment.train[self.row.train]
     }
 
-    fn told(&self) -> String {
+    fn description(&self) -> String {
         self.row.in_words(&self.order.bound.experiment)
     }
 
     fn selections(&self) -> (Vec<Selection>, Vec<Selection>) {
         let bound = self.order.bound;
-        let of = |parts: &[Part]| parts.iter().map(|p| bound.selection(p)).collect();
+        let of = |parts: &[ImageSelection]| parts.iter().map(|p| bound.selection(p)).collect();
         (of(&self.set().from), of(&self.set().validation))
     }
 
@@ -286,7 +286,7 @@ impl Work<'_> {
     }
 
     /// Trains the row unless it is done; returns `true` if it was not.
-    fn train(&self, number: usize, all: &[&Work<'_>]) -> Result<bool> {
+    fn train(&self, number: usize, all: &[&RowWork<'_>]) -> Result<bool> {
         let network = match self.row.learner {
             Learner::Baseline(kind) => return self.fit_baseline(kind),
             Learner::Network(network, _) => network,
@@ -294,7 +294,7 @@ impl Work<'_> {
         let missing = !self.is_done();
         if missing {
             let state = State { number, of: all.len(), left: left(all, self.order)? };
-            (self.callbacks.training)(&self.told(), &state);
+            (self.callbacks.training)(&self.description(), &state);
             (self.callbacks.fit)(&self.plan(network)?, &self.folder)?;
         }
         if missing || !self.folder.join(PAGE).exists() {
@@ -339,9 +339,9 @@ impl Work<'_> {
             let selection = bound.selection(&test.part);
             let on = selection.identity(Pick::All, 0)?;
             match StoredEvaluation::find(&evaluation::path(&self.folder, &test.slug), &of, test.part.pick, Some(&on)) {
-                Known::Here(_) => continue,
-                Known::Wrong(why) => self.again(&why),
-                Known::Missing => {}
+                StoredState::Here(_) => continue,
+                StoredState::Wrong(why) => self.again(&why),
+                StoredState::Missing => {}
             }
             if self.callbacks.stop.load(Ordering::Relaxed) {
                 let words = "stopped before all rows of the table were done";
@@ -379,7 +379,7 @@ fn short(e: &Error) -> String {
 
 /// Estimates the seconds that the unfinished training runs take: each the mean of the finished runs of its network, or of all
 /// finished runs if there are none. Returns `None` before the first run is done.
-fn left(all: &[&Work<'_>], order: &TableOptions<'_>) -> Result<Option<f64>> {
+fn left(all: &[&RowWork<'_>], order: &TableOptions<'_>) -> Result<Option<f64>> {
     let mut known: Vec<(Network, f64)> = Vec::new();
     for row in rows::rows(&order.bound.experiment) {
         if let Learner::Network(network, _) = row.learner

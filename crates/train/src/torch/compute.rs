@@ -40,7 +40,7 @@ impl Compute<'_> {
 impl Operations for Compute<'_> {
     type Value = Tensor;
     /// Positions of the maxima, and the size before the pooling.
-    type Places = (Tensor, [i64; 2]);
+    type PoolIndices = (Tensor, [i64; 2]);
 
     fn conv(&mut self, x: &Tensor, name: &str, conv: Conv) -> Tensor {
         let weight = self.rounded(&self.tensors[&format!("{name}.weight")]);
@@ -81,12 +81,12 @@ impl Operations for Compute<'_> {
         Tensor::cat(&[a, b], 1)
     }
 
-    fn pool(&mut self, x: &Tensor) -> (Tensor, Self::Places) {
+    fn pool(&mut self, x: &Tensor) -> (Tensor, Self::PoolIndices) {
         let (smaller, places) = x.max_pool2d_with_indices([2, 2], [2, 2], [0, 0], [1, 1], false);
         (smaller, (places, size(x)))
     }
 
-    fn unpool(&mut self, x: &Tensor, (places, size): Self::Places) -> Tensor {
+    fn unpool(&mut self, x: &Tensor, (places, size): Self::PoolIndices) -> Tensor {
         x.max_unpool2d(&places, size)
     }
 

@@ -38,7 +38,7 @@ impl Precision {
 
 /// Device and precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Where {
+pub struct Placement {
     /// Device.
     pub device: Device,
     /// Precision.

@@ -24,7 +24,7 @@ pub fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     let done = panic::catch_unwind(AssertUnwindSafe(|| tch::with_grad(work)));
     drop(mode);
     GUARDED.set(outer);
-    done.unwrap_or_else(|panic| match said(panic.as_ref()) {
+    done.unwrap_or_else(|panic| match printed(panic.as_ref()) {
         Some(words) => Err(failure(words)),
         None => panic::resume_unwind(panic),
     })
@@ -36,7 +36,7 @@ fn silence() {
     ONCE.call_once(|| {
         let usual = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
-            if !GUARDED.get() || said(info.payload()).is_none() {
+            if !GUARDED.get() || printed(info.payload()).is_none() {
                 usual(info);
             }
         }));
@@ -44,7 +44,7 @@ fn silence() {
 }
 
 /// Returns the message of libtorch in a panic of tch; `None` for other panics.
-fn said(panic: &(dyn Any + Send)) -> Option<&str> {
+fn printed(panic: &(dyn Any + Send)) -> Option<&str> {
     panic.downcast_ref::<String>()?.strip_prefix(UNWRAPPED)
 }
 

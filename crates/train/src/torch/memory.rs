@@ -58,13 +58,13 @@ impl Model {
 mod tests {
     use super::*;
     use crate::net::Network;
-    use crate::torch::Where;
+    use crate::torch::Placement;
     use tch::Device;
 
     /// Expected: usual images pass; those that no machine can hold are refused with exit code 2 before anything is computed.
     #[test]
     fn images_beyond_the_memory_are_refused() {
-        let place = Where { device: Device::Cpu, precision: Precision::Single };
+        let place = Placement { device: Device::Cpu, precision: Precision::Single };
         for network in Network::ALL {
             let model = Model::new(*network, 3, 3, 1, place);
             assert!(model.check_inference(1, (480, 360)).is_ok() && model.check_training(1, (64, 64)).is_ok());

@@ -19,7 +19,7 @@ pub use tch;
 use tch::{Device, Kind, Tensor};
 
 pub use compute::Pass;
-pub use device::{Precision, Where};
+pub use device::{Placement, Precision};
 pub use guard::guarded;
 
 /// Number of times the finer encoder features are halved: cells of 8 pixels.
@@ -34,14 +34,14 @@ pub struct Model {
     /// Number of classes.
     pub classes: usize,
     /// Device and precision.
-    pub place: Where,
+    pub place: Placement,
     list: Vec<Parameter>,
     tensors: BTreeMap<String, Tensor>,
 }
 
 impl Model {
     /// Returns a network with random initial values, which depend only on the seed.
-    pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Where) -> Self {
+    pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Placement) -> Self {
         let list = parameters(network, bands, classes);
         let tensors =
             list.iter().enumerate().map(|(i, p)| (p.name.clone(), tensor(p, &p.begin(seed, i), place.device)));
@@ -50,7 +50,7 @@ impl Model {
     }
 
     /// Returns a network with these values. An error names the array that does not match.
-    pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Where) -> Result<Self> {
+    pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Placement) -> Result<Self> {
         let mut model = Self::new(network, bands, classes, 0, place);
         model.load(arrays)?;
         Ok(model)
@@ -213,8 +213,8 @@ mod tests {
     /// Expected: every network gives features with cells of 8 and of 16 pixels, in cells of 8, with the channels of its encoder there;
     /// the scores are the same as without features. Source: the networks' tables of channels.
     #[test]
-    fn every_network_tells_of_its_encoder() {
-        let place = Where { device: Device::Cpu, precision: Precision::Single };
+    fn every_network_names_its_encoder() {
+        let place = Placement { device: Device::Cpu, precision: Precision::Single };
         let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256, 384 + 384]);
         let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17) as f32 / 17.0).collect();
         let shallow = Model::new(Network::TinyUnet, 3, 3, 1, place).scores_and_features(&pixels, size);

@@ -66,7 +66,7 @@ impl Scores {
 
 /// Returns the indices of the images that the appearance model is learnt from: at most 64 of `pictures`, at even intervals. The list is
 /// empty if the refinement does not use appearance.
-pub fn learnt_from(refine: Refine, pictures: usize) -> Vec<usize> {
+pub fn training_images(refine: Refine, pictures: usize) -> Vec<usize> {
     let used = if refine.appearance { pictures.min(LEARNT) } else { 0 };
     (0..used).map(|k| k * pictures / used).collect()
 }

@@ -5,11 +5,12 @@
 //! above the ground. All images of a column show the same plant. The sheet's PNG comment records what it was rendered
 //! from; a sheet that would come out the same is kept.
 
+mod contact_sheet;
 mod page;
-mod sheet;
 mod view;
 
 use crate::quality::threads;
+use contact_sheet::{Bar, Column, ContactSheet, Layout, Thumbnail};
 use furrow_base::geometry::Window;
 use furrow_base::input::shipped;
 use furrow_base::math::Vec3;
@@ -18,12 +19,11 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
 use furrow_field::species_text::SpeciesFile;
 use furrow_field::{Field, assemble};
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::integrator::{PathTracer, World};
-use furrow_render::render::{self, Settings, Watch};
-use page::{Entry, Look, Stage};
-use sheet::{Bar, Column, Layout, Sheet, Shot};
+use furrow_render::render::{self, RenderMonitor, Settings};
+use page::{Entry, PlantView, Stage};
 use std::path::{Path, PathBuf};
 use view::{VIEW_DEG, View};
 
@@ -130,26 +130,29 @@ impl Args {
         if !kept {
             let mut columns = Vec::new();
             for (plant, views, _) in &stages {
-                let shot = |view| Ok((self.shoot(page, plant.bbch, view, signals)?, bar(view, size as usize)));
-                let shots = views.iter().map(shot).collect::<Result<Vec<(Shot, Bar)>>>()?;
-                columns.push(Column { words: format!("BBCH {}", plant.bbch), shots });
+                let thumbnail = |view| Ok((self.shoot(page, plant.bbch, view, signals)?, bar(view, size as usize)));
+                let thumbnails = views.iter().map(thumbnail).collect::<Result<Vec<(Thumbnail, Bar)>>>()?;
+                columns.push(Column { words: format!("BBCH {}", plant.bbch), thumbnails });
             }
             let sheet = layout.compose(&columns);
             let (width, height) = (sheet.width as u32, sheet.height as u32);
-            furrow_output::write_png(&path, width, height, &Picture::Rgb(&sheet.pixels), &from)?;
+            furrow_output::write_png(&path, width, height, &ImageData::Rgb(&sheet.pixels), &from)?;
         }
         if !self.quiet {
-            furrow_cli::tell!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
+            furrow_cli::message!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
         let (width, height, pixels) = furrow_output::read_rgb(&path)?;
-        let sheet = Sheet { width: width as usize, height: height as usize, pixels };
+        let sheet = ContactSheet { width: width as usize, height: height as usize, pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, views, _))| {
             let look = |(k, view): (usize, &View)| {
-                let shot = layout.part(&sheet, (i, k));
-                Ok(Look { jpeg: furrow_output::encode_jpeg(size, size, &shot, 88)?, width_mm: view.width_mm() })
+                let thumbnail = layout.part(&sheet, (i, k));
+                Ok(PlantView {
+                    jpeg: furrow_output::encode_jpeg(size, size, &thumbnail, 88)?,
+                    width_mm: view.width_mm(),
+                })
             };
-            let looks = views.iter().enumerate().map(look).collect::<Result<Vec<Look>>>()?;
-            Ok(Stage { plant, looks })
+            let plant_views = views.iter().enumerate().map(look).collect::<Result<Vec<PlantView>>>()?;
+            Ok(Stage { plant, plant_views })
         });
         let stages = stages.collect::<Result<Vec<Stage>>>()?;
         Ok((path, Entry { desc, stages }))
@@ -186,13 +189,13 @@ impl Args {
     }
 
     /// Renders one image.
-    fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Shot> {
+    fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Thumbnail> {
         let field = self.field(page, bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
         let world = World { scene: &field.scene, geometry: &geometry };
         let window = Window::full(self.size, self.size);
         let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: Points::Sobol };
-        let watch = Watch { done: &|_| {}, stop: signals.heed() };
+        let watch = RenderMonitor { done: &|_| {}, stop: signals.catch() };
         let film = render::render(&world, &PathTracer::default(), &settings, &watch)?;
         Ok(field.photograph(&film).rgb.as_chunks::<3>().0.to_vec())
     }

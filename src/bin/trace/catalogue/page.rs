@@ -25,11 +25,11 @@ pub(super) struct Stage {
     /// The plant shown.
     pub(super) plant: PlantRecord,
     /// Its images: from above, then from the side.
-    pub(super) looks: Vec<Look>,
+    pub(super) plant_views: Vec<PlantView>,
 }
 
 /// A square image.
-pub(super) struct Look {
+pub(super) struct PlantView {
     /// The image as JPEG.
     pub(super) jpeg: Vec<u8>,
     /// Width of the image at the plant, millimetres.
@@ -62,7 +62,7 @@ fn figure(name: &str, stage: &Stage) -> Markup {
     html! {
         figure.stage {
             figcaption { "BBCH " (code) }
-            @for (look, from) in stage.looks.iter().zip(["above", "the side"]) {
+            @for (look, from) in stage.plant_views.iter().zip(["above", "the side"]) {
                 @let mm = round_length(LONGEST * look.width_mm);
                 @let long = SIDE * mm / look.width_mm;
                 svg viewBox={ "0 0 " (SIDE) " " (SIDE) } role="img" aria-label={ (name) ", BBCH " (code) ", from " (from) } {

@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     };
     let (paths, warnings) = cluster::emit(&set, &job, &out)?;
     for warning in warnings {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     Ok(paths)
 }

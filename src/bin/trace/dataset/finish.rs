@@ -39,29 +39,29 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let labelling = args.labels.labelling();
     if !args.format.is_empty() || !labelling.is_usual() {
         for warning in plan::add_formats(&mut set, &args.format, &labelling)? {
-            furrow_cli::tell!("warning: {warning}");
+            furrow_cli::message!("warning: {warning}");
         }
         generate_and_push(&set, &args.work, Shard::ALL, None, push.as_ref(), signals)?;
     }
     let threads = Threads::new(args.work.threads)?;
     let files = threads.install(|| {
         let files = finish::finish(&set, args.shards)?;
-        tell_left_out(&set)?;
+        print_left_out(&set)?;
         Ok::<_, furrow_base::Error>(files)
     })?;
     if let Some(push) = &push {
-        push::whole(&set, push, signals.heed())?;
+        push::whole(&set, push, signals.catch())?;
     }
     Ok(files)
 }
 
 /// Prints how many plants and leaves are left out of the formats' lists.
-pub(super) fn tell_left_out(set: &Set) -> Result<()> {
+pub(super) fn print_left_out(set: &Set) -> Result<()> {
     if set.recipe.formats.is_empty() {
         return Ok(());
     }
     if let Some(LeftOut { ignored_plants, plants, leaves }) = LeftOut::of(set)? {
-        furrow_cli::tell!(
+        furrow_cli::message!(
             "left out of the formats' lists: {plants} plants and {leaves} leaves too small or too hidden, {ignored_plants} plants without a class"
         );
     }

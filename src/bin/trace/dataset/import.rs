@@ -109,19 +109,19 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_folder(&args.out)?;
     let source = source(args)?;
     for warning in source.warnings() {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(source.images().len() as u64);
     let order = ImportSettings { split: args.split, licence: args.licence.clone() };
     let done = |_| progress.add();
-    let stop = signals.heed();
+    let stop = signals.catch();
     let pool = render::pool(args.threads)?;
     let set = pool.install(|| import::import(&args.out, source.as_ref(), &order, &done, stop))?;
     progress.finish();
     let files = finish::finish(&set, None)?;
     for warning in finish::dropped(&set)? {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     Ok(files)
 }

@@ -1,6 +1,6 @@
 //! `trace dataset`: renders many fields with all labels, in the formats of other tools.
 
-pub(crate) mod bill;
+pub(crate) mod cost_estimate;
 mod emit;
 mod finish;
 mod import;
@@ -80,18 +80,18 @@ struct MakeArgs {
     #[command(flatten)]
     push: render::PushArgs,
     #[command(flatten)]
-    dry: bill::DryRunArgs,
+    dry: cost_estimate::DryRunArgs,
 }
 
 /// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
         Some(Verb::Plan(PlanArgs { order, estimate: true })) => {
-            bill::run(order.images.folder(), order.order()?, 0, false, signals)
+            cost_estimate::run(order.images.folder(), order.order()?, 0, false, signals)
         }
         Some(Verb::Plan(PlanArgs { order, estimate: false })) => {
             let set = order::run(order, false, signals)?;
-            order::tell_plants(&set, false)?;
+            order::print_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
         }
         Some(Verb::Render(args)) => render::run(args, signals),
@@ -102,17 +102,17 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Emit(args)) => emit::run(args),
         None if cli.make.dry.dry_run => {
             let MakeArgs { order, work, .. } = &cli.make;
-            bill::run(order.images.folder(), order.order()?, work.threads, work.quiet, signals)
+            cost_estimate::run(order.images.folder(), order.order()?, work.threads, work.quiet, signals)
         }
         None => {
             let push = cli.make.push.push()?;
             let set = order::run(&cli.make.order, cli.make.work.quiet, signals)?;
-            order::tell_plants(&set, cli.make.work.quiet)?;
+            order::print_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
             let all = furrow_dataset::make::generate::Shard::ALL;
             render::generate_and_push(&set, &cli.make.work, all, memory, push.as_ref(), signals)?;
             if cli.make.push.frees() {
-                furrow_cli::tell!(
+                furrow_cli::message!(
                     "all images are pushed: run `trace dataset finish` in the folder that they were pushed to"
                 );
                 return Ok(Vec::new());
@@ -120,12 +120,12 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
             let files = furrow_job::Threads::new(cli.make.work.threads)?.install(|| {
                 let files = furrow_dataset::make::finish::finish(&set, None)?;
                 if !cli.make.work.quiet {
-                    finish::tell_left_out(&set)?;
+                    finish::print_left_out(&set)?;
                 }
                 Ok::<_, furrow_base::Error>(files)
             })?;
             if let Some(push) = &push {
-                furrow_dataset::make::push::whole(&set, push, signals.heed())?;
+                furrow_dataset::make::push::whole(&set, push, signals.catch())?;
             }
             Ok(files)
         }

@@ -8,8 +8,8 @@ use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::make::plan::{self, Order};
 use furrow_dataset::model::classes::Classes;
-use furrow_dataset::model::keep::{self, Kept, Omitted};
 use furrow_dataset::model::labelling::Labelling;
+use furrow_dataset::model::optional_maps::{self, OmittableMap, OptionalMap};
 use furrow_dataset::model::photo::Photo;
 use furrow_dataset::model::split::Shares;
 use furrow_dataset::read::packs;
@@ -56,7 +56,7 @@ pub(crate) struct ImageArgs {
     #[arg(long, value_name = "TEXT", default_value = Order::NO_LICENCE)]
     licence: String,
     #[command(flatten)]
-    look: LookArgs,
+    look: RenderingArgs,
 }
 
 /// Files of an image.
@@ -78,7 +78,7 @@ pub(crate) struct ContentArgs {
 
 /// How images are rendered.
 #[derive(clap::Args)]
-pub(crate) struct LookArgs {
+pub(crate) struct RenderingArgs {
     /// Samples per pixel.
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
@@ -126,12 +126,14 @@ impl LabelArgs {
 
 /// Names of the maps that can be kept, with descriptions.
 fn maps() -> clap::builder::PossibleValuesParser {
-    let value =
-        |(name, _, words): &(&'static str, Kept, &'static str)| clap::builder::PossibleValue::new(*name).help(*words);
+    let value = |(name, _, words): &(&'static str, OptionalMap, &'static str)| {
+        clap::builder::PossibleValue::new(*name).help(*words)
+    };
     let none = clap::builder::PossibleValue::new("none").help("no other maps");
     let label = |(name, words): (&'static str, &'static str)| clap::builder::PossibleValue::new(name).help(words);
-    let labels = Omitted::NEVER.into_iter().chain(Omitted::NAMED.map(|(name, _, words)| (name, words))).map(label);
-    clap::builder::PossibleValuesParser::new(Kept::NAMED.iter().map(value).chain([none]).chain(labels))
+    let labels =
+        OmittableMap::NEVER.into_iter().chain(OmittableMap::NAMED.map(|(name, _, words)| (name, words))).map(label);
+    clap::builder::PossibleValuesParser::new(OptionalMap::NAMED.iter().map(value).chain([none]).chain(labels))
 }
 
 /// Names of the formats, with descriptions.
@@ -154,9 +156,9 @@ pub(crate) fn run(args: &Args, quiet: bool, signals: &Signals) -> Result<Set> {
 }
 
 /// Prints how many plants the images are expected to show. With `quiet`, only warnings are printed.
-pub(super) fn tell_plants(set: &Set, quiet: bool) -> Result<()> {
+pub(super) fn print_plants(set: &Set, quiet: bool) -> Result<()> {
     match furrow_dataset::make::render::scene_file(set)?.plants_in_view(set.recipe.count) {
-        Some(plants) if plants.warning().is_some() || !quiet => furrow_cli::tell!("{}", plants.told()),
+        Some(plants) if plants.warning().is_some() || !quiet => furrow_cli::message!("{}", plants.message()),
         _ => {}
     }
     Ok(())
@@ -168,16 +170,16 @@ pub(crate) fn begin(folder: &Path, mut order: Order, quiet: bool, signals: &Sign
     cli::check_folder(folder)?;
     let growing = Line::begin(quiet);
     order.progress.clone_from(growing.progress());
-    let planned = plan::plan(folder, &order, signals.heed());
+    let planned = plan::plan(folder, &order, signals.catch());
     growing.end();
     let (set, warnings) = planned?;
     for warning in warnings {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
     Ok(set)
 }
 
-impl LookArgs {
+impl RenderingArgs {
     /// Rendering options without an edit.
     pub(crate) fn options(&self) -> RenderOptions {
         let spp = if self.labels_only { 1 } else { self.spp };
@@ -192,7 +194,7 @@ impl ContentArgs {
             return Err(Error::misuse("--keep rgb needs images, and --labels-only renders none")
                 .help("leave one of them out; semantics can be kept on its own"));
         }
-        (order.keep, order.omit) = keep::asked(&self.keep)?;
+        (order.keep, order.omit) = optional_maps::parse(&self.keep)?;
         (order.photo, order.split) = (self.photo, self.split);
         Ok(())
     }

@@ -73,7 +73,7 @@ impl Progress {
         let mut last = log.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if last.elapsed() >= growing::LOGGED {
             *last = Instant::now();
-            furrow_cli::tell!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
+            furrow_cli::message!("{done} of {} images; {}", self.total.load(Ordering::Relaxed), self.rate(done));
         }
     }
 

@@ -146,12 +146,12 @@ fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
 /// Renders images in the dataset's folder, or in a scratch folder and moves them there.
 fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
     let begin = Instant::now();
-    let (soon, now) = signals.heed_patiently();
+    let (soon, now) = signals.catch_graceful();
     let (growing, time_left) = (Arc::default(), Arc::default());
     let progress = Progress::of_fields(begin, quiet, &growing, &time_left);
     let total = |n: usize| progress.expect(n as u64);
     let done = |_| progress.add();
-    let warn = |words: &str| progress.pause(|| furrow_cli::tell!("warning: {words}"));
+    let warn = |words: &str| progress.pause(|| furrow_cli::message!("warning: {words}"));
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };
     let work = Work { progress: Some(&growing), time_left: Some(&time_left), ..*work };
     let made = match scratch {
@@ -161,7 +161,11 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
     let (images, rate) = progress.finish();
     if !quiet {
         let rate = if images > 0 { format!(": {rate:.0} images per hour") } else { String::new() };
-        furrow_cli::tell!("{}: {images} images in {:.1} s{rate}", set.folder.display(), begin.elapsed().as_secs_f64());
+        furrow_cli::message!(
+            "{}: {images} images in {:.1} s{rate}",
+            set.folder.display(),
+            begin.elapsed().as_secs_f64()
+        );
     }
     made.map_err(|error| set.blame(error))
 }

@@ -6,7 +6,7 @@ use crate::quality::threads;
 use furrow_base::Result;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Set;
-use furrow_dataset::check::verify::{self, Again, OtherKernels};
+use furrow_dataset::check::verify::{self, OtherKernels, Rerender};
 use furrow_dataset::make::render;
 use furrow_job::Threads;
 use std::path::PathBuf;
@@ -37,12 +37,12 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
     let renderer = if args.rerender > 0 { render::near_renderer(&set)? } else { None };
-    let again = Again { images: args.rerender, renderer: renderer.as_ref(), memory: args.memory.bytes };
+    let again = Rerender { images: args.rerender, renderer: renderer.as_ref(), memory: args.memory.bytes };
     let progress = Progress::new(Instant::now(), args.quiet);
     progress.expect(set.recipe.count);
     let done = |_| progress.add();
     let threads = Threads::new(args.threads)?;
-    let found = verify::verify(&set, &again, &threads, &done, signals.heed())?;
+    let found = verify::verify(&set, &again, &threads, &done, signals.catch())?;
     progress.finish();
     if !args.quiet {
         let again = match &found.kernels {
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
                 format!("by {here} instead of {there}, and nearly the same: they differ in at most {most}")
             }
         };
-        furrow_cli::tell!(
+        furrow_cli::message!(
             "{}: {} of {} images checked, {} rendered again {again}; {} faults",
             set.folder.display(),
             found.checked,
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             found.faults.len()
         );
         if let Some(unchecked) = &found.unchecked {
-            furrow_cli::tell!("not checked: {unchecked}");
+            furrow_cli::message!("not checked: {unchecked}");
         }
     }
     found.verdict(&set, args.shards)?;

@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let files = files(&shipped::folder()?)?;
     let files: Vec<(&str, Vec<u8>)> = files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
     let paths = write_files(&args.dir, &files)?;
-    furrow_cli::tell!(
+    furrow_cli::message!(
         "{}: now run trace --scene {} --spp 16",
         args.dir.display(),
         args.dir.join("field.ron").display()

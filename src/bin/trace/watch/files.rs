@@ -27,7 +27,7 @@ const MOST: usize = 4096;
 
 /// Watched files, shared by the threads that receive events and poll.
 #[derive(Default)]
-struct Followed {
+struct WatchedFiles {
     /// The files, with their stamps before they were read, or at the last poll.
     stamps: BTreeMap<PathBuf, Stamp>,
     /// `true` if any file saved in the same folders counts too.
@@ -41,7 +41,7 @@ pub(super) struct Files {
     /// Files read for the last image, and the file of the last error: more than scene files name, because models name
     /// files too.
     read: BTreeSet<PathBuf>,
-    followed: Arc<Mutex<Followed>>,
+    followed: Arc<Mutex<WatchedFiles>>,
 }
 
 /// Starts watching, initially nothing. The session is notified when a watched file is saved.
@@ -50,9 +50,9 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
         Error::failed(format!("cannot watch for changes of files: {e}"))
             .help("raise fs.inotify.max_user_instances or fs.inotify.max_user_watches with sysctl")
     };
-    let followed: Arc<Mutex<Followed>> = Arc::default();
+    let followed: Arc<Mutex<WatchedFiles>> = Arc::default();
     let (known, looked_at, (send, receive)) = (followed.clone(), followed.clone(), channel());
-    let told = move |event: notify::Result<Event>| {
+    let on_event = move |event: notify::Result<Event>| {
         let Ok(event) = event else { return };
         let known = known.lock().unwrap_or_else(PoisonError::into_inner);
         let counts = |path| known.beside || known.stamps.contains_key(path);
@@ -60,7 +60,7 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
             let _ = send.send(());
         }
     };
-    let watcher = notify::recommended_watcher(told).map_err(failed)?;
+    let watcher = notify::recommended_watcher(on_event).map_err(failed)?;
     std::thread::Builder::new()
         .name("files".into())
         .spawn(move || wait(&receive, &session, &looked_at))
@@ -70,7 +70,7 @@ pub(super) fn watch(session: Arc<Session>) -> Result<Files> {
 
 /// Notifies the session once per burst of events. Changes without events, as on network file systems or in a folder
 /// that was deleted and recreated, are detected by modification time and size.
-fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<Followed>) {
+fn wait(events: &Receiver<()>, session: &Session, followed: &Mutex<WatchedFiles>) {
     loop {
         let mut changed = match events.recv_timeout(GLANCE) {
             Ok(()) => true,
@@ -179,7 +179,7 @@ impl Files {
             match self.watcher.watch(&folder, RecursiveMode::NonRecursive) {
                 Ok(()) => drop(watched.insert(folder)),
                 Err(e) if self.folders.contains(&folder) => drop(e),
-                Err(e) => furrow_cli::tell!("warning: changes in {} cannot be detected: {e}", folder.display()),
+                Err(e) => furrow_cli::message!("warning: changes in {} cannot be detected: {e}", folder.display()),
             }
         }
         self.folders = watched;

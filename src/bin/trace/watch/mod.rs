@@ -15,13 +15,13 @@
 //! | `page.html`, `page.css`, `page.js` | the page |
 
 mod answer;
+mod contact_sheet;
 mod files;
 mod guard;
 mod http;
-mod picture;
+mod live_image;
 mod server;
 mod session;
-mod sheet;
 mod sliders;
 mod tev;
 mod worker;
@@ -34,7 +34,7 @@ use furrow_cli::cli::{self, signal::Signals};
 use furrow_job::Threads;
 use guard::Guard;
 use server::Server;
-use session::{Session, Wish};
+use session::{PageRequest, Session};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -95,13 +95,13 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     cli::check_scene(&args.scene)?;
     let photo = args.photo.as_deref().map(answer::Photo::read).transpose()?;
     let threads = Threads::new(args.threads)?;
-    let stop = signals.heed();
-    let wish = Wish { index: args.index, seed: args.seed, width: args.width, ..Wish::default() };
+    let stop = signals.catch();
+    let wish = PageRequest { index: args.index, seed: args.seed, width: args.width, ..PageRequest::default() };
     let session = Arc::new(Session::new(args.scene.clone(), wish, args.spp));
     session.show(|shown| shown.photo = photo.is_some());
     let guard = Guard::new(args.host)?;
     let server = Server::open(args.host, args.port, guard, session.clone(), photo)?;
-    server.tell();
+    server.print_address();
     let files = files::watch(session.clone())?;
     let tev = args.display.map(|Display::Tev| tev::Tev::default());
     let worker = Worker::new(session.clone(), files, (&threads, args.memory.bytes), tev)?;

@@ -71,7 +71,7 @@ impl Seed {
 }
 
 /// Shared state of the threads that answer requests.
-struct Desk {
+struct ServerState {
     guard: Guard,
     session: Arc<Session>,
     photo: Option<Photo>,
@@ -85,7 +85,7 @@ struct Desk {
 pub(super) struct Server {
     listener: TcpListener,
     address: SocketAddr,
-    desk: Arc<Desk>,
+    desk: Arc<ServerState>,
 }
 
 impl Server {
@@ -103,14 +103,14 @@ impl Server {
         })?;
         let address = listener.local_addr().unwrap_or(wanted);
         let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(EXPLAINED)))?;
-        let desk = Desk { guard, session, photo, renderer, busy: AtomicUsize::new(0), writing: Mutex::new(()) };
+        let desk = ServerState { guard, session, photo, renderer, busy: AtomicUsize::new(0), writing: Mutex::new(()) };
         Ok(Self { listener, address, desk: Arc::new(desk) })
     }
 
     /// Prints the address of the page, for this machine and for others.
-    pub(super) fn tell(&self) {
+    pub(super) fn print_address(&self) {
         let (address, port) = (self.address, self.address.port());
-        furrow_cli::tell!(
+        furrow_cli::message!(
             "watching {}: http://{address}/{}/",
             self.desk.session.path().display(),
             self.desk.guard.token()
@@ -118,13 +118,15 @@ impl Server {
         if address.ip().is_loopback() {
             let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
             let host = if host.trim().is_empty() { "HOST" } else { host.trim() };
-            furrow_cli::tell!("from another machine: ssh -L {port}:{address} {host}, then open the same address there");
+            furrow_cli::message!(
+                "from another machine: ssh -L {port}:{address} {host}, then open the same address there"
+            );
         } else {
-            furrow_cli::tell!(
+            furrow_cli::message!(
                 "warning: everyone who can reach {address} and knows this address can view the page and write to the scene file"
             );
         }
-        furrow_cli::tell!("press Ctrl-C to stop");
+        furrow_cli::message!("press Ctrl-C to stop");
     }
 
     /// Serves requests until `stop` is set. The thread that accepts connections ends with the program.
@@ -151,7 +153,7 @@ impl Server {
             };
             if !admitted && warned.is_none_or(|at| at.elapsed() > BEAT) {
                 warned = Some(Instant::now());
-                furrow_cli::tell!("warning: there are too many connections at once; some are refused");
+                furrow_cli::message!("warning: there are too many connections at once; some are refused");
             }
         }
     }
@@ -170,10 +172,10 @@ impl Server {
 }
 
 /// Counts one connection until it is dropped, also by a panic.
-struct Busy(Arc<Desk>);
+struct Busy(Arc<ServerState>);
 
 impl Busy {
-    fn new(desk: &Arc<Desk>) -> Self {
+    fn new(desk: &Arc<ServerState>) -> Self {
         desk.busy.fetch_add(1, Ordering::SeqCst);
         Self(desk.clone())
     }
@@ -185,7 +187,7 @@ impl Drop for Busy {
     }
 }
 
-impl Desk {
+impl ServerState {
     /// Reads a request and answers it.
     fn receive(&self, mut connection: Connection) {
         let answer = match connection.head().and_then(|head| self.answer(&mut connection, head)) {

@@ -1,7 +1,7 @@
 //! Requested and displayed state, shared by the threads that render, watch files and answer requests.
 
-use super::picture::Picture;
-use super::sheet::Sheet;
+use super::contact_sheet::ContactSheet;
+use super::live_image::LiveImage;
 use super::sliders::Slider;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use std::time::Duration;
 
 /// Request of the page.
 #[derive(Clone, Default, PartialEq)]
-pub(super) struct Wish {
+pub(super) struct PageRequest {
     /// Index of the field.
     pub(super) index: u64,
     /// Seed that overrides the scene file's.
@@ -28,19 +28,19 @@ pub(super) struct Wish {
 
 /// State displayed by the page.
 #[derive(Default)]
-pub(super) struct Shown {
+pub(super) struct PageState {
     /// Last image that could be rendered.
-    pub(super) picture: Option<Arc<Picture>>,
+    pub(super) picture: Option<Arc<LiveImage>>,
     /// Error of the newest request, if it failed.
     pub(super) error: Option<String>,
     /// Warnings of the newest field that are known before it is built, with the number of the request.
-    pub(super) foretold: (u64, Vec<String>),
+    pub(super) expected_warnings: (u64, Vec<String>),
     /// Text of the scene file when last read.
     pub(super) text: String,
     /// Numbers of the scene file.
     pub(super) sliders: Vec<Slider>,
     /// Sheet of indices.
-    pub(super) sheet: Sheet,
+    pub(super) sheet: ContactSheet,
     /// `true` if a photograph was given on the command line.
     pub(super) photo: bool,
     /// Current activity of the worker; empty if idle.
@@ -48,12 +48,12 @@ pub(super) struct Shown {
 }
 
 struct Inner {
-    wish: Wish,
+    wish: PageRequest,
     /// Incremented with every request and every change of a file.
     asked: u64,
     /// Incremented with every change of the displayed state.
     version: u64,
-    shown: Shown,
+    shown: PageState,
     ended: bool,
 }
 
@@ -70,8 +70,8 @@ pub(super) struct Session {
 
 impl Session {
     /// Creates a session without an image.
-    pub(super) fn new(path: PathBuf, wish: Wish, spp: u32) -> Self {
-        let inner = Inner { wish, asked: 1, version: 1, shown: Shown::default(), ended: false };
+    pub(super) fn new(path: PathBuf, wish: PageRequest, spp: u32) -> Self {
+        let inner = Inner { wish, asked: 1, version: 1, shown: PageState::default(), ended: false };
         Self { path, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: Arc::default() }
     }
 
@@ -108,7 +108,7 @@ impl Session {
     }
 
     /// Changes the request. Returns the number of the newest request.
-    pub(super) fn wish(&self, change: impl FnOnce(&mut Wish)) -> u64 {
+    pub(super) fn wish(&self, change: impl FnOnce(&mut PageRequest)) -> u64 {
         let mut asked = 0;
         self.turn(|inner| {
             let before = inner.wish.clone();
@@ -132,7 +132,7 @@ impl Session {
     }
 
     /// Waits for a request newer than number `done`; `None` at the end.
-    pub(super) fn next(&self, done: u64) -> Option<(u64, Wish)> {
+    pub(super) fn next(&self, done: u64) -> Option<(u64, PageRequest)> {
         let mut inner = self.lock();
         while inner.asked == done && !inner.ended {
             inner = self.changed.wait(inner).unwrap_or_else(PoisonError::into_inner);
@@ -142,7 +142,7 @@ impl Session {
     }
 
     /// Changes the displayed state.
-    pub(super) fn show(&self, change: impl FnOnce(&mut Shown)) {
+    pub(super) fn show(&self, change: impl FnOnce(&mut PageState)) {
         self.turn(|inner| {
             change(&mut inner.shown);
             inner.version += 1;
@@ -150,12 +150,12 @@ impl Session {
     }
 
     /// Reads from the displayed state.
-    pub(super) fn shown<T>(&self, look: impl FnOnce(&Shown) -> T) -> T {
+    pub(super) fn shown<T>(&self, look: impl FnOnce(&PageState) -> T) -> T {
         look(&self.lock().shown)
     }
 
     /// Returns the image; an error before the first one is rendered.
-    pub(super) fn picture(&self) -> Result<Arc<Picture>> {
+    pub(super) fn picture(&self) -> Result<Arc<LiveImage>> {
         self.shown(|shown| shown.picture.clone()).ok_or_else(|| Error::input("there is no image yet"))
     }
 
@@ -171,9 +171,9 @@ impl Session {
 
     fn describe(&self, inner: &Inner) -> Value {
         let Inner { wish, asked, version, shown, .. } = inner;
-        let (told_of, foretold) = &shown.foretold;
-        let grown = shown.picture.as_ref().filter(|picture| picture.asked() >= *told_of);
-        let warnings = grown.map_or(foretold, |picture| picture.warnings());
+        let (expected_for, expected_warnings) = &shown.expected_warnings;
+        let grown = shown.picture.as_ref().filter(|picture| picture.asked() >= *expected_for);
+        let warnings = grown.map_or(expected_warnings, |picture| picture.warnings());
         json!({
             "version": version,
             "asked": asked,

@@ -104,7 +104,7 @@ pub(super) fn write(file: &Path, path: &str, value: f64, seen: &str) -> Result<S
     }
     check(file, &new)?;
     let permissions = fs::metadata(file).map_err(Error::reading(file))?.permissions();
-    let mut whole = furrow_output::Together::default();
+    let mut whole = furrow_output::FileSet::default();
     whole.add(file, &[mark.as_slice(), new.as_bytes()].concat())?;
     // Check again as late as possible, because an editor may have saved meanwhile.
     unchanged(file, seen)?;

@@ -18,12 +18,12 @@ pub(super) struct Tev {
     client: Option<TevClient>,
     size: (u32, u32),
     /// `true` once the user was warned that there is no connection.
-    told: bool,
+    warned: bool,
 }
 
 impl Default for Tev {
     fn default() -> Self {
-        Self { address: ADDRESS.into(), client: None, size: (0, 0), told: false }
+        Self { address: ADDRESS.into(), client: None, size: (0, 0), warned: false }
     }
 }
 
@@ -31,12 +31,12 @@ impl Tev {
     /// Sends the radiance of the film. Warns once if tev is not running.
     pub(super) fn send(&mut self, film: &Film) {
         match self.try_send(film) {
-            Ok(()) => self.told = false,
+            Ok(()) => self.warned = false,
             Err(e) => {
                 self.client = None;
-                if !std::mem::replace(&mut self.told, true) {
+                if !std::mem::replace(&mut self.warned, true) {
                     let address = self.address;
-                    furrow_cli::tell!(
+                    furrow_cli::message!(
                         "warning: cannot send the image to tev at {address}: {e}; start tev, then save the scene file"
                     );
                 }

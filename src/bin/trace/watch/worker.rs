@@ -1,10 +1,10 @@
 //! Thread that builds and renders requested fields. A newer request interrupts it. If a scene file cannot be rendered,
 //! the last image is kept and the error is shown.
 
+use super::contact_sheet;
 use super::files::Files;
-use super::picture::{Made, Picture};
-use super::session::{Session, Wish};
-use super::sheet;
+use super::live_image::{LiveImage, RenderInfo};
+use super::session::{PageRequest, Session};
 use super::sliders::{sliders, with};
 use super::tev::Tev;
 use furrow_base::error::Kind;
@@ -13,7 +13,7 @@ use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_field::assemble::Preview;
 use furrow_job::{Field, Renderer, Request, SceneFile, Threads};
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Quality, RenderOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -77,7 +77,7 @@ impl Worker {
                     // Moving a slider must not print the same error repeatedly.
                     let words = format!("error: {error}");
                     if session.shown(|shown| shown.error.as_ref() != Some(&words)) {
-                        furrow_cli::tell!("{words}");
+                        furrow_cli::message!("{words}");
                     }
                     session.show(|shown| {
                         (shown.doing, shown.error) = ("", Some(words));
@@ -89,7 +89,7 @@ impl Worker {
     }
 
     /// Reads the scene file, builds the field and renders it.
-    fn answer(&mut self, asked: u64, wish: &Wish) -> Result<()> {
+    fn answer(&mut self, asked: u64, wish: &PageRequest) -> Result<()> {
         let (begin, written) = (Instant::now(), SystemTime::now());
         let session = self.session.clone();
         self.files.expect(session.path());
@@ -107,8 +107,8 @@ impl Worker {
             None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
         };
         let scene = scene.seed(wish.seed).memory(self.memory).preview(&self.preview).until(session.outdated());
-        let foretold = scene.foretold(wish.index)?;
-        session.show(|shown| shown.foretold = (asked, foretold));
+        let expected_warnings = scene.expected_warnings(wish.index)?;
+        session.show(|shown| shown.expected_warnings = (asked, expected_warnings));
         let field = Arc::new(self.grow(&scene, wish)?);
         if self.files.keep(session.path(), &field.grown().files, written) {
             // Its buffers, materials or images may have been read before a change.
@@ -129,7 +129,7 @@ impl Worker {
     }
 
     /// Builds the field at the requested width, or at the camera's own width if that is smaller.
-    fn grow(&mut self, scene: &SceneFile, wish: &Wish) -> Result<Field> {
+    fn grow(&mut self, scene: &SceneFile, wish: &PageRequest) -> Result<Field> {
         let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
         let field = scene.clone().width(guess).field(wish.index)?;
         let camera = &field.grown().scene.camera;
@@ -148,7 +148,7 @@ impl Worker {
         first: &mut (dyn FnMut() -> Duration + Send),
     ) -> Result<()> {
         let Self { session, renderer, tev, .. } = self;
-        let watch = Watch { done: &|_| (), stop: session.outdated() };
+        let watch = RenderMonitor { done: &|_| (), stop: session.outdated() };
         if watch.stop.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
@@ -158,8 +158,8 @@ impl Worker {
         let (mut spp, mut kept) = (passes.iter(), None);
         renderer.refine(field, &Request { watch, ..Request::default() }, passes, &mut |film, labels| {
             let labels = kept.get_or_insert_with(|| Arc::new(labels.clone()));
-            let made = Made { asked, first: first(), spp: spp.next().copied().unwrap_or_default() };
-            let picture = Arc::new(Picture::new(field, film, labels, made));
+            let made = RenderInfo { asked, first: first(), spp: spp.next().copied().unwrap_or_default() };
+            let picture = Arc::new(LiveImage::new(field, film, labels, made));
             session.show(|shown| (shown.picture, shown.error) = (Some(picture), None));
             if let Some(tev) = tev {
                 tev.send(film);
@@ -169,22 +169,22 @@ impl Worker {
     }
 
     /// Renders the missing thumbnails of the sheet.
-    fn sheet(&mut self, scene: &SceneFile, text: String, wish: &Wish, asked: u64) -> Result<()> {
+    fn sheet(&mut self, scene: &SceneFile, text: String, wish: &PageRequest, asked: u64) -> Result<()> {
         let session = &self.session;
         let same = |of: &(String, Option<u64>, u64)| of.0 == text && of.1 == wish.seed;
         if !session.shown(|shown| shown.sheet.of.as_ref().is_some_and(same)) {
             session.show(|shown| {
-                shown.sheet = sheet::Sheet { of: Some((text, wish.seed, asked)), pictures: Vec::new() };
+                shown.sheet = contact_sheet::ContactSheet { of: Some((text, wish.seed, asked)), pictures: Vec::new() };
             });
         }
-        let width = self.own_width.unwrap_or(sheet::WIDTH).min(sheet::WIDTH);
+        let width = self.own_width.unwrap_or(contact_sheet::WIDTH).min(contact_sheet::WIDTH);
         // The sheet shows other fields, so it has a preview cache separate from the image's.
         let scene = scene.clone().width(width).preview(&Preview::default());
-        for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..sheet::COUNT {
+        for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..contact_sheet::COUNT {
             if session.outdated().load(Ordering::Relaxed) {
                 return Err(Error::interrupted());
             }
-            let picture = match sheet::picture(&scene, index, session.outdated()) {
+            let picture = match contact_sheet::picture(&scene, index, session.outdated()) {
                 Ok(png) => Ok(Arc::new(png)),
                 Err(error) if error.kind() == Kind::Interrupted => return Err(error),
                 // The other indices may still succeed.

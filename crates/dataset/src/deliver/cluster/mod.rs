@@ -54,14 +54,14 @@ pub fn emit(set: &Set, job: &Job, folder: &Path) -> Result<(Vec<PathBuf>, Vec<St
     let paths = write_together(folder, |together| {
         files.iter().try_for_each(|file| together.add(&folder.join(&file.path), &file.bytes))
     })?;
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     if job.scheduler == Scheduler::Slurm && job.shards > SLURM_ARRAY {
-        told.push(format!(
+        notes.push(format!(
             "{} shards: Slurm refuses arrays of more than {SLURM_ARRAY} tasks unless its MaxArraySize is raised",
             job.shards
         ));
     }
-    Ok((paths, told))
+    Ok((paths, notes))
 }
 
 fn check(set: &Set, job: &Job) -> Result<()> {

@@ -97,8 +97,9 @@ mod tests {
     #[test]
     fn words_survive_a_shell() {
         for word in ["/a/b.c", "it's here", "", "$(rm) \"x\" \\ `y` *", "@x"] {
-            let said = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
-            assert_eq!(String::from_utf8(said.unwrap().stdout).unwrap(), word);
+            let message =
+                std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
+            assert_eq!(String::from_utf8(message.unwrap().stdout).unwrap(), word);
         }
     }
 
@@ -106,11 +107,11 @@ mod tests {
     /// literal.
     #[test]
     fn variables_are_the_shells_and_nothing_else() {
-        let said = |word: &str| {
+        let message = |word: &str| {
             let words = format!("printf %s {}", expanded(word));
             let mut shell = std::process::Command::new("sh");
-            let said = shell.arg("-c").arg(words).env("A_1", "x y").env_remove("NONE").output().unwrap();
-            (said.status.success(), String::from_utf8(said.stdout).unwrap())
+            let message = shell.arg("-c").arg(words).env("A_1", "x y").env_remove("NONE").output().unwrap();
+            (message.status.success(), String::from_utf8(message.stdout).unwrap())
         };
         for (word, expected) in [
             ("$A_1/furrow", "x y/furrow"),
@@ -118,9 +119,9 @@ mod tests {
             ("$(rm) `y` \"z\" \\ it's * $", "$(rm) `y` \"z\" \\ it's * $"),
             ("${A_1%x} $1 ${} @A@", "${A_1%x} $1 ${} @A@"),
         ] {
-            assert_eq!(said(word), (true, expected.to_owned()), "{word}");
+            assert_eq!(message(word), (true, expected.to_owned()), "{word}");
         }
-        assert_eq!(said("$NONE/furrow"), (false, String::new()));
+        assert_eq!(message("$NONE/furrow"), (false, String::new()));
     }
 
     #[test]

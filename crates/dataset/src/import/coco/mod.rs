@@ -19,7 +19,7 @@ mod spot;
 use super::classes::{Meaning, Names};
 use super::files::{Shot, length, photograph};
 use super::instances::{Instances, instances};
-use super::{Labelled, Listed, Source};
+use super::{Labelled, Source, SourceImage};
 use crate::model::record::{Keypoint, PointState};
 use crate::model::split::Split;
 use crate::model::warnings;
@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 /// A source of images with COCO annotations.
 pub struct Coco {
-    listed: Vec<Listed>,
+    listed: Vec<SourceImage>,
     images: Vec<Annotated>,
     words: String,
     crowds: Crowds,
@@ -87,7 +87,7 @@ impl Coco {
             let _ = writeln!(words, "crowds: {crowds:?}");
         }
         let mut all = Self { listed: Vec::new(), images: Vec::new(), words, crowds };
-        let mut found: Vec<(Listed, Annotated)> = Vec::new();
+        let mut found: Vec<(SourceImage, Annotated)> = Vec::new();
         for (split, document) in documents(from)? {
             let folder = images.map_or_else(|| beside(from, &document), Path::to_path_buf);
             found.extend(all.document(split, &document, &folder, classes)?);
@@ -115,11 +115,11 @@ impl Coco {
         path: &Path,
         folder: &Path,
         classes: Option<&Names>,
-    ) -> Result<Vec<(Listed, Annotated)>> {
+    ) -> Result<Vec<(SourceImage, Annotated)>> {
         let instances = Read::open(path)?;
         let leaves = leaves_beside(path).map(|path| Read::open(&path)).transpose()?;
         let document: Arc<Path> = path.into();
-        let mut found: BTreeMap<Id, (Listed, Annotated)> = BTreeMap::new();
+        let mut found: BTreeMap<Id, (SourceImage, Annotated)> = BTreeMap::new();
         for image in &instances.document.images {
             let file = names::find(path, folder, split, &image.file_name)?;
             let annotated = Annotated {
@@ -129,7 +129,7 @@ impl Coco {
                 things: Vec::new(),
                 warnings: file.warning.into_iter().collect(),
             };
-            let listed = Listed { split, name: image.file_name.clone() };
+            let listed = SourceImage { split, name: image.file_name.clone() };
             if found.insert(image.id.clone(), (listed, annotated)).is_some() {
                 return Err(instances.wrong(format!("two images have the id {}", image.id.0)));
             }
@@ -164,7 +164,7 @@ impl Read {
     }
 
     /// Adds the annotations to their images.
-    fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<Id, (Listed, Annotated)>) -> Result<()> {
+    fn annotate(mut self, classes: Option<&Names>, found: &mut BTreeMap<Id, (SourceImage, Annotated)>) -> Result<()> {
         let annotations = std::mem::take(&mut self.document.annotations);
         let kinds = self.kinds(classes, &annotations)?;
         let document: Arc<Path> = self.path.as_path().into();
@@ -302,7 +302,7 @@ impl Source for Coco {
         "coco"
     }
 
-    fn images(&self) -> &[Listed] {
+    fn images(&self) -> &[SourceImage] {
         &self.listed
     }
 
@@ -420,7 +420,7 @@ fn doubts(image: &Annotated, (w, h): (u32, u32), masks: &[(usize, Vec<u32>)], cr
     let beyond = image.things.iter().filter(|thing| thing.segmentation.reaches_beyond(w, h)).count();
     let is_crowd = |thing: &&Thing| thing.crowd && matches!(thing.meaning, Meaning::Class(Class::Crop | Class::Weed));
     let alone = if crowds == Crowds::Class { image.things.iter().filter(is_crowd).count() } else { 0 };
-    let told = [
+    let stated = [
         (empty, "annotations cover no pixel and were left out"),
         (beyond, "masks reach more than a pixel beyond the image and were cut at its border"),
         (
@@ -429,7 +429,7 @@ fn doubts(image: &Annotated, (w, h): (u32, u32), masks: &[(usize, Vec<u32>)], cr
              instances",
         ),
     ];
-    told.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")).collect()
+    stated.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")).collect()
 }
 
 impl Segmentation {
@@ -445,8 +445,8 @@ impl Segmentation {
 fn plant_numbers(things: &[Thing], crowds: Crowds) -> Vec<u32> {
     let is_one = |t: &Thing| !t.crowd || crowds == Crowds::Instances;
     let is_plant = |t: &Thing| is_one(t) && matches!(t.meaning, Meaning::Class(Class::Crop | Class::Weed));
-    let told: Vec<u32> = things.iter().filter(|t| is_plant(t)).filter_map(|t| t.plant).collect();
-    let distinct: BTreeSet<u32> = told.iter().copied().filter(|n| *n > 0).collect();
+    let stated: Vec<u32> = things.iter().filter(|t| is_plant(t)).filter_map(|t| t.plant).collect();
+    let distinct: BTreeSet<u32> = stated.iter().copied().filter(|n| *n > 0).collect();
     let own = distinct.len() == things.iter().filter(|t| is_plant(t)).count();
     let mut last = 0;
     let number = |thing: &Thing| {

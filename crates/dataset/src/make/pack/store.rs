@@ -10,7 +10,7 @@ use crate::read::native;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::packs::record::PackRecord;
-use crate::read::set::{Set, Whole};
+use crate::read::set::{Set, SetWriter};
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
 use furrow_output::{is_unfinished, remove_unfinished_in};
@@ -127,7 +127,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
         }
     }
     let mut members = BTreeMap::new();
-    let mut whole = Whole::new(folder);
+    let mut whole = SetWriter::new(folder);
     whole.file(&id.path(), |out| {
         let mut archive = tar::Builder::new(out);
         for image in &images {

@@ -3,7 +3,7 @@
 use super::super::document::{Document, FLOAT, SparseBytes, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use super::super::files::Files;
 use super::super::parts::MOST_TRIANGLES;
-use super::super::settle::Wrong;
+use super::super::settle::ModelError;
 use super::super::uri::{Target, follow};
 use super::item;
 use std::borrow::Cow;
@@ -30,7 +30,11 @@ struct Elements {
 
 impl<'a> Accessors<'a> {
     /// Reads all buffers; `own` is the binary chunk of a GLB file.
-    pub(super) fn open(document: &'a Document, own: Option<&'a [u8]>, files: &mut Files<'_>) -> Result<Self, Wrong> {
+    pub(super) fn open(
+        document: &'a Document,
+        own: Option<&'a [u8]>,
+        files: &mut Files<'_>,
+    ) -> Result<Self, ModelError> {
         let mut buffers = Vec::new();
         for (i, buffer) in document.buffers.iter().enumerate() {
             let data: Cow<'a, [u8]> = match &buffer.uri {
@@ -52,14 +56,14 @@ impl<'a> Accessors<'a> {
     }
 
     /// Returns the bytes of a buffer view; `None` if it reaches past its buffer.
-    pub(super) fn view(&self, view: usize) -> Result<Option<&[u8]>, Wrong> {
+    pub(super) fn view(&self, view: usize) -> Result<Option<&[u8]>, ModelError> {
         let view = item(&self.document.buffer_views, view, "buffer view")?;
         let buffer = item(&self.buffers, view.buffer, "buffer")?;
         Ok(view.byte_offset.checked_add(view.byte_length).and_then(|end| buffer.get(view.byte_offset..end)))
     }
 
     /// Returns the elements of an accessor as single-precision numbers.
-    pub(super) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, Wrong> {
+    pub(super) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>, ModelError> {
         let Elements { bytes, component_type, normalized } = self.elements(index, N)?;
         let one = |whole: f32, most: f32| if normalized { (whole / most).max(-1.0) } else { whole };
         let component = |e: &[u8], i: usize| match component_type {
@@ -75,14 +79,14 @@ impl<'a> Accessors<'a> {
     }
 
     /// Returns the elements of an accessor as indices.
-    pub(super) fn whole<const N: usize>(&self, index: usize) -> Result<Vec<[u32; N]>, Wrong> {
+    pub(super) fn whole<const N: usize>(&self, index: usize) -> Result<Vec<[u32; N]>, ModelError> {
         let Elements { bytes, component_type, .. } = self.elements(index, N)?;
         integers(&bytes, component_type)
             .ok_or_else(|| format!("accessor {index} holds indices that are not integers").into())
     }
 
     /// Returns the elements of an accessor: those of its buffer view, or zeros, overridden by its sparse ones.
-    fn elements(&self, index: usize, components: usize) -> Result<Elements, Wrong> {
+    fn elements(&self, index: usize, components: usize) -> Result<Elements, ModelError> {
         let accessor = item(&self.document.accessors, index, "accessor")?;
         let words = |what: &str| format!("accessor {index} {what}");
         let kind = match components {
@@ -113,7 +117,7 @@ impl<'a> Accessors<'a> {
             let part = |of: &SparseBytes, size: usize| {
                 let data = self.view(of.buffer_view)?.and_then(|data| data.get(of.byte_offset..));
                 let packed = packed(data, (sparse.count, size, size));
-                packed.ok_or_else(|| Wrong::from(words("has sparse elements past their bytes")))
+                packed.ok_or_else(|| ModelError::from(words("has sparse elements past their bytes")))
             };
             let kind = sparse.indices.component_type.unwrap_or_default();
             let places = part(&sparse.indices, width(kind).ok_or_else(unknown)?)?;

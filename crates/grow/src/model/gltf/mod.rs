@@ -4,7 +4,7 @@
 //! is visited once.
 
 mod accessors;
-mod look;
+mod appearance;
 mod passed_over;
 mod pose;
 #[cfg(test)]
@@ -12,21 +12,21 @@ mod tests;
 
 use super::document::{Document, Material, Mesh as MeshDesc, Node, Primitive};
 use super::files::Files;
-use super::gather::Gathered;
+use super::gather::UnplacedParts;
 use super::glb;
 use super::notes::Notes;
 use super::parts::{Label, Model, Up};
-use super::settle::{Wrong, faceted, into_one_tile};
+use super::settle::{ModelError, faceted, into_one_tile};
 use accessors::Accessors;
+use appearance::{Appearance, AppearanceReader};
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{DMat4, Vec2, Vec3};
 use furrow_optics::texture::Surface;
-use look::{Look, Looks};
 use pose::{Pose, bound, morph, placement};
 use std::collections::BTreeMap;
 
 /// Reads a model, or returns an error.
-pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
+pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, ModelError> {
     let file = files.own()?;
     let (json, own) = if glb::is_glb(&file) { glb::split(&file)? } else { (&file[..], None) };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
@@ -39,14 +39,16 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
     let mut notes = Notes::default();
     passed_over::warn_of_contents(&document, &mut notes);
     let accessors = Accessors::open(&document, own, &mut files)?;
-    let mut looks = Looks::new(&document, &accessors, files, notes);
+    let mut appearances = AppearanceReader::new(&document, &accessors, files, notes);
     let materials: &[Material] = &document.materials;
-    let known = materials.iter().enumerate().map(|(i, m)| looks.look(i, m)).collect::<Result<Vec<_>, _>>()?;
-    let Looks { files, notes, .. } = looks;
+    let known =
+        materials.iter().enumerate().map(|(i, m)| appearances.appearance(i, m)).collect::<Result<Vec<_>, _>>()?;
+    let AppearanceReader { files, notes, .. } = appearances;
     let mut model = Model { surfaces: known.iter().map(|l| l.surface.clone()).collect(), ..Model::default() };
     // For primitives without a material.
     model.surfaces.push(Surface::default());
-    let mut reader = Reader { document: &document, accessors: &accessors, looks: &known, bare: BTreeMap::new(), notes };
+    let mut reader =
+        Reader { document: &document, accessors: &accessors, appearances: &known, bare: BTreeMap::new(), notes };
     reader.walk(up, &mut model)?;
     model.warnings = reader.notes.words();
     model.pictures = files.pictures;
@@ -57,7 +59,7 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
 struct Reader<'a> {
     document: &'a Document,
     accessors: &'a Accessors<'a>,
-    looks: &'a [Look],
+    appearances: &'a [Appearance],
     /// Surfaces without pictures, for primitives without texture coordinates, by material.
     bare: BTreeMap<usize, usize>,
     notes: Notes,
@@ -77,7 +79,7 @@ fn item<'a, T>(of: &'a [T], index: usize, what: &str) -> Result<&'a T, String> {
 
 impl Reader<'_> {
     /// Returns the root nodes of the scene that is shown.
-    fn roots(&self) -> Result<Vec<usize>, Wrong> {
+    fn roots(&self) -> Result<Vec<usize>, ModelError> {
         let document = self.document;
         if let Some(scene) = document.scene.or((!document.scenes.is_empty()).then_some(0)) {
             return Ok(item(&document.scenes, scene, "scene")?.nodes.clone());
@@ -91,7 +93,7 @@ impl Reader<'_> {
 
     /// Visits the nodes of the scene, parents before children. Returns their indices in this order, and the transforms
     /// of all nodes into the model's frame; the identity for nodes outside the scene.
-    fn nodes(&self, up: Up) -> Result<(Vec<usize>, Vec<DMat4>), Wrong> {
+    fn nodes(&self, up: Up) -> Result<(Vec<usize>, Vec<DMat4>), ModelError> {
         let nodes = &self.document.nodes;
         let (mut order, mut world) = (Vec::new(), vec![DMat4::IDENTITY; nodes.len()]);
         let mut seen = vec![false; nodes.len()];
@@ -109,9 +111,9 @@ impl Reader<'_> {
     }
 
     /// Adds the meshes of the scene to `model`.
-    fn walk(&mut self, up: Up, model: &mut Model) -> Result<(), Wrong> {
+    fn walk(&mut self, up: Up, model: &mut Model) -> Result<(), ModelError> {
         let (order, world) = self.nodes(up)?;
-        let mut gathered = Gathered::default();
+        let mut gathered = UnplacedParts::default();
         for index in order {
             let node = &self.document.nodes[index];
             let Some(mesh) = node.mesh else { continue };
@@ -124,18 +126,19 @@ impl Reader<'_> {
                 None => None,
             };
             for primitive in &mesh.primitives {
-                let look = primitive.material.map(|m| item(self.looks, m, "material")).transpose()?;
-                if let Some(look) = look.filter(|look| look.absent) {
+                let appearance = primitive.material.map(|m| item(self.appearances, m, "material")).transpose()?;
+                if let Some(appearance) = appearance.filter(|appearance| appearance.absent) {
                     let words = "left out: surfaces whose opacity is below the threshold everywhere";
-                    self.notes.about(words, &look.surface.name);
+                    self.notes.about(words, &appearance.surface.name);
                     continue;
                 }
-                let read = self.primitive((node, mesh, primitive), look, pose.as_ref().map(|pose| (pose, &to)), &name);
+                let read =
+                    self.primitive((node, mesh, primitive), appearance, pose.as_ref().map(|pose| (pose, &to)), &name);
                 let Some(read) = read? else { continue };
                 let surface = match primitive.material {
                     Some(material) if read.bare => self.bare(material, model),
                     Some(material) => material,
-                    None => self.looks.len(),
+                    None => self.appearances.len(),
                 };
                 let to = if read.bent { DMat4::IDENTITY } else { to };
                 gathered.add(name.clone(), read.mesh, surface, label.clone(), to)?;
@@ -156,10 +159,10 @@ impl Reader<'_> {
     fn primitive(
         &mut self,
         (node, desc, primitive): (&Node, &MeshDesc, &Primitive),
-        look: Option<&Look>,
+        appearance: Option<&Appearance>,
         pose: Option<(&Pose, &DMat4)>,
         name: &str,
-    ) -> Result<Option<Read>, Wrong> {
+    ) -> Result<Option<Read>, ModelError> {
         let attribute = |what: &str| primitive.attributes.get(what).copied();
         let mode = primitive.mode.unwrap_or(4);
         if mode < 4 {
@@ -173,7 +176,7 @@ impl Reader<'_> {
         let mut positions = accessors.floats::<3>(positions)?;
         morph(accessors, primitive, weights, "POSITION", &mut positions)?;
         let positions: Vec<Vec3> = positions.into_iter().map(Vec3::from).collect();
-        let named = format!("TEXCOORD_{}", look.map_or(0, |l| l.slot.set));
+        let named = format!("TEXCOORD_{}", appearance.map_or(0, |l| l.slot.set));
         let mut uvs = match attribute(&named) {
             Some(uvs) => {
                 let mut uvs = accessors.floats::<2>(uvs)?;
@@ -182,14 +185,14 @@ impl Reader<'_> {
             }
             None => vec![Vec2::ZERO; positions.len()],
         };
-        let bare = attribute(&named).is_none() && look.is_some_and(Look::has_pictures);
+        let bare = attribute(&named).is_none() && appearance.is_some_and(Appearance::has_pictures);
         if bare {
             self.notes.about(format!("no texture coordinates {named}, so the pictures are passed over"), name);
         }
-        if let Some(look) = look.filter(|_| !bare) {
-            uvs.iter_mut().for_each(|uv| *uv = look.slot.transformed(*uv));
-            if look.surface.mask.is_some() {
-                into_one_tile(&mut uvs, look.wrap, name, &mut self.notes)?;
+        if let Some(appearance) = appearance.filter(|_| !bare) {
+            uvs.iter_mut().for_each(|uv| *uv = appearance.slot.transformed(*uv));
+            if appearance.surface.mask.is_some() {
+                into_one_tile(&mut uvs, appearance.wrap, name, &mut self.notes)?;
             }
         }
         let corners: Vec<u32> = match primitive.indices {
@@ -230,7 +233,7 @@ impl Reader<'_> {
     }
 
     /// Returns an error if the geometry of a primitive is stored only in compressed form.
-    fn check_compression(&self, primitive: &Primitive, name: &str) -> Result<(), Wrong> {
+    fn check_compression(&self, primitive: &Primitive, name: &str) -> Result<(), ModelError> {
         const DRACO: &str = "KHR_draco_mesh_compression";
         let stored = |accessor: &usize| {
             self.document.accessors.get(*accessor).is_none_or(|a| a.buffer_view.is_some() || a.sparse.is_some())
@@ -239,11 +242,11 @@ impl Reader<'_> {
             return Ok(());
         }
         let what = format!("`{name}` is compressed with {DRACO}, which cannot be read");
-        Err(Wrong { what, help: "export it without compression and extensions" })
+        Err(ModelError { what, help: "export it without compression and extensions" })
     }
 
     /// Warns of vertex colours other than white.
-    fn warn_of_colors(&mut self, primitive: &Primitive, name: &str) -> Result<(), Wrong> {
+    fn warn_of_colors(&mut self, primitive: &Primitive, name: &str) -> Result<(), ModelError> {
         let Some(accessor) = primitive.attributes.get("COLOR_0") else { return Ok(()) };
         let wide = self.document.accessors.get(*accessor).is_some_and(|a| a.kind == "VEC4");
         let white = if wide {

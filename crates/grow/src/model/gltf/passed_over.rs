@@ -4,7 +4,7 @@ use super::super::document::{
     DIFFUSE_TRANSMISSION, Document, LIGHTS, Material, SPECULAR_GLOSSINESS, TEXTURE_TRANSFORM, TRANSMISSION,
 };
 use super::super::notes::Notes;
-use super::super::settle::Wrong;
+use super::super::settle::ModelError;
 use serde_json::Value;
 
 /// Extensions that are read.
@@ -30,10 +30,10 @@ const WITH_FALLBACK: [&str; 5] = [
 ];
 
 /// Returns an error if the file requires an extension that is not read.
-pub(super) fn check_required(document: &Document) -> Result<(), Wrong> {
+pub(super) fn check_required(document: &Document) -> Result<(), ModelError> {
     let known = |name: &&String| READ.contains(&name.as_str()) || HARMLESS.contains(&name.as_str());
     match document.extensions_required.iter().find(|name| !known(name)) {
-        Some(name) => Err(Wrong {
+        Some(name) => Err(ModelError {
             what: format!("it requires the extension {name}, which cannot be read"),
             help: "export it without compression and extensions",
         }),

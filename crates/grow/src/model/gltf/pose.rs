@@ -1,7 +1,7 @@
 //! Meshes at rest: transforms of nodes, morph targets and skins.
 
 use super::super::document::{Document, Node, Primitive};
-use super::super::settle::Wrong;
+use super::super::settle::ModelError;
 use super::accessors::Accessors;
 use super::item;
 use furrow_base::geometry::Mesh;
@@ -31,7 +31,7 @@ pub(super) fn morph<const N: usize>(
     weights: &[f64],
     attribute: &str,
     values: &mut [[f32; N]],
-) -> Result<bool, Wrong> {
+) -> Result<bool, ModelError> {
     let mut changed = false;
     for (target, weight) in primitive.targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
         let Some(by) = target.get(attribute) else { continue };
@@ -60,7 +60,7 @@ impl Pose {
         world: &[DMat4],
         skin: usize,
         to: &DMat4,
-    ) -> Result<Option<Self>, Wrong> {
+    ) -> Result<Option<Self>, ModelError> {
         let skin = item(&document.skins, skin, "skin")?;
         let mut binds = match skin.inverse_bind_matrices {
             Some(matrices) => accessors.floats::<16>(matrices)?,
@@ -80,7 +80,7 @@ impl Pose {
 
     /// Bends a mesh, whose vertices `joints` and `weights` bind, into the model's frame. `to` transforms vertices without
     /// weights.
-    pub(super) fn bend(&self, mesh: &mut Mesh, bound: &[Vec<(u32, f32)>], to: &DMat4) -> Result<(), Wrong> {
+    pub(super) fn bend(&self, mesh: &mut Mesh, bound: &[Vec<(u32, f32)>], to: &DMat4) -> Result<(), ModelError> {
         for (k, bound) in bound.iter().enumerate() {
             let sum: f64 = bound.iter().map(|(_, weight)| f64::from(*weight)).sum();
             let mut matrix = if sum > 0.0 { DMat4::ZERO } else { *to };
@@ -102,7 +102,7 @@ pub(super) fn bound(
     accessors: &Accessors<'_>,
     primitive: &Primitive,
     vertices: usize,
-) -> Result<Vec<Vec<(u32, f32)>>, Wrong> {
+) -> Result<Vec<Vec<(u32, f32)>>, ModelError> {
     let mut bound: Vec<Vec<(u32, f32)>> = Vec::new();
     for set in 0.. {
         let named = |what: &str| primitive.attributes.get(&format!("{what}_{set}")).copied();

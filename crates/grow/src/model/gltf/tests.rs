@@ -79,7 +79,7 @@ fn alpha_counts_under_mask_and_blend_alone() {
 /// Expected: a surface below the threshold everywhere is left out with a warning, and an error if nothing is left; one
 /// whose coordinates show its transparent half alone is invisible with a warning.
 #[test]
-fn invisible_surfaces_are_told() {
+fn invisible_surfaces_are_reported() {
     let faint = |d: &mut Value| {
         d["materials"][0] = json!({ "name": "glass", "alphaMode": "BLEND", "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorFactor": [1, 1, 1, 0.4] } });
     };

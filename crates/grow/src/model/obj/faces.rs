@@ -2,7 +2,7 @@
 
 use super::super::notes::Notes;
 use super::super::parts::MOST_TRIANGLES;
-use super::super::settle::{Wrong, faceted, too_many_triangles};
+use super::super::settle::{ModelError, faceted, too_many_triangles};
 use super::lines::{Statement, statements};
 use super::polygon::{Cut, normal, triangles};
 use furrow_base::geometry::Mesh;
@@ -72,7 +72,7 @@ struct Polygon {
 
 impl Faces {
     /// Reads the text of a file.
-    pub(super) fn read(text: &str, notes: &mut Notes) -> Result<Self, Wrong> {
+    pub(super) fn read(text: &str, notes: &mut Notes) -> Result<Self, ModelError> {
         let mut all = Self::default();
         let mut state = State { name: "unnamed_object".into(), material: None, group: 0, pieces: BTreeMap::new() };
         let mut polygons = Vec::new();
@@ -114,7 +114,12 @@ impl Faces {
     }
 
     /// Reads the corners of a face; `None` if it has fewer than three.
-    fn face(&mut self, of: &Statement<'_>, state: &mut State, notes: &mut Notes) -> Result<Option<Polygon>, Wrong> {
+    fn face(
+        &mut self,
+        of: &Statement<'_>,
+        state: &mut State,
+        notes: &mut Notes,
+    ) -> Result<Option<Polygon>, ModelError> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         let corners: Vec<Corner> =
             of.rest.split_whitespace().map(|word| corner(of, word, counts)).collect::<Result<_, _>>()?;
@@ -137,7 +142,7 @@ impl Faces {
     }
 
     /// Cuts a polygon into triangles of its piece.
-    fn cut(&mut self, polygon: Polygon, notes: &mut Notes) -> Result<(), Wrong> {
+    fn cut(&mut self, polygon: Polygon, notes: &mut Notes) -> Result<(), ModelError> {
         let Polygon { piece, line, corners } = polygon;
         let there = |corner: &&Corner| {
             let within = |index: Option<u32>, n: usize| index.is_none_or(|index| (index as usize) < n);

@@ -5,7 +5,7 @@
 
 use super::super::files::Files;
 use super::super::notes::Notes;
-use super::super::settle::{Wrong, fraction};
+use super::super::settle::{ModelError, fraction};
 use super::lines::{Statement, statements, text};
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::Vec2;
@@ -48,13 +48,13 @@ struct Material {
 }
 
 /// Surface of a material, and how to read the faces that use it.
-pub(super) struct Look {
+pub(super) struct Appearance {
     pub(super) surface: Surface,
     map: Option<Map>,
     opacity: f32,
 }
 
-impl Look {
+impl Appearance {
     /// Returns whether its opacity is below one half everywhere.
     pub(super) fn is_absent(&self) -> bool {
         self.opacity < 0.5
@@ -97,19 +97,19 @@ impl<'a> Materials<'a> {
     }
 
     /// Reads the libraries that a statement `mtllib` names: one whose name may have spaces, or several.
-    pub(super) fn load(&mut self, names: &str, notes: &mut Notes) -> Result<(), Wrong> {
+    pub(super) fn load(&mut self, names: &str, notes: &mut Notes) -> Result<(), ModelError> {
         let whole = self.files.named(&slashed(names));
         let several: Vec<&str> = names.split_whitespace().collect();
         let read: Vec<(&str, Vec<u8>)> = match whole {
             Ok(bytes) => vec![(names, bytes)],
             Err(_) if several.len() > 1 => {
                 let each = several.into_iter().map(|name| Ok((name, self.files.named(&slashed(name))?)));
-                each.collect::<Result<_, Wrong>>()?
+                each.collect::<Result<_, ModelError>>()?
             }
             Err(wrong) => return Err(wrong),
         };
         for (name, bytes) in read {
-            let wrong = |what: String| Wrong::from(format!("its materials {}: {what}", slashed(name)));
+            let wrong = |what: String| ModelError::from(format!("its materials {}: {what}", slashed(name)));
             let found = materials(&text(&bytes).map_err(wrong)?, notes).map_err(wrong)?;
             // The first material of a name counts, as in other programs.
             for material in found {
@@ -122,12 +122,12 @@ impl<'a> Materials<'a> {
     }
 
     /// Returns the surfaces of all materials.
-    pub(super) fn looks(&mut self, notes: &mut Notes) -> Result<Vec<Look>, Wrong> {
+    pub(super) fn appearances(&mut self, notes: &mut Notes) -> Result<Vec<Appearance>, ModelError> {
         let materials = std::mem::take(&mut self.materials);
-        materials.iter().map(|material| self.look(material, notes)).collect()
+        materials.iter().map(|material| self.appearance(material, notes)).collect()
     }
 
-    fn look(&mut self, material: &Material, notes: &mut Notes) -> Result<Look, Wrong> {
+    fn appearance(&mut self, material: &Material, notes: &mut Notes) -> Result<Appearance, ModelError> {
         let picture = material.picture.as_ref().map(|map| self.picture(map)).transpose()?;
         let cut = material.cut.as_ref().map(|map| self.picture(map)).transpose()?;
         if let (Some(picture), Some(cut)) = (&material.picture, &material.cut)
@@ -149,7 +149,7 @@ impl<'a> Materials<'a> {
         // physically based extensions is that of glTF, α = roughness².
         let shiny = material.shininess.filter(|n| *n >= 0.0).map(|n| (2.0 / (n + 2.0)).sqrt());
         let rough = material.roughness.map(|roughness| fraction(roughness).powi(2));
-        Ok(Look {
+        Ok(Appearance {
             surface: Surface {
                 name: material.name.clone(),
                 color,
@@ -163,7 +163,7 @@ impl<'a> Materials<'a> {
         })
     }
 
-    fn picture(&mut self, map: &Map) -> Result<Arc<Texture>, Wrong> {
+    fn picture(&mut self, map: &Map) -> Result<Arc<Texture>, ModelError> {
         let key = (map.file.clone(), map.clamp);
         if let Some(known) = self.known.get(&key) {
             return Ok(known.clone());

@@ -11,19 +11,19 @@ mod polygon;
 mod tests;
 
 use super::files::Files;
-use super::gather::{Gathered, moved, offset};
+use super::gather::{UnplacedParts, moved, offset};
 use super::notes::Notes;
 use super::parts::{Model, Up};
-use super::settle::{Wrong, into_one_tile};
+use super::settle::{ModelError, into_one_tile};
 use faces::Faces;
 use furrow_base::math::DVec3;
 use furrow_optics::texture::Surface;
 use lines::text;
-use materials::{Look, Materials};
+use materials::{Appearance, Materials};
 use std::collections::BTreeMap;
 
 /// Reads a model, or returns an error.
-pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
+pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, ModelError> {
     let mut notes = Notes::default();
     let file = files.own()?;
     let faces = Faces::read(&text(&file)?, &mut notes)?;
@@ -33,11 +33,12 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
         materials.load(library, &mut notes)?;
     }
     let mut model = Model::default();
-    let looks = materials.looks(&mut notes)?;
-    model.surfaces.extend(looks.iter().map(|look| look.surface.clone()));
+    let appearances = materials.appearances(&mut notes)?;
+    model.surfaces.extend(appearances.iter().map(|appearance| appearance.surface.clone()));
     // For faces without a material.
     model.surfaces.push(Surface::default());
-    let numbers: BTreeMap<&str, usize> = looks.iter().enumerate().map(|(k, l)| (l.surface.name.as_str(), k)).collect();
+    let numbers: BTreeMap<&str, usize> =
+        appearances.iter().enumerate().map(|(k, l)| (l.surface.name.as_str(), k)).collect();
 
     // Positions are reduced to single precision around the model's own foot.
     let rotation = up.rotation();
@@ -46,30 +47,30 @@ pub(super) fn read(mut files: Files<'_>, up: Up) -> Result<Model, Wrong> {
     if let Some(at) = foot {
         notes.add(moved(at));
     }
-    let mut gathered = Gathered::default();
+    let mut gathered = UnplacedParts::default();
     let mut bare: BTreeMap<usize, usize> = BTreeMap::new();
     for piece in &faces.pieces {
         let number = piece.material.as_ref().and_then(|name| numbers.get(name.as_str()).copied());
         if let (Some(name), None) = (&piece.material, number) {
             notes.about("materials that its MTL files lack, replaced by white", name);
         }
-        let look: Option<&Look> = number.map(|number| &looks[number]);
-        if let Some(look) = look.filter(|look| look.is_absent()) {
-            notes.about("left out: materials whose opacity `d` is below ½", &look.surface.name);
+        let appearance: Option<&Appearance> = number.map(|number| &appearances[number]);
+        if let Some(appearance) = appearance.filter(|appearance| appearance.is_absent()) {
+            notes.about("left out: materials whose opacity `d` is below ½", &appearance.surface.name);
             continue;
         }
         let mut mesh = faces.mesh(piece, origin);
-        let mut surface = number.unwrap_or(looks.len());
-        if let Some(look) = look.filter(|look| look.has_pictures()) {
+        let mut surface = number.unwrap_or(appearances.len());
+        if let Some(appearance) = appearance.filter(|appearance| appearance.has_pictures()) {
             if piece.textured {
-                mesh.uvs.iter_mut().for_each(|uv| *uv = look.transformed(*uv));
-                if look.surface.mask.is_some() {
-                    into_one_tile(&mut mesh.uvs, look.wrap(), &piece.name, &mut notes)?;
+                mesh.uvs.iter_mut().for_each(|uv| *uv = appearance.transformed(*uv));
+                if appearance.surface.mask.is_some() {
+                    into_one_tile(&mut mesh.uvs, appearance.wrap(), &piece.name, &mut notes)?;
                 }
             } else {
                 notes.about("no texture coordinates, so the pictures of its material are passed over", &piece.name);
                 surface = *bare.entry(surface).or_insert_with(|| {
-                    model.surfaces.push(look.surface.without_pictures());
+                    model.surfaces.push(appearance.surface.without_pictures());
                     model.surfaces.len() - 1
                 });
             }

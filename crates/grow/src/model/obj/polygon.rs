@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn convex_polygons_are_fans_and_crossed_ones_are_told() {
+    fn convex_polygons_are_fans_and_crossed_ones_are_reported() {
         let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
         assert_eq!(triangles(&tilted(&square)), Cut::Whole(vec![[0, 1, 2], [0, 2, 3]]));
         let line = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)];

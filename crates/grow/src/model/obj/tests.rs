@@ -66,7 +66,7 @@ fn text_of_other_programs_is_read() {
 }
 
 #[test]
-fn missing_materials_and_coordinates_are_told() {
+fn missing_materials_and_coordinates_are_reported() {
     let white = read(&SQUARE.replace("usemtl green", "usemtl blue"), GREEN);
     assert_eq!(white.warnings, ["materials that its MTL files lack, replaced by white: `blue`"]);
     let pictured = format!("{GREEN}map_Kd a picture.png\n");
@@ -101,8 +101,8 @@ fn options_of_pictures_are_read() {
     let at = |uv| mesh.uvs.iter().position(|t| *t == uv).map(|k| mesh.positions[k]);
     assert_eq!(at(vec2(0.25, 0.5)), Some(vec3(0.0, 0.0, 0.0)));
     assert_eq!(at(vec2(0.75, 0.0)), Some(vec3(1.0, 1.0, 0.0)));
-    let told = read(SQUARE, &with("-mm 0 0.5 -imfchan l -clamp on"));
-    assert_eq!(told.warnings.len(), 2, "{:?}", told.warnings);
+    let stated = read(SQUARE, &with("-mm 0 0.5 -imfchan l -clamp on"));
+    assert_eq!(stated.warnings.len(), 2, "{:?}", stated.warnings);
     assert!(refused(SQUARE, &with("-huge 2")).contains("line 3: the option -huge of a picture is unknown"));
     assert!(refused(SQUARE, &format!("{GREEN}map_Kd -s 1 1 1\n")).contains("a file `1`"));
     let grey = read(SQUARE, "newmtl green\nKd 0.25\nPr 0.5\n");

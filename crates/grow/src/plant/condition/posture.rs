@@ -4,7 +4,7 @@
 //! wilt are estimates from pictures of beet and sunflower at noon during a drought.
 
 use super::{Condition, ConditionDesc, leaf_stream};
-use crate::plant::growth::LeafNow;
+use crate::plant::growth::LeafState;
 use furrow_base::math::lerp;
 use furrow_base::sampling::{Purpose, Stream};
 
@@ -26,7 +26,7 @@ impl<'a> Posture<'a> {
     }
 
     /// Applies the posture to the leaves.
-    pub(in crate::plant) fn apply(&self, leaves: &mut [LeafNow<'_>]) {
+    pub(in crate::plant) fn apply(&self, leaves: &mut [LeafState<'_>]) {
         let last = leaves.iter().map(|l| l.number).max().unwrap_or(1);
         for leaf in leaves {
             let mut s = leaf_stream(self.stream, leaf.number).child(Purpose::Condition, 22);
@@ -46,7 +46,7 @@ impl<'a> Posture<'a> {
     }
 }
 
-fn droop(leaf: &mut LeafNow<'_>, wilt: f32) {
+fn droop(leaf: &mut LeafState<'_>, wilt: f32) {
     let [angle, arch, nod, hang, sink] = LIMP_DEG.map(f32::to_radians);
     leaf.angle += (angle - leaf.angle).max(0.0) * 0.7 * wilt;
     leaf.arch += arch * wilt;

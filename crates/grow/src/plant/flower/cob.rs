@@ -2,14 +2,14 @@
 
 use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
-use super::pen::{Pen, Sheet, Solid};
+use super::mesher::{FlowerMesher, Sheet, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Vec3, lerp};
 use furrow_base::sampling::Stream;
 
 /// Builds a maize ear.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Cob { width, husks, silks, silk, material, silk_material } = flower else { return };
     let Bloom { base, frame, size, .. } = *bloom;
     let width = width.f32() * size;

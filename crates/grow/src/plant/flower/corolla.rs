@@ -1,7 +1,7 @@
 //! Single flowers: rings of sepals and petals around the ovary and the stamens.
 
 use super::desc::{Bloom, FlowerDesc};
-use super::pen::{Pen, ROUND, Solid};
+use super::mesher::{FlowerMesher, ROUND, Solid};
 use super::ring;
 use crate::plant::organ::OrganKind;
 use furrow_base::sampling::Stream;
@@ -11,7 +11,7 @@ use std::f32::consts::TAU;
 pub(super) const BUD: f32 = 0.3;
 
 /// Builds a single flower or its bud.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Corolla { rings, centre, centre_material, stamens, stamen, anther_material } = flower else {
         return;
     };

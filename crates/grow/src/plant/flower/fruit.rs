@@ -2,14 +2,14 @@
 //! top. Berries are round, with a calyx.
 
 use super::desc::{Bloom, FlowerDesc};
-use super::pen::{Pen, ROUND, Sheet, Solid};
+use super::mesher::{FlowerMesher, ROUND, Sheet, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::sampling::Stream;
 use std::f32::consts::TAU;
 
 /// Builds a pod whose length is the bloom's size.
-pub(super) fn pod(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen) {
+pub(super) fn pod(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher) {
     let FlowerDesc::Pod { outline, aspect, flat, notch, style, material } = flower else { return };
     let Bloom { base, frame, size, .. } = *bloom;
     let (outline, notch) = (*outline, notch.f32());
@@ -27,7 +27,7 @@ pub(super) fn pod(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen) {
 const DISC: f32 = 0.14;
 
 /// Builds a poppy's capsule. Its length including the disc is the bloom's size.
-pub(super) fn capsule(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn capsule(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Capsule { outline, aspect, disc, rays, material, stigma_material } = flower else { return };
     let Bloom { base, frame, size, .. } = *bloom;
     let width = aspect.f32() * size;
@@ -52,7 +52,7 @@ pub(super) fn capsule(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream:
 }
 
 /// Builds a berry whose diameter is the bloom's size.
-pub(super) fn berry(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn berry(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Berry { aspect, sepals, material, sepal_material } = flower else { return };
     let Bloom { base, frame, size, .. } = *bloom;
     let length = aspect.f32() * size;

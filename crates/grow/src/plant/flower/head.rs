@@ -4,7 +4,7 @@
 //! construct the sunflower head", Mathematical Biosciences 44. The dome is a paraboloid.
 
 use super::desc::{Bloom, FlowerDesc};
-use super::pen::{Pen, Solid};
+use super::mesher::{FlowerMesher, Solid};
 use super::{corolla, ring};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
@@ -15,7 +15,7 @@ use furrow_base::sampling::Stream;
 pub(in crate::plant) const GOLDEN: f32 = 2.399_963;
 
 /// Builds a head or its bud.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Head { disc, dome, florets, rings, disc_material, young, young_material, receptacle_material } =
         flower
     else {
@@ -62,7 +62,14 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &m
 }
 
 /// Builds one floret: a short rod with a round end.
-fn floret(pen: &mut Pen, kind: OrganKind, material: &str, base: Vec3, along: Vec3, (width, length): (f32, f32)) {
+fn floret(
+    pen: &mut FlowerMesher,
+    kind: OrganKind,
+    material: &str,
+    base: Vec3,
+    along: Vec3,
+    (width, length): (f32, f32),
+) {
     let frame = Frame::about(along);
     let base = base - along * (0.4 * length);
     let outline = Outline::Power { a: 0.15, b: 0.35 };

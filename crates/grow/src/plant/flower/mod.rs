@@ -18,17 +18,17 @@ mod corolla;
 pub(super) mod desc;
 mod fruit;
 pub(super) mod head;
+pub(super) mod mesher;
 mod panicle;
-pub(super) mod pen;
 mod ring;
 mod spike;
 
 use desc::{Bloom, FlowerDesc};
 use furrow_base::sampling::Stream;
-use pen::Pen;
+use mesher::FlowerMesher;
 
 /// Builds the meshes of one flower, inflorescence or fruit.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     match flower {
         FlowerDesc::Corolla { .. } => corolla::grow(flower, bloom, pen, stream),
         FlowerDesc::Head { .. } => head::grow(flower, bloom, pen, stream),

@@ -2,7 +2,7 @@
 
 use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
-use super::pen::{Pen, Solid};
+use super::mesher::{FlowerMesher, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, Vec3, lerp};
@@ -12,7 +12,7 @@ use furrow_base::sampling::Stream;
 const PIECES: usize = 8;
 
 /// Builds a tassel.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Panicle { branches, branch, zone, angle_deg, bend_deg, spikelets, spikelet, material } = flower
     else {
         return;
@@ -47,7 +47,7 @@ impl Spikelets<'_> {
     /// Builds an axis that bends down by `bend` radians and bears spikelets beyond the fraction `bare` of its length.
     fn along(
         &self,
-        pen: &mut Pen,
+        pen: &mut FlowerMesher,
         stream: &mut Stream,
         base: Vec3,
         ahead: Vec3,

@@ -1,7 +1,7 @@
 //! Rings of sheets around a flower's axis: sepals, petals, bracts, rays.
 
 use super::desc::{Bloom, RingDesc};
-use super::pen::{Pen, Sheet};
+use super::mesher::{FlowerMesher, Sheet};
 use crate::plant::organ::OrganKind;
 use furrow_base::math::lerp;
 use furrow_base::sampling::Stream;
@@ -11,7 +11,14 @@ use std::f32::consts::{PI, TAU};
 const CLOSED: (f32, f32) = (0.75, 2.3);
 
 /// Builds rings of sheets that start at the distance `start` from the axis, metres, in the plane of the bloom's base.
-pub(super) fn grow(rings: &[RingDesc], bloom: &Bloom, start: f32, kind: OrganKind, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(
+    rings: &[RingDesc],
+    bloom: &Bloom,
+    start: f32,
+    kind: OrganKind,
+    pen: &mut FlowerMesher,
+    stream: &mut Stream,
+) {
     let whole = rings.iter().all(|ring| ring.arc_deg.get() >= 360.0);
     let spin = if whole { stream.range32(0.0, TAU) } else { stream.range32(-0.1, 0.1) };
     for (k, ring) in rings.iter().enumerate() {

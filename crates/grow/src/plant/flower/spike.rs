@@ -3,7 +3,7 @@
 
 use super::desc::{Bloom, FlowerDesc};
 use super::head::GOLDEN;
-use super::pen::{Pen, Solid};
+use super::mesher::{FlowerMesher, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, Vec3, lerp};
@@ -11,7 +11,7 @@ use furrow_base::sampling::Stream;
 use std::f32::consts::TAU;
 
 /// Builds a spike.
-pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut Pen, stream: &mut Stream) {
+pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, stream: &mut Stream) {
     let FlowerDesc::Spike { spikelets, ranks, florets, width, spikelet, angle_deg, awn, material, awn_material } =
         flower
     else {

@@ -12,7 +12,7 @@ const SIZE: f32 = 0.03;
 fn draw(text: &str, opening: f32, seed: u64) -> (FlowerDesc, Vec<Organ>) {
     let desc: FlowerDesc = ron::from_str(text).unwrap();
     assert_eq!(desc.check(), Ok(()));
-    let mut pen = Pen::new(0.9e-3);
+    let mut pen = FlowerMesher::new(0.9e-3);
     let bloom = Bloom { base: Vec3::ZERO, frame: Frame::about(Vec3::Z), size: SIZE, opening };
     grow(&desc, &bloom, &mut pen, &mut Stream::of(seed, 0, Purpose::Test, 1));
     let organs = pen.finish();

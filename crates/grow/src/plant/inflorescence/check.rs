@@ -8,14 +8,14 @@ use furrow_base::ron_file::{Step, choose};
 use std::collections::BTreeMap;
 
 /// Error: place in the plant's description, message, hint.
-type Wrong = (Vec<Step<'static>>, String, String);
+type PathError = (Vec<Step<'static>>, String, String);
 
 /// Checks the flowering axes of stage `i`.
 pub(in crate::plant) fn stage(
     (flowers, kinds): (&BTreeMap<String, FlowerDesc>, &BTreeMap<String, LeafKind>),
     stages: &[StageDesc],
     i: usize,
-) -> Result<(), Wrong> {
+) -> Result<(), PathError> {
     use Step::{Field, Item};
     let before = i.checked_sub(1).map(|b| &stages[b].inflorescences);
     let stage = &stages[i];

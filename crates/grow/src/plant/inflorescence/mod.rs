@@ -18,16 +18,16 @@ mod seat;
 use super::flower;
 use super::flower::desc::Bloom;
 use super::flower::head::GOLDEN;
-use super::flower::pen::Pen;
-use super::growth::{Between, Growth, LeafNow};
+use super::flower::mesher::FlowerMesher;
+use super::growth::{Growth, LeafState, StageInterpolation};
 use super::leaf::{self, Lower};
-use super::organ::{self, OnStem, Organ, OrganKind, StemLine};
+use super::organ::{self, Organ, OrganKind, StemLine, StemPosition};
 use super::stage::BUD;
 use desc::{FlowersDesc, InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat, StemLeafDesc};
 use furrow_base::math::{Frame, Vec3, lerp};
 use furrow_base::ron_file::{Bound, Vary};
 use furrow_base::sampling::{Purpose, Stream};
-use seat::Place;
+use seat::AxisSite;
 
 /// Index of a plant's child stream for its flowering axes.
 const STREAM: u64 = 1 << 22;
@@ -36,7 +36,7 @@ const LEAST: f32 = 3e-4;
 const MM: f32 = 1e-3;
 
 /// An axis that has been built.
-struct Grown {
+struct BuiltAxis {
     /// Number of its line among the plant's stems.
     line: u32,
     points: Vec<Vec3>,
@@ -47,10 +47,10 @@ struct Grown {
     spin: f32,
 }
 
-impl Grown {
+impl BuiltAxis {
     /// Returns the position on the plant's stems of a point at a fraction of its length.
-    fn on(&self, share: f32) -> OnStem {
-        OnStem { line: self.line, at: share.clamp(0.0, 1.0) * (self.points.len() - 1) as f32 }
+    fn on(&self, share: f32) -> StemPosition {
+        StemPosition { line: self.line, at: share.clamp(0.0, 1.0) * (self.points.len() - 1) as f32 }
     }
 
     /// Returns point, direction and radius at a fraction of its length.
@@ -64,10 +64,10 @@ impl Grown {
 }
 
 /// Builder of flowering axes.
-struct Grower<'a, 'b> {
+struct AxisBuilder<'a, 'b> {
     growth: &'b Growth<'a>,
     organs: &'b mut Vec<Organ>,
-    pen: Pen,
+    pen: FlowerMesher,
     /// Number of the next axis among the plant's stems.
     line: u32,
     axes: usize,
@@ -76,14 +76,14 @@ struct Grower<'a, 'b> {
 
 /// Builds a plant's flowering axes with all that they bear.
 pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, cell: f32) {
-    let Between { from, to, .. } = growth.between;
+    let StageInterpolation { from, to, .. } = growth.between;
     if to.inflorescences.is_empty() && from.inflorescences.is_empty() {
         return;
     }
     let tips = seat::tips(organs, growth);
     let line = organ::next_line(organs);
-    let mut grower = Grower { growth, organs, pen: Pen::new(cell), line, axes: 0, flowers: 0 };
-    let mut grown: Vec<Vec<Grown>> = Vec::new();
+    let mut grower = AxisBuilder { growth, organs, pen: FlowerMesher::new(cell), line, axes: 0, flowers: 0 };
+    let mut grown: Vec<Vec<BuiltAxis>> = Vec::new();
     for (k, desc) in to.inflorescences.iter().enumerate() {
         let ends = (from.inflorescences.get(k), desc);
         let stream = growth.stream.child(Purpose::Plant, STREAM).child(Purpose::Plant, k as u64);
@@ -102,7 +102,7 @@ fn held<T>(ends: Ends<'_, T>) -> &T {
     ends.0.unwrap_or(ends.1)
 }
 
-impl<'a> Grower<'a, '_> {
+impl<'a> AxisBuilder<'a, '_> {
     /// Builds all axes of one description. The random stream of an axis and the numbers of its leaves depend on its
     /// place only, so axes at other places may appear and disappear.
     fn sort(
@@ -110,16 +110,16 @@ impl<'a> Grower<'a, '_> {
         sort: usize,
         ends: Ends<'a, InflorescenceDesc>,
         stream: &Stream,
-        tips: &[Place],
-        grown: &[Vec<Grown>],
-    ) -> Vec<Grown> {
+        tips: &[AxisSite],
+        grown: &[Vec<BuiltAxis>],
+    ) -> Vec<BuiltAxis> {
         let between = self.growth.between;
         let count = |stream: &Stream| between.draw(ends, Some(0.0), stream, 0, |d| &d.count).round() as usize;
         let most = between.to.inflorescences[sort].count.largest().round() as usize;
         let most = most.max(between.from.inflorescences.get(sort).map_or(0, |d| d.count.largest().round() as usize));
         // Place, relative size, and index among all axes that this description may give.
-        let mut places: Vec<(Place, f32, usize)> = Vec::new();
-        let base = |nth: usize, place: Place, stream: &Stream, places: &mut Vec<(Place, f32, usize)>| {
+        let mut places: Vec<(AxisSite, f32, usize)> = Vec::new();
+        let base = |nth: usize, place: AxisSite, stream: &Stream, places: &mut Vec<(AxisSite, f32, usize)>| {
             places.extend((0..count(stream)).map(|i| (place, 1.0, nth * most + i)));
         };
         match &held(ends).at {
@@ -154,7 +154,7 @@ impl<'a> Grower<'a, '_> {
                         let out = seat::across(along, parent.spin + GOLDEN * i as f32);
                         let size = lerp(1.0, self.blend(ends, |d| d.top.f32()), share);
                         let on = Some(parent.on(lerp(from, to, share)));
-                        places.push((Place { point, along, out: Some(out), on }, size, k as usize * most + i));
+                        places.push((AxisSite { point, along, out: Some(out), on }, size, k as usize * most + i));
                     }
                 }
             }
@@ -196,8 +196,8 @@ impl<'a> Grower<'a, '_> {
         (sort, nth): (usize, usize),
         ends: Ends<'a, InflorescenceDesc>,
         own: &Stream,
-        (place, size): (Place, f32),
-    ) -> Option<Grown> {
+        (place, size): (AxisSite, f32),
+    ) -> Option<BuiltAxis> {
         let vigour = self.growth.vigour;
         let length = self.draw(ends, Some(0.0), (own, 1), |d| &d.length_mm) * MM * vigour * size;
         let width = self.draw(ends, Some(0.0), (own, 2), |d| &d.width_mm) * MM * vigour * size.sqrt();
@@ -213,7 +213,7 @@ impl<'a> Grower<'a, '_> {
         let radius = (0.5 * width).max(1.2e-4);
         let radii = (radius, radius * self.blend(ends, |d| d.taper.f32()));
         let (points, ways) = curve(place.point, along, (length, bend), radius, &mut stream);
-        let axis = Grown { line: self.line, points, ways, radii, spin };
+        let axis = BuiltAxis { line: self.line, points, ways, radii, spin };
         self.line += 1;
         let of_stem = &self.growth.desc.stem_material;
         let material =
@@ -237,7 +237,7 @@ impl<'a> Grower<'a, '_> {
         (sort, nth, row): (usize, usize, usize),
         ends: Ends<'a, StemLeafDesc>,
         stream: &Stream,
-        axis: &Grown,
+        axis: &BuiltAxis,
     ) {
         let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round() as usize;
         let (low, high) = (self.blend(ends, |d| d.from.f32()), self.blend(ends, |d| d.to.f32()));
@@ -255,7 +255,7 @@ impl<'a> Grower<'a, '_> {
             if blade < BUD {
                 continue;
             }
-            let leaf = LeafNow {
+            let leaf = LeafState {
                 number,
                 layer: 0,
                 kind_name: name,
@@ -281,7 +281,7 @@ impl<'a> Grower<'a, '_> {
     }
 
     /// Builds the flowers of an axis on their stalks.
-    fn flowers(&mut self, ends: Ends<'a, FlowersDesc>, stream: &Stream, axis: &Grown, material: &str) {
+    fn flowers(&mut self, ends: Ends<'a, FlowersDesc>, stream: &Stream, axis: &BuiltAxis, material: &str) {
         let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round() as usize;
         let (low, high) = (self.blend(ends, |d| d.from.f32()), self.blend(ends, |d| d.to.f32()));
         let top = self.blend(ends, |d| d.top.f32());

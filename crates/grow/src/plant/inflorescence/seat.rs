@@ -1,7 +1,7 @@
 //! Seats of flowering axes: tips of shoots and axils of leaves, taken from the organs built so far.
 
 use crate::plant::growth::Growth;
-use crate::plant::organ::{OnStem, Organ, OrganKind};
+use crate::plant::organ::{Organ, OrganKind, StemPosition};
 use furrow_base::math::{Vec3, direction};
 use furrow_base::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -11,7 +11,7 @@ const PARALLEL: f32 = 0.999_96;
 
 /// Place that can bear an axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct AxisSite {
     /// Position, metres.
     pub(super) point: Vec3,
     /// Direction of the stem that bears it, unit vector.
@@ -19,17 +19,17 @@ pub(super) struct Place {
     /// Direction in which the axil opens, perpendicular to the stem, unit vector; `None` for a tip.
     pub(super) out: Option<Vec3>,
     /// Position on the plant's stems; `None` on a grass, whose culms start at the soil.
-    pub(super) on: Option<OnStem>,
+    pub(super) on: Option<StemPosition>,
 }
 
 /// Returns the tips of all shoots, the main shoot's first.
-pub(super) fn tips(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
-    let stems: Vec<Place> = organs.iter().filter(|o| o.kind == OrganKind::Stem).filter_map(end_of).collect();
+pub(super) fn tips(organs: &[Organ], growth: &Growth<'_>) -> Vec<AxisSite> {
+    let stems: Vec<AxisSite> = organs.iter().filter(|o| o.kind == OrganKind::Stem).filter_map(end_of).collect();
     if stems.is_empty() { culms(organs, growth) } else { stems }
 }
 
 /// Returns the tip of a stem. Its mesh consists of rings from base to tip, which differ in the texture coordinate v.
-fn end_of(stem: &Organ) -> Option<Place> {
+fn end_of(stem: &Organ) -> Option<AxisSite> {
     let mesh = &stem.mesh;
     let middle_of = |v: f32| {
         // The last vertex of a ring coincides with its first.
@@ -39,7 +39,7 @@ fn end_of(stem: &Organ) -> Option<Place> {
     let last = mesh.uvs.last()?.y;
     let before = mesh.uvs.iter().rev().find(|uv| uv.y != last)?.y;
     let (point, below) = (middle_of(last), middle_of(before));
-    Some(Place { point, along: (point - below).normalize_or(Vec3::Z), out: None, on: stem.end() })
+    Some(AxisSite { point, along: (point - below).normalize_or(Vec3::Z), out: None, on: stem.end() })
 }
 
 /// Shoot of a grass.
@@ -51,7 +51,7 @@ struct Shoot {
 
 /// Returns the bases of a grass's shoots, whose culms are hidden in their sheaths. Sheaths that are close to each other
 /// and parallel belong to one shoot; its culm is at their centre.
-fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
+fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<AxisSite> {
     let mut shoots: Vec<Shoot> = Vec::new();
     // Sheaths are on two sides of a shoot, whose width is that of the stem.
     let near = 1.05 * growth.stem + 1e-4;
@@ -72,13 +72,13 @@ fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<Place> {
         let two = &shoot.feet[..shoot.feet.len().min(2)];
         let foot = two.iter().sum::<Vec3>() / two.len() as f32;
         let (point, along) = if k == 0 { (Vec3::ZERO, upright) } else { (foot, shoot.along) };
-        Place { point, along, out: None, on: None }
+        AxisSite { point, along, out: None, on: None }
     };
     shoots.iter().enumerate().map(culm).collect()
 }
 
 /// Returns the axil of leaf `number`, or `None` if the leaf does not exist.
-pub(super) fn axil(organs: &[Organ], number: u32) -> Option<Place> {
+pub(super) fn axil(organs: &[Organ], number: u32) -> Option<AxisSite> {
     let of = |organ: &&Organ| u32::from(organ.leaf) == number;
     let axis = organs.iter().filter(of).find_map(|o| o.axis.as_ref())?;
     let sheathed = organs.iter().filter(of).any(|o| o.kind == OrganKind::Sheath);
@@ -86,7 +86,7 @@ pub(super) fn axil(organs: &[Organ], number: u32) -> Option<Place> {
     let ahead = (axis.tip - axis.base).with_z(0.0).normalize_or(Vec3::X);
     let along = if sheathed { (axis.base - foot).normalize_or(Vec3::Z) } else { Vec3::Z };
     let point = if sheathed { axis.base - along * 0.004 } else { foot };
-    Some(Place { point, along, out: Some(ahead), on: axis.on })
+    Some(AxisSite { point, along, out: Some(ahead), on: axis.on })
 }
 
 /// Returns a unit vector perpendicular to `along`, at this azimuth about it.

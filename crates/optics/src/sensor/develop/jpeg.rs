@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn quality_tells_how_much_is_lost_and_a_second_pass_loses_little() {
+    fn quality_sets_the_loss_and_a_second_pass_loses_little() {
         let picture = picture();
         let lost = [95, 75, 30].map(|quality| differ(&pass(quality, false, &picture), &picture).0);
         assert!(lost.is_sorted() && lost[2] > 1.4 * lost[0], "{lost:?}");

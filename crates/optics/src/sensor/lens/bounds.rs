@@ -294,7 +294,7 @@ mod tests {
     /// Expected: inside the image, the same rays as for labels, bit for bit; outside, rays through points that project
     /// to those coordinates.
     #[test]
-    fn rays_go_on_beyond_the_image_as_far_as_the_lens_is_known() {
+    fn rays_beyond_the_image_end_where_the_lens_is_unknown() {
         for lens in LENSES {
             let camera = camera(lens);
             let mut known = 0;

@@ -104,7 +104,7 @@ impl Lidar {
     }
 
     /// Returns `true` if a range is within the reported limits.
-    pub fn tells(&self, range: f32) -> bool {
+    pub fn in_range(&self, range: f32) -> bool {
         (self.range[0]..=self.range[1]).contains(&range)
     }
 

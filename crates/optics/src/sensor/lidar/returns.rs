@@ -21,10 +21,10 @@ pub enum Returns {
 
 impl Returns {
     /// Returns the indices of the reported echoes, each once, given the intensities of all echoes by increasing range.
-    pub fn told(self, intensities: &[f32]) -> Vec<usize> {
+    pub fn reported(self, intensities: &[f32]) -> Vec<usize> {
         let Some(last) = intensities.len().checked_sub(1) else { return Vec::new() };
         let brightest = || (0..=last).reduce(|a, b| if intensities[b] > intensities[a] { b } else { a }).unwrap_or(0);
-        let mut told = match self {
+        let mut reported = match self {
             Self::First => vec![0],
             Self::Last => vec![last],
             Self::Strongest => vec![brightest()],
@@ -32,8 +32,8 @@ impl Returns {
             Self::StrongestAndLast => vec![brightest(), last],
             Self::All => (0..=last).collect(),
         };
-        told.dedup();
-        told
+        reported.dedup();
+        reported
     }
 }
 
@@ -42,9 +42,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn echoes_are_told_by_range_and_brightness() {
+    fn echoes_are_selected_by_range_and_brightness() {
         let echoes = [0.2, 0.5, 0.1];
-        for (returns, told) in [
+        for (returns, reported) in [
             (Returns::First, vec![0]),
             (Returns::Last, vec![2]),
             (Returns::Strongest, vec![1]),
@@ -52,9 +52,9 @@ mod tests {
             (Returns::StrongestAndLast, vec![1, 2]),
             (Returns::All, vec![0, 1, 2]),
         ] {
-            assert_eq!(returns.told(&echoes), told);
-            assert_eq!(returns.told(&[0.3]), [0]);
-            assert!(returns.told(&[]).is_empty());
+            assert_eq!(returns.reported(&echoes), reported);
+            assert_eq!(returns.reported(&[0.3]), [0]);
+            assert!(returns.reported(&[]).is_empty());
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::canvas::Canvas;
 use super::cells::{Cells, MOST_CELLS};
-use super::drawn::{Drawn, Grey};
+use super::generated::{GeneratedTexture, HeightImage};
 use super::leaf_recipe::{LeafRecipe, LeafRelief};
 use super::lyrate::{self, Lyrate};
 use super::shape::{Margin, Shape};
@@ -25,7 +25,7 @@ use furrow_base::sampling::rng::{Purpose, Stream};
 const MOST_CUTS: f64 = 200.0;
 
 /// Generates the leaf texture.
-pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
+pub(super) fn draw(recipe: &LeafRecipe) -> Result<GeneratedTexture> {
     if let Outline::Power { a, b } = recipe.outline
         && !(a > 0.0 && b > 0.0 && a < 20.0 && b < 20.0)
     {
@@ -68,11 +68,11 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<Drawn> {
             return Err(Error::input(format!("{asked} {what}: at most {most} are supported")));
         }
     }
-    Ok(Painter::new(recipe, width, height).paint())
+    Ok(LeafPainter::new(recipe, width, height).paint())
 }
 
 /// Geometry of the leaf, computed before its pigments.
-struct Painter<'a> {
+struct LeafPainter<'a> {
     recipe: &'a LeafRecipe,
     width: usize,
     height: usize,
@@ -86,7 +86,7 @@ struct Painter<'a> {
     to_margin: Canvas,
 }
 
-impl<'a> Painter<'a> {
+impl<'a> LeafPainter<'a> {
     fn new(recipe: &'a LeafRecipe, width: usize, height: usize) -> Self {
         let seed = recipe.seed.get() as u64;
         let stream = Stream::of(seed, 0, Purpose::Texture, 0);
@@ -134,7 +134,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    fn paint(&self) -> Drawn {
+    fn paint(&self) -> GeneratedTexture {
         let r = self.recipe;
         let (width, height) = (self.width, self.height);
         let optics = LeafOptics::new(&r.pigments);
@@ -181,7 +181,7 @@ impl<'a> Painter<'a> {
             }
         }
         let relief = r.relief.map(|relief| self.relief(&relief));
-        Drawn { width: width as u32, height: height as u32, rgba, opaque: false, relief }
+        GeneratedTexture { width: width as u32, height: height as u32, rgba, opaque: false, relief }
     }
 
     /// Returns the opacity of each pixel, 0..255: the fraction of sixteen sample points inside the leaf. For an entire
@@ -211,7 +211,7 @@ impl<'a> Painter<'a> {
     }
 
     /// Computes the heights at half the image's size, because relief is smoother than colour.
-    fn relief(&self, relief: &LeafRelief) -> Grey {
+    fn relief(&self, relief: &LeafRelief) -> HeightImage {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mm = self.recipe.length_mm.f32() / self.scale;
         let mut ink = self.veins[0].clone();
@@ -256,6 +256,6 @@ impl<'a> Painter<'a> {
                 heights.push(h + furrow);
             }
         }
-        Grey::from_mm(width as u32, height as u32, &heights, relief.range_mm.f32())
+        HeightImage::from_mm(width as u32, height as u32, &heights, relief.range_mm.f32())
     }
 }

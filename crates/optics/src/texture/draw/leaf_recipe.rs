@@ -46,7 +46,7 @@ pub struct LeafRecipe {
     pub pigments: Pigments,
     /// Variation over the blade.
     #[serde(default)]
-    pub look: Look,
+    pub look: TissueVariation,
     /// Relief; without it no height map is written.
     #[serde(default)]
     pub relief: Option<LeafRelief>,
@@ -55,7 +55,8 @@ pub struct LeafRecipe {
 /// Variation of the tissue over a blade. Fractions are relative to the blade's chlorophyll unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Look {
+#[serde(rename = "Look")]
+pub struct TissueVariation {
     /// Chlorophyll left in the midrib, in secondary veins and in finer veins.
     pub veins: (Num<Fraction>, Num<Fraction>, Num<Fraction>),
     /// Areoles, the cells between the finest veins: their size in mm and the paleness of their borders.
@@ -81,7 +82,7 @@ pub struct Look {
     pub mark: Num<Fraction>,
 }
 
-impl Default for Look {
+impl Default for TissueVariation {
     fn default() -> Self {
         let f = Num::new;
         Self {

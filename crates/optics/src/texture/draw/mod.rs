@@ -5,7 +5,7 @@
 mod canvas;
 mod cells;
 mod crust;
-mod drawn;
+mod generated;
 mod leaf;
 mod leaf_recipe;
 mod lobed;
@@ -20,8 +20,8 @@ mod tissue;
 mod veins;
 mod write;
 
-pub use drawn::{Drawn, Grey};
-pub use leaf_recipe::{LeafRecipe, LeafRelief, Look};
+pub use generated::{GeneratedTexture, HeightImage};
+pub use leaf_recipe::{LeafRecipe, LeafRelief, TissueVariation};
 pub use lobed::{Lean, Lobed};
 pub use lyrate::Lyrate;
 pub use shape::{Margin, Sinus};
@@ -49,7 +49,7 @@ pub fn read(path: &Path) -> Result<Recipe> {
 }
 
 /// Generates the texture of a recipe.
-pub fn draw(recipe: &Recipe) -> Result<Drawn> {
+pub fn draw(recipe: &Recipe) -> Result<GeneratedTexture> {
     match recipe {
         Recipe::Leaf(leaf) => leaf::draw(leaf),
         Recipe::Soil(soil) => soil::draw(soil),

@@ -7,7 +7,7 @@
 
 use super::cells::MOST_CELLS;
 use super::crust::FRAGMENTS;
-use super::drawn::Drawn;
+use super::generated::GeneratedTexture;
 use super::soil_recipe::{Ground, SoilRecipe};
 use super::tile::Tile;
 use furrow_base::error::{Error, Result};
@@ -15,7 +15,7 @@ use furrow_base::math::Vec3;
 use furrow_base::ron_file::{Num, Positive};
 
 /// Generates the ground texture.
-pub(super) fn draw(recipe: &SoilRecipe) -> Result<Drawn> {
+pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
     let size = recipe.size.get() as usize;
     if size > 4096 {
         return Err(Error::input(format!("ground of {size} × {size} pixels: at most 4096 are supported")));

@@ -1,6 +1,6 @@
 //! Steps of the ground generation; each changes heights and colours over the whole tile. See [`super::soil`].
 
-use super::drawn::{Drawn, Grey};
+use super::generated::{GeneratedTexture, HeightImage};
 use super::soil_recipe::{Litter, SoilRecipe};
 use super::stamp::Stamp;
 use crate::texture::noise::Tiling;
@@ -277,7 +277,7 @@ impl Tile {
         self.colour.iter_mut().for_each(|c| *c *= factor);
     }
 
-    pub(super) fn finish(self, range_mm: f32) -> Drawn {
+    pub(super) fn finish(self, range_mm: f32) -> GeneratedTexture {
         let n = self.size as u32;
         let rgba = self
             .colour
@@ -287,7 +287,7 @@ impl Tile {
                 [code(c.x), code(c.y), code(c.z), 255]
             })
             .collect();
-        let relief = Some(Grey::from_mm(n, n, &self.height, range_mm));
-        Drawn { width: n, height: n, rgba, opaque: true, relief }
+        let relief = Some(HeightImage::from_mm(n, n, &self.height, range_mm));
+        GeneratedTexture { width: n, height: n, rgba, opaque: true, relief }
     }
 }

@@ -1,7 +1,7 @@
 //! Tissue composition over a blade: chlorophyll in and between veins; red, brown and mealy tissue.
 
 use super::cells::{Cells, unit};
-use super::leaf_recipe::{LeafRecipe, Look};
+use super::leaf_recipe::{LeafRecipe, TissueVariation};
 use super::shape::Shape;
 use crate::texture::noise::Tiling;
 use furrow_base::math::{Vec2, lerp, smoothstep, vec2};
@@ -19,7 +19,7 @@ pub(super) struct Tissue {
 }
 
 pub(super) struct Surface<'a> {
-    look: &'a Look,
+    look: &'a TissueVariation,
     length_mm: f32,
     aspect: f32,
     noise: Tiling,

@@ -1,6 +1,6 @@
 //! Writes generated textures to PNG files with their provenance.
 
-use super::{Drawn, Grey, Recipe, draw, read};
+use super::{GeneratedTexture, HeightImage, Recipe, draw, read};
 use furrow_base::atomic_file::write_together;
 use furrow_base::error::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -57,7 +57,7 @@ pub(super) fn source(recipe: &Recipe, name: &str) -> String {
 }
 
 /// Encodes a generated texture's colour as PNG: sRGB, with alpha unless it is opaque. `source` is stored in the file.
-pub fn encode(drawn: &Drawn, source: &str) -> Vec<u8> {
+pub fn encode(drawn: &GeneratedTexture, source: &str) -> Vec<u8> {
     let (color, bytes) = if drawn.opaque {
         let rgb = drawn.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
         (png::ColorType::Rgb, rgb)
@@ -71,7 +71,7 @@ pub fn encode(drawn: &Drawn, source: &str) -> Vec<u8> {
 }
 
 /// Encodes a height map as PNG: 16-bit grey, linear, with its range in the text chunk `HeightRange`.
-pub fn encode_height(relief: &Grey, source: &str) -> Vec<u8> {
+pub fn encode_height(relief: &HeightImage, source: &str) -> Vec<u8> {
     let bytes: Vec<u8> = relief.values.iter().flat_map(|v| v.to_be_bytes()).collect();
     png_file(relief.width, relief.height, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes, |info| {
         text(info, "Source", source);

@@ -1,6 +1,6 @@
 //! Devices of Open Image Denoise and their errors.
 
-use super::super::picture::{Kind, Picture, Rgb};
+use super::super::noisy_image::{Kind, NoisyImage, Rgb};
 use super::sys::{self, Functions};
 use furrow_base::{Error, Result};
 use std::ffi::{CStr, c_char, c_int};
@@ -64,7 +64,7 @@ impl Device {
     ///
     /// # Panics
     /// Panics if the picture's images do not have its size.
-    pub(in crate::denoise) fn denoise(&mut self, picture: &Picture<'_>) -> Result<Vec<Rgb>> {
+    pub(in crate::denoise) fn denoise(&mut self, picture: &NoisyImage<'_>) -> Result<Vec<Rgb>> {
         let mut clean: Vec<Rgb> = vec![[0.0; 3]; picture.pixels()];
         let filter = Filter::new(self)?;
         for (name, pixels) in images(picture) {
@@ -88,7 +88,7 @@ impl Device {
 }
 
 /// Returns the input images of a filter with their names in the library.
-fn images<'a>(picture: &Picture<'a>) -> Vec<(&'static CStr, &'a [Rgb])> {
+fn images<'a>(picture: &NoisyImage<'a>) -> Vec<(&'static CStr, &'a [Rgb])> {
     match picture.kind {
         Kind::Albedo => vec![(c"albedo", picture.noisy)],
         Kind::Normal => vec![(c"normal", picture.noisy)],

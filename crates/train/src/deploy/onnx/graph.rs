@@ -129,7 +129,7 @@ impl Recorder {
 impl Operations for Recorder {
     type Value = String;
     /// Indices of the maxima, and the name of the pooling's input.
-    type Places = (String, String);
+    type PoolIndices = (String, String);
 
     fn conv(&mut self, x: &String, name: &str, conv: Conv) -> String {
         let (weight, bias) = (format!("{name}.weight"), format!("{name}.bias"));
@@ -176,7 +176,7 @@ impl Operations for Recorder {
         self.op("Concat", &[a, b], vec![whole("axis", 1)])
     }
 
-    fn pool(&mut self, x: &String) -> (String, Self::Places) {
+    fn pool(&mut self, x: &String) -> (String, Self::PoolIndices) {
         let smaller = self.op("MaxPool", &[x], vec![several("kernel_shape", &[2, 2]), several("strides", &[2, 2])]);
         let places = format!("{smaller}.places");
         if let Some(node) = self.graph.node.last_mut() {
@@ -186,7 +186,7 @@ impl Operations for Recorder {
     }
 
     /// The output size is read at run time from the shape of the pooling's input.
-    fn unpool(&mut self, x: &String, (places, before): Self::Places) -> String {
+    fn unpool(&mut self, x: &String, (places, before): Self::PoolIndices) -> String {
         let size = self.op("Shape", &[&before], vec![]);
         let attributes = vec![several("kernel_shape", &[2, 2]), several("strides", &[2, 2])];
         self.op("MaxUnpool", &[x, &places, &size], attributes)

@@ -17,7 +17,7 @@ mod graph;
 pub mod proto;
 
 use crate::data::Band;
-use crate::deploy::Facts;
+use crate::deploy::ExportMetadata;
 use crate::net::fitting;
 use crate::run::TrainedModel;
 use furrow_base::{Error, Result};
@@ -63,7 +63,7 @@ pub fn model(trained: &TrainedModel) -> Result<Model> {
         ),
         value("classes", "number of each pixel's class", DataType::Uint8, [any("images"), any("height"), any("width")]),
     ];
-    let facts = serde_json::to_value(Facts::of(card, (card.input.width, card.input.height)));
+    let facts = serde_json::to_value(ExportMetadata::of(card, (card.input.width, card.input.height)));
     let facts = facts.map_err(|e| Error::failed(format!("cannot write JSON: {e}")))?;
     let words = facts.as_object().into_iter().flatten().map(|(key, value)| Entry {
         key: key.clone(),

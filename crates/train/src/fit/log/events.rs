@@ -13,13 +13,13 @@ pub(super) struct Event {
     pub(super) wall_time: f64,
     #[prost(int64, tag = "2")]
     pub(super) step: i64,
-    #[prost(oneof = "What", tags = "3, 5, 7")]
-    pub(super) what: Option<What>,
+    #[prost(oneof = "EventContent", tags = "3, 5, 7")]
+    pub(super) what: Option<EventContent>,
 }
 
 /// Content of an event.
 #[derive(Clone, PartialEq, Oneof)]
-pub(super) enum What {
+pub(super) enum EventContent {
     #[prost(string, tag = "3")]
     FileVersion(String),
     #[prost(message, tag = "5")]
@@ -50,13 +50,13 @@ pub(super) struct Summary {
 pub(super) struct Value {
     #[prost(string, tag = "1")]
     pub(super) tag: String,
-    #[prost(oneof = "Of", tags = "2, 4")]
-    pub(super) of: Option<Of>,
+    #[prost(oneof = "SummaryValue", tags = "2, 4")]
+    pub(super) of: Option<SummaryValue>,
 }
 
 /// Value of a summary: a number or an image.
 #[derive(Clone, PartialEq, Oneof)]
-pub(super) enum Of {
+pub(super) enum SummaryValue {
     #[prost(float, tag = "2")]
     Number(f32),
     #[prost(message, tag = "4")]

@@ -7,8 +7,8 @@
 mod events;
 
 use super::checkpoint::{History, LossPoint, ValidationPass};
-use crate::figure::Sheet;
-use events::{Event, Image, Of, STARTED, SessionLog, Summary, Value, What};
+use crate::figure::Figure;
+use events::{Event, EventContent, Image, STARTED, SessionLog, Summary, SummaryValue, Value};
 use furrow_base::input;
 use furrow_base::{Error, Result};
 use furrow_output::write_atomically;
@@ -40,14 +40,14 @@ impl TrainingLog {
         if let Some((events, last)) = go_on(&path, history.last()).map_err(Error::io(&path))? {
             let mut log = Self { folder: folder.into(), classes: classes.to_vec(), events };
             if last > step {
-                log.event(step + 1, What::SessionLog(SessionLog { status: STARTED }))?;
+                log.event(step + 1, EventContent::SessionLog(SessionLog { status: STARTED }))?;
             }
             log.csv(history)?;
             return Ok(log);
         }
         let events = File::create(&path).map_err(Error::io(&path))?;
         let mut log = Self { folder: folder.into(), classes: classes.to_vec(), events };
-        log.event(0, What::FileVersion("brain.Event:2".into()))?;
+        log.event(0, EventContent::FileVersion("brain.Event:2".into()))?;
         for point in &history.losses {
             log.loss(point)?;
         }
@@ -61,11 +61,11 @@ impl TrainingLog {
     /// Writes a point of the loss curve to the event file.
     pub fn loss(&mut self, point: &LossPoint) -> Result<()> {
         let values = vec![number("loss/training", point.loss), number("learning rate", point.rate)];
-        self.event(point.step, What::Summary(Summary { value: values }))
+        self.event(point.step, EventContent::Summary(Summary { value: values }))
     }
 
     /// Writes a validation pass to the event file, with an image of some of its predictions.
-    pub fn pass(&mut self, pass: &ValidationPass, picture: Option<&Sheet>) -> Result<()> {
+    pub fn pass(&mut self, pass: &ValidationPass, picture: Option<&Figure>) -> Result<()> {
         let mut values = vec![number("validation/mean IoU", pass.miou), number("validation/accuracy", pass.ga)];
         values.extend(pass.loss.map(|loss| number("loss/validation", loss)));
         let ious = self.classes.iter().zip(&pass.iou);
@@ -74,9 +74,9 @@ impl TrainingLog {
             let encoded = sheet.png()?;
             let (height, width) = (sheet.height as i32, sheet.width as i32);
             let image = Image { height, width, colorspace: 3, encoded };
-            values.push(Value { tag: "photograph, truth, prediction".into(), of: Some(Of::Image(image)) });
+            values.push(Value { tag: "photograph, truth, prediction".into(), of: Some(SummaryValue::Image(image)) });
         }
-        self.event(pass.step, What::Summary(Summary { value: values }))
+        self.event(pass.step, EventContent::Summary(Summary { value: values }))
     }
 
     /// Rewrites `log.csv`.
@@ -84,7 +84,7 @@ impl TrainingLog {
         write_atomically(&self.folder.join(CSV), table(history, &self.classes).as_bytes())
     }
 
-    fn event(&mut self, step: u64, what: What) -> Result<()> {
+    fn event(&mut self, step: u64, what: EventContent) -> Result<()> {
         let wall_time = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
         let record = events::record(&Event { wall_time, step: step as i64, what: Some(what) });
         self.events.write_all(&record).map_err(Error::io(&self.folder.join(EVENTS)))
@@ -110,7 +110,7 @@ fn go_on(path: &Path, known: u64) -> io::Result<Option<(File, u64)>> {
 }
 
 fn number(tag: &str, value: f64) -> Value {
-    Value { tag: tag.into(), of: Some(Of::Number(value as f32)) }
+    Value { tag: tag.into(), of: Some(SummaryValue::Number(value as f32)) }
 }
 
 /// Reads the history of a running or complete training from `log.csv`, except accuracy and the IoU of single classes. Returns

@@ -79,11 +79,11 @@ impl Examples {
         let weights = &axes * beta.rows(1, axes.ncols());
         let weights: Vec<f64> = weights.iter().zip(&scales).map(|(w, s)| w * s.factor).collect();
         let bias = beta[0] - weights.iter().zip(&scales).map(|(w, s)| w * s.mean).sum::<f64>();
-        Some((Classifier { weights, bias }, self.told(&rows, pictures)))
+        Some((Classifier { weights, bias }, self.cross_validated_accuracy(&rows, pictures)))
     }
 
     /// Returns the cross-validated pseudo-R². See [`Self::learn`] for it, and [`Self::newton`] for `rows`.
-    fn told(&self, rows: &DMatrix<f64>, pictures: &[usize]) -> f64 {
+    fn cross_validated_accuracy(&self, rows: &DMatrix<f64>, pictures: &[usize]) -> f64 {
         let folds = pictures.iter().max().map_or(0, |last| FOLDS.min(last + 1));
         let (mut found, mut mean, mut best) = (0.0, 0.0, 0.0);
         for fold in 0..folds {
@@ -240,7 +240,7 @@ mod tests {
     /// agree form the largest component and the coefficients of the others are small; a constant feature has no weight. Source: the
     /// rule.
     #[test]
-    fn kinds_are_told_apart_in_spite_of_wrong_labels() {
+    fn classes_are_separated_in_spite_of_wrong_labels() {
         let (rows, kinds) = examples(400, 12, 0.25);
         let found = rows.classifier().unwrap();
         let odds =

@@ -32,7 +32,7 @@ const SURE: f64 = 8.0;
 /// Maximum number of regions per image used as examples, the largest first: bounds the memory on noisy predictions.
 const MOST: usize = 2000;
 /// Range of the cross-validated pseudo-R² over which the classifier's weight rises linearly from 0 to 1.
-const TOLD: (f64, f64) = (0.05, 0.15);
+const ACCURACY_RANGE: (f64, f64) = (0.05, 0.15);
 /// Minimum number of images with plants: within one image, plants only repeat the errors of its rows.
 const LEAST: usize = 2;
 
@@ -124,8 +124,8 @@ impl Appearance {
             all.weights.extend(&picture.weights);
             numbers.resize(all.labels.len(), number);
         }
-        let (classifier, told) = all.learn(&numbers)?;
-        let trust = ((told - TOLD.0) / (TOLD.1 - TOLD.0)).clamp(0.0, 1.0);
+        let (classifier, accuracy) = all.learn(&numbers)?;
+        let trust = ((accuracy - ACCURACY_RANGE.0) / (ACCURACY_RANGE.1 - ACCURACY_RANGE.0)).clamp(0.0, 1.0);
         (trust > 0.0).then_some(Self { classifier, trust })
     }
 
@@ -222,7 +222,7 @@ mod tests {
     /// Expected: appearance that predicts the labels of held-out images counts fully; it is left out if it does not predict them, or if all
     /// plants have one label; if it predicts a third of the labels it counts in part. Source: the rule.
     #[test]
-    fn looks_count_as_far_as_they_tell_on_other_pictures() {
+    fn appearance_is_weighted_by_its_cross_validated_accuracy() {
         let mut s = Stream::of(4, 0, Purpose::Test, 0);
         let mut field = |share: f64, kinds: bool| -> Vec<Examples> {
             let mut one = |_| {
@@ -250,7 +250,7 @@ mod tests {
 
     /// Expected: nothing is learnt from one image alone, nor from images without plants. Source: the rule.
     #[test]
-    fn one_picture_says_too_little() {
+    fn one_image_is_too_little_evidence() {
         let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let plants: Vec<_> = (0..10).map(|k| (k, k, side(k), f64::from(side(k)))).collect();
         let (regions, features, evidence) = picture(&plants);

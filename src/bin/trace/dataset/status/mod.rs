@@ -20,7 +20,7 @@ const EVERY: Duration = Duration::from_secs(5);
 /// Interval of checks for signals in between.
 const HEED: Duration = Duration::from_millis(50);
 /// Maximum number of failed images printed as text; `--json` lists all.
-const MOST_TOLD: usize = 20;
+const MOST_LISTED: usize = 20;
 
 /// The dataset, and options.
 #[derive(clap::Args)]
@@ -45,12 +45,12 @@ pub(crate) struct Args {
 /// Prints the status once, or until all images are done.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.page.as_deref().map_or(Ok(()), |page| check_page(page, &args.dir))?;
-    let stop = signals.heed();
+    let stop = signals.catch();
     loop {
         // The dataset may have been extended meanwhile.
         let set = Set::open(&args.dir)?;
         let status = Status::of(&set, args.shards, stop)?;
-        let text = if args.json { status.json()? + "\n" } else { told(&set, &status) };
+        let text = if args.json { status.json()? + "\n" } else { as_text(&set, &status) };
         if let Some(path) = &args.page {
             let again = (args.watch && !status.is_done()).then_some(EVERY.as_secs());
             write_atomically(path, page::html(&set, &status, again).as_bytes())?;
@@ -101,7 +101,7 @@ fn print(text: &str, in_place: bool) -> Result<bool> {
 }
 
 /// Formats a status as text.
-fn told(set: &Set, status: &Status) -> String {
+fn as_text(set: &Set, status: &Status) -> String {
     let mut text = format!("{}: {}\n", set.folder.display(), summary(status));
     if status.shards.len() > 1 {
         text += &cli::columns(&shards(status));
@@ -112,8 +112,8 @@ fn told(set: &Set, status: &Status) -> String {
     }
     if !status.failures.is_empty() {
         text += "failed images:\n";
-        text.extend(failed(status).iter().skip(1).take(MOST_TOLD).map(|row| format!("{}\n", row.join(": "))));
-        if let Some(more) = status.failures.len().checked_sub(MOST_TOLD).filter(|more| *more > 0) {
+        text.extend(failed(status).iter().skip(1).take(MOST_LISTED).map(|row| format!("{}\n", row.join(": "))));
+        if let Some(more) = status.failures.len().checked_sub(MOST_LISTED).filter(|more| *more > 0) {
             text.extend([format!("and {more} more; --json and --page list all\n")]);
         }
     }

@@ -46,7 +46,7 @@ pub(super) struct Texel {
 
 /// Scattering of a material over an image of `width` × `height` texels; a single texel if it is constant.
 #[derive(Clone, Debug)]
-pub(super) struct Look {
+pub(super) struct ScatteringMap {
     pub(super) kind: Kind,
     pub(super) width: u32,
     pub(super) height: u32,
@@ -55,11 +55,11 @@ pub(super) struct Look {
     pub(super) held: bool,
 }
 
-impl Look {
+impl ScatteringMap {
     /// Samples a material whose textures are fixed to one level.
     pub(super) fn of(material: &Material) -> Self {
         let (width, height) = match material.varies() {
-            Varies::Picture(w, h) | Varies::Raster(w, h) => (w, h),
+            Varies::Texture(w, h) | Varies::Raster(w, h) => (w, h),
             Varies::Nowhere | Varies::Place => (1, 1),
         };
         let flat = patch(Vec3::ZERO, Vec3::Z);

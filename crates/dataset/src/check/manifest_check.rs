@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Result of checking the manifest.
 #[derive(Default)]
-pub(crate) struct Listed {
+pub(crate) struct ManifestCheck {
     /// Faults, one sentence each.
     pub(crate) faults: Vec<String>,
     /// Description of the checks that were skipped because images are missing.
@@ -32,9 +32,9 @@ struct Manifest {
 }
 
 /// Checks all files that the manifest lists. `missing` contains the indices of missing or incomplete images.
-pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
+pub(crate) fn check_manifest(set: &Set, missing: &[u64]) -> Result<ManifestCheck> {
     let whole = missing.is_empty();
-    let only = |fault: String| Ok(Listed { faults: vec![fault], unchecked: None });
+    let only = |fault: String| Ok(ManifestCheck { faults: vec![fault], unchecked: None });
     let path = set.folder.join(MANIFEST);
     let bytes = match furrow_base::input::contents(&path) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound && whole => {
@@ -42,7 +42,7 @@ pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             let of_all = format!("scene, lists and tables, because {MANIFEST} is written when all images are complete");
-            return Ok(Listed { faults: Vec::new(), unchecked: Some(of_all) });
+            return Ok(ManifestCheck { faults: Vec::new(), unchecked: Some(of_all) });
         }
         other => other.map_err(Error::io(&path))?,
     };
@@ -52,7 +52,7 @@ pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
     };
     let before = !whole && serde_json::from_value::<Recipe>(manifest.recipe).ok().as_ref() != Some(&set.recipe);
     let mut sealed: BTreeMap<String, Checksum> = BTreeMap::new();
-    let mut absent = Absent::default();
+    let mut absent = UnrecordedImages::default();
     for (index, image) in (0..).zip(set.all_checksums()) {
         let name = Set::name(index);
         let Some(image) = image else {
@@ -86,18 +86,18 @@ pub(crate) fn listed(set: &Set, missing: &[u64]) -> Result<Listed> {
         faults.push(format!("{MANIFEST} lacks {} files: `trace dataset finish` rewrites it", sealed.len()));
     }
     let unlike = format!("{FILE} and images by {MANIFEST}, which is of another recipe until all images are complete");
-    Ok(Listed { faults, unchecked: before.then_some(unlike) })
+    Ok(ManifestCheck { faults, unchecked: before.then_some(unlike) })
 }
 
 /// Images without a checksum record; their files can only be recognised by name.
 #[derive(Default)]
-struct Absent {
+struct UnrecordedImages {
     names: BTreeSet<String>,
     /// Path patterns of other images' files, as [`shape`] returns them.
     shapes: BTreeSet<String>,
 }
 
-impl Absent {
+impl UnrecordedImages {
     /// Returns `true` if a file belongs to one of these images: its path has the image's number in the same place as
     /// the files of other images.
     fn have(&self, path: &str) -> bool {
@@ -121,8 +121,8 @@ mod tests {
     /// Expected: files of a missing image are recognised by the paths of another image's files, in any split; files of
     /// fields and of the whole dataset are not.
     #[test]
-    fn files_of_absent_images_are_told_by_their_names() {
-        let absent = Absent {
+    fn files_of_absent_images_are_recognised_by_their_names() {
+        let absent = UnrecordedImages {
             names: BTreeSet::from(["000004".to_owned()]),
             shapes: ["images/000001/rgb.png", "yolo/labels/train/000001.txt"].map(|path| shape(path, "000001")).into(),
         };
@@ -132,6 +132,6 @@ mod tests {
         for other in ["images/000003/rgb.png", "tum/000004-camera.txt", "colmap/000004/images.txt", "coco/train.json"] {
             assert!(!absent.have(other), "{other}");
         }
-        assert!(Absent { shapes: BTreeSet::new(), ..absent }.have("yolo/labels/train/000004.txt"));
+        assert!(UnrecordedImages { shapes: BTreeSet::new(), ..absent }.have("yolo/labels/train/000004.txt"));
     }
 }

@@ -6,8 +6,8 @@
 
 use super::desc::LOBE_SIDES;
 use crate::plant::axis;
-use crate::plant::blade::Rest;
-use crate::plant::organ::{Carried, OnStem, Organ, OrganKind, StemLine};
+use crate::plant::blade::RestMesh;
+use crate::plant::organ::{Organ, OrganKind, StemLine, StemPosition, StemVertices};
 use crate::plant::skeleton::Weights;
 use crate::plant::tube::{self, Profile};
 use furrow_base::geometry::Mesh;
@@ -16,10 +16,10 @@ use furrow_base::math::{Frame, Vec3, vec2};
 use std::f32::consts::TAU;
 
 /// Builder of the meshes of a plant's flowers.
-pub(in crate::plant) struct Pen {
+pub(in crate::plant) struct FlowerMesher {
     organs: Vec<Organ>,
     /// Position on the plant's stems of the flower that is being built.
-    on: OnStem,
+    on: StemPosition,
     /// Shortest cell of its meshes, metres.
     pub(in crate::plant) cell: f32,
 }
@@ -85,14 +85,14 @@ pub(super) struct Solid {
 /// Outline of an ellipsoid.
 pub(super) const ROUND: Outline = Outline::Power { a: 0.5, b: 0.5 };
 
-impl Pen {
+impl FlowerMesher {
     /// Returns an empty builder whose meshes have no cells shorter than `cell` metres.
     pub(in crate::plant) fn new(cell: f32) -> Self {
-        Self { organs: Vec::new(), on: OnStem { line: 0, at: 0.0 }, cell }
+        Self { organs: Vec::new(), on: StemPosition { line: 0, at: 0.0 }, cell }
     }
 
     /// Sets the position on the plant's stems of the flowers that are built from now on.
-    pub(in crate::plant) fn stand(&mut self, on: OnStem) {
+    pub(in crate::plant) fn stand(&mut self, on: StemPosition) {
         self.on = on;
     }
 
@@ -103,13 +103,20 @@ impl Pen {
 
     /// Adds a mesh to the organ of this kind and material.
     pub(in crate::plant) fn add(&mut self, kind: OrganKind, material: &str, mesh: &Mesh) {
-        let carried = Carried { corners: mesh.positions.len(), line: self.on.line, at: Some(self.on.at) };
+        let carried = StemVertices { corners: mesh.positions.len(), line: self.on.line, at: Some(self.on.at) };
         self.add_carried(kind, material, mesh, carried, None);
     }
 
     /// Adds a mesh to the organ of this kind and material, with the stem that carries it. `line` is the centre line if
     /// the mesh is a stem itself.
-    fn add_carried(&mut self, kind: OrganKind, material: &str, mesh: &Mesh, carried: Carried, line: Option<StemLine>) {
+    fn add_carried(
+        &mut self,
+        kind: OrganKind,
+        material: &str,
+        mesh: &Mesh,
+        carried: StemVertices,
+        line: Option<StemLine>,
+    ) {
         if mesh.triangles.is_empty() {
             return;
         }
@@ -134,7 +141,7 @@ impl Pen {
         // A notch needs vertices on either side of its lowest point.
         let columns = if sheet.notch > 0.0 || sheet.width > 4.0 * self.cell { 8 } else { 4 };
         let side = sheet.out.cross(sheet.up);
-        let mut rest = Rest::default();
+        let mut rest = RestMesh::default();
         let mut near = None;
         for i in 0..=rows {
             let t = 0.02 + 0.965 * i as f32 / rows as f32;
@@ -179,7 +186,7 @@ impl Pen {
     /// axis.
     fn turned(&mut self, kind: OrganKind, material: &str, solid: &Solid, sides: u32, factor: impl Fn(f32) -> f32) {
         let rows = self.cells(solid.length, 3.0, 10.0);
-        let mut rest = Rest::default();
+        let mut rest = RestMesh::default();
         let mut near = None;
         for i in 0..=rows {
             let t = 0.5 - 0.5 * (std::f32::consts::PI * i as f32 / rows as f32).cos();
@@ -214,7 +221,7 @@ impl Pen {
     /// Adds a stem: a strand with joints for animation.
     pub(in crate::plant) fn stem(&mut self, material: &str, line: StemLine, radii: (f32, f32)) {
         let mesh = self.tube(&line.points, radii);
-        let carried = Carried { corners: mesh.positions.len(), line: line.number, at: None };
+        let carried = StemVertices { corners: mesh.positions.len(), line: line.number, at: None };
         self.add_carried(OrganKind::Stem, material, &mesh, carried, Some(line));
     }
 

@@ -17,7 +17,7 @@ const BRIGHT: f64 = 0.99;
 
 /// Downscaled image with its class maps, which hold one class per pixel, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shot {
+pub struct Thumbnail {
     /// Name of the image.
     pub name: String,
     /// Width, pixels.
@@ -32,7 +32,7 @@ pub struct Shot {
     pub predictions: Vec<Vec<u8>>,
 }
 
-impl Shot {
+impl Thumbnail {
     /// Downscales an image of `width × height` pixels and its maps to at most `most` pixels wide and high. Image pixels are averaged; map
     /// pixels take the nearest label.
     pub fn new(

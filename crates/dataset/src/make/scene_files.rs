@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 /// The files of a scene, as they are stored in a dataset.
-pub(crate) struct Gathered {
+pub(crate) struct SceneFiles {
     /// The files, below `scene/`.
     pub(crate) files: Vec<File>,
     /// Path of the scene file, one of `files`.
@@ -25,7 +25,11 @@ pub(crate) struct Gathered {
 
 /// Reads the files at `paths`, which are all files of a scene including `scene` itself, as they were opened. `shipped`
 /// maps names in the scene file to files that ship with the program.
-pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, scene: &Path) -> Result<Gathered> {
+pub(crate) fn collect_files(
+    paths: &[PathBuf],
+    shipped: &BTreeMap<String, PathBuf>,
+    scene: &Path,
+) -> Result<SceneFiles> {
     let places = places(paths, scene)?;
     let scene = absolute(scene)?;
     // In species files only names with the extension `.ron` are replaced: `name` and keys of tables are quoted strings
@@ -54,7 +58,7 @@ pub(crate) fn gather(paths: &[PathBuf], shipped: &BTreeMap<String, PathBuf>, sce
         }
         gathered.push(File { path: slashed(to), bytes });
     }
-    Ok(Gathered { files: gathered, scene: slashed(&places[&scene]), rewritten })
+    Ok(SceneFiles { files: gathered, scene: slashed(&places[&scene]), rewritten })
 }
 
 /// Returns the destination of each file, relative to the dataset's folder, by its absolute path.

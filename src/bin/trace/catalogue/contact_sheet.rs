@@ -14,10 +14,10 @@ const ROOM: usize = 3;
 const LARGE: usize = 160;
 
 /// A square image, sRGB, row-major from the top.
-pub(super) type Shot = Vec<[u8; 3]>;
+pub(super) type Thumbnail = Vec<[u8; 3]>;
 
 /// An image of any shape.
-pub(super) struct Sheet {
+pub(super) struct ContactSheet {
     pub(super) width: usize,
     pub(super) height: usize,
     /// Pixels, row-major from the top.
@@ -29,7 +29,7 @@ pub(super) struct Column {
     /// Text above the images.
     pub(super) words: String,
     /// Images, and the scale bar below each.
-    pub(super) shots: Vec<(Shot, Bar)>,
+    pub(super) thumbnails: Vec<(Thumbnail, Bar)>,
 }
 
 /// A scale bar.
@@ -80,15 +80,15 @@ impl Layout {
     }
 
     /// Arranges columns side by side, at most [`MOST`] per line.
-    pub(super) fn compose(self, columns: &[Column]) -> Sheet {
+    pub(super) fn compose(self, columns: &[Column]) -> ContactSheet {
         let width = GAP + columns.len().min(MOST) * (self.size + GAP);
         let height = GAP + columns.len().div_ceil(MOST) * self.tall();
         let mut pixels = vec![PAPER; width * height];
         for (i, column) in columns.iter().enumerate() {
             letters::draw(&mut pixels, width, &column.words, self.column(i), self.dot(), INK);
-            for (k, (shot, bar)) in column.shots.iter().enumerate() {
+            for (k, (thumbnail, bar)) in column.thumbnails.iter().enumerate() {
                 let (x, y) = self.corner(i, k);
-                for (row, line) in shot.chunks_exact(self.size).enumerate() {
+                for (row, line) in thumbnail.chunks_exact(self.size).enumerate() {
                     let start = (y + row) * width + x;
                     pixels[start..start + self.size].copy_from_slice(line);
                 }
@@ -101,11 +101,11 @@ impl Layout {
                 letters::draw(&mut pixels, width, &bar.words, beside, self.dot(), INK);
             }
         }
-        Sheet { width, height, pixels }
+        ContactSheet { width, height, pixels }
     }
 
     /// Cuts image k of column i out of a sheet made by [`Self::compose`].
-    pub(super) fn part(self, sheet: &Sheet, (i, k): (usize, usize)) -> Shot {
+    pub(super) fn part(self, sheet: &ContactSheet, (i, k): (usize, usize)) -> Thumbnail {
         let (x, y) = self.corner(i, k);
         (y..y + self.size).flat_map(|row| &sheet.pixels[row * sheet.width + x..][..self.size]).copied().collect()
     }
@@ -120,17 +120,19 @@ mod tests {
     #[test]
     fn pictures_are_found_where_they_were_put() {
         let layout = Layout { rows: 2, size: 40 };
-        let shot = |n: usize| vec![[n as u8, 1, 2]; 1600];
+        let thumbnail = |n: usize| vec![[n as u8, 1, 2]; 1600];
         let bar = |pixels| Bar { pixels, words: "5".into() };
-        let column =
-            |i: usize| Column { words: "BB".into(), shots: vec![(shot(i), bar(10)), (shot(100 + i), bar(11))] };
+        let column = |i: usize| Column {
+            words: "BB".into(),
+            thumbnails: vec![(thumbnail(i), bar(10)), (thumbnail(100 + i), bar(11))],
+        };
         let columns: Vec<Column> = (0..8).map(column).collect();
         let sheet = layout.compose(&columns);
         assert_eq!((sheet.width, sheet.pixels.len()), (GAP + 6 * (40 + GAP), sheet.width * sheet.height));
         let inked = |y: usize, x: usize| sheet.pixels[y * sheet.width + x] == INK;
         for (i, column) in columns.iter().enumerate() {
-            for (k, (shot, bar)) in column.shots.iter().enumerate() {
-                assert_eq!(layout.part(&sheet, (i, k)), *shot);
+            for (k, (thumbnail, bar)) in column.thumbnails.iter().enumerate() {
+                assert_eq!(layout.part(&sheet, (i, k)), *thumbnail);
                 let (x, y) = layout.corner(i, k);
                 let row = y + 40 + ROOM + 3;
                 assert!((x..x + bar.pixels).all(|x| inked(row, x)) && !inked(row, x + bar.pixels));

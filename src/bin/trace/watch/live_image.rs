@@ -4,7 +4,7 @@ use furrow_base::{Error, Result};
 use furrow_grow::plant::OrganKind;
 use furrow_job::{Field, Renderer, View};
 use furrow_optics::sensor::Photograph;
-use furrow_output::Picture as Png;
+use furrow_output::ImageData as Png;
 use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
 use furrow_render::render::label::NONE;
@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// How an image was rendered.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Made {
+pub(super) struct RenderInfo {
     /// Number of the request that it answers.
     pub(super) asked: u64,
     /// Time from the start of reading the file to the first image of this field.
@@ -25,16 +25,16 @@ pub(super) struct Made {
 }
 
 /// A field and its image so far.
-pub(super) struct Picture {
+pub(super) struct LiveImage {
     field: Arc<Field>,
     labels: Arc<LabelMap>,
     photograph: Photograph,
-    made: Made,
+    made: RenderInfo,
 }
 
-impl Picture {
+impl LiveImage {
     /// Develops the film into an image.
-    pub(super) fn new(field: &Arc<Field>, film: &Film, labels: &Arc<LabelMap>, made: Made) -> Self {
+    pub(super) fn new(field: &Arc<Field>, film: &Film, labels: &Arc<LabelMap>, made: RenderInfo) -> Self {
         let photograph = field.edit().photograph(field.grown(), film);
         Self { field: field.clone(), labels: labels.clone(), photograph, made }
     }

@@ -2,7 +2,7 @@
 
 use super::figures::{Figures, Maps};
 use super::flip;
-use super::picture::Picture;
+use super::raster_image::RasterImage;
 use furrow_base::Result;
 
 /// Largest total size of a page's images in bytes; encoded as text in the page they take a third more.
@@ -16,7 +16,7 @@ pub(super) const MOST_DELTA_E: f32 = 20.0;
 
 /// Pair for display, with images as JPEG.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shot {
+pub struct DisplayPair {
     /// Name of both images.
     pub name: String,
     /// Width in pixels, as displayed.
@@ -33,11 +33,11 @@ pub struct Shot {
     pub maps: [Vec<u8>; 3],
 }
 
-impl Shot {
+impl DisplayPair {
     /// Creates a pair for a page with `shown` pairs, as large as the page allows.
     pub(super) fn take(
         name: &str,
-        (a, b): (&Picture, &Picture),
+        (a, b): (&RasterImage, &RasterImage),
         maps: &Maps,
         figures: &Figures,
         shown: usize,
@@ -52,7 +52,7 @@ impl Shot {
         let mut side = SIDES.0;
         loop {
             let (width, height) = furrow_output::shrunk(a.width, a.height, side);
-            let photo = |of: &Picture| {
+            let photo = |of: &RasterImage| {
                 let (w, h, rgb) = furrow_output::shrink(of.width, of.height, &of.rgb, side);
                 furrow_output::encode_jpeg(w, h, &rgb, QUALITY.0)
             };
@@ -62,7 +62,7 @@ impl Shot {
                 furrow_output::encode_jpeg(width, height, &painted, QUALITY.1)
             };
             let [flip, ssim, ciede2000] = &grays;
-            let shot = Self {
+            let display_pair = Self {
                 name: name.to_owned(),
                 width,
                 height,
@@ -71,8 +71,8 @@ impl Shot {
                 b: photo(b)?,
                 maps: [map(flip)?, map(ssim)?, map(ciede2000)?],
             };
-            if shot.bytes() * shown <= BYTES || side <= SIDES.1 {
-                return Ok(shot);
+            if display_pair.bytes() * shown <= BYTES || side <= SIDES.1 {
+                return Ok(display_pair);
             }
             side = (width.max(height) * 4 / 5).max(SIDES.1);
         }
@@ -84,9 +84,9 @@ impl Shot {
 }
 
 /// Keeps the `most` pairs with the largest FLIP, in decreasing order, ties by name.
-pub(super) fn worst(shots: &mut Vec<Shot>, most: usize) {
-    shots.sort_by(|a, b| b.flip.total_cmp(&a.flip).then_with(|| a.name.cmp(&b.name)));
-    shots.truncate(most);
+pub(super) fn worst(display_pairs: &mut Vec<DisplayPair>, most: usize) {
+    display_pairs.sort_by(|a, b| b.flip.total_cmp(&a.flip).then_with(|| a.name.cmp(&b.name)));
+    display_pairs.truncate(most);
 }
 
 #[cfg(test)]
@@ -98,7 +98,7 @@ mod tests {
     /// Noise compresses worst in JPEG.
     #[test]
     fn pictures_of_a_page_weigh_what_they_may() {
-        let noise = |seed: u64| Picture {
+        let noise = |seed: u64| RasterImage {
             width: 500,
             height: 400,
             rgb: (0..200_000).map(|k| mix(seed + k).to_le_bytes()).map(|[r, g, b, ..]| [r, g, b]).collect(),
@@ -107,7 +107,7 @@ mod tests {
         let (a, b) = (noise(1), noise(1_000_000));
         let maps = maps(&a, &b, PIXELS_PER_DEGREE).unwrap();
         let figures = pair(&a, &b, None, PIXELS_PER_DEGREE).unwrap();
-        let [one, many] = [1, 12].map(|shown| Shot::take("x", (&a, &b), &maps, &figures, shown).unwrap());
+        let [one, many] = [1, 12].map(|shown| DisplayPair::take("x", (&a, &b), &maps, &figures, shown).unwrap());
         assert_eq!((one.width, one.height), (500, 400));
         assert!(12 * many.bytes() <= BYTES && many.width < 500 && many.width > 200, "{}", many.width);
     }

@@ -19,17 +19,17 @@ use wgpu::{TextureFormat, TextureView};
 type Key = ([usize; 2], usize);
 
 /// Textures and parameters of the parts.
-pub(super) struct Sheets {
+pub(super) struct SceneTextures {
     /// Index of the sheet of each part.
     pub(super) worn: Vec<usize>,
     /// All sheets.
-    pub(super) all: Vec<Sheet>,
+    pub(super) all: Vec<MaterialTextures>,
     /// Parameters of each part: tints, then roughness, relief, paleness.
     pub(super) wears: Vec<[f32; 12]>,
 }
 
 /// Textures of a material with a mask.
-pub(super) struct Sheet {
+pub(super) struct MaterialTextures {
     /// Reflectance; near infrared in the alpha channel.
     pub(super) reflected: TextureView,
     /// Transmittance, likewise.
@@ -40,7 +40,7 @@ pub(super) struct Sheet {
     pub(super) mask: TextureView,
 }
 
-impl Sheets {
+impl SceneTextures {
     /// Builds the textures of a scene's materials, at most `most` texels wide and high.
     pub(super) fn new(scene: &Scene, gpu: &Gpu, most: u32) -> Self {
         let swatches: Vec<Swatch<'_>> = scene.materials.iter().map(crate::material::Material::swatch).collect();
@@ -59,7 +59,7 @@ impl Sheets {
                 let [reflected, transmitted, relief] =
                     colors.entry(of_colors).or_insert_with(|| pictures(gpu, swatch, most));
                 let (reflected, transmitted, relief) = (reflected.clone(), transmitted.clone(), relief.clone());
-                sheets.all.push(Sheet { reflected, transmitted, relief, mask: mask.clone() });
+                sheets.all.push(MaterialTextures { reflected, transmitted, relief, mask: mask.clone() });
             }
             sheets.worn.push(sheet);
             let by = scene.materials[part.material as usize].tint_factors(part.tint());

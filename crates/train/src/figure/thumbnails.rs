@@ -1,13 +1,13 @@
 //! Selection of images of a set to show with their predictions: evenly spread over the set and, on request, those with the worst
 //! predictions.
 
-use super::shot::{Shot, spread};
+use super::thumbnail::{Thumbnail, spread};
 use crate::data::{Band, Example};
 use crate::measure::{Confusion, Scores};
 use furrow_base::Result;
 
 /// Collector of the images to show.
-pub struct Shots {
+pub struct Thumbnails {
     places: Vec<usize>,
     next: usize,
     classes: usize,
@@ -16,10 +16,10 @@ pub struct Shots {
     planes: [usize; 3],
     most: u32,
     /// Kept images: index, mean I/U (only for those kept as the worst), and image; the worst first, then the evenly spread ones.
-    kept: Vec<(usize, Option<f64>, Shot)>,
+    kept: Vec<(usize, Option<f64>, Thumbnail)>,
 }
 
-impl Shots {
+impl Thumbnails {
     /// Collects at most `shown` of `images` images with these bands, each downscaled to at most `most` pixels wide and high.
     pub fn new(images: usize, shown: usize, most: u32, bands: &[Band]) -> Self {
         let place = |band: &Band| bands.iter().position(|b| b == band);
@@ -50,25 +50,25 @@ impl Shots {
         }
         let planes = self.planes.map(|band| &example.planes[band]);
         let rgb: Vec<[u8; 3]> = (0..example.labels.len()).map(|i| planes.map(|plane| plane[i])).collect();
-        let shot = Shot::new(&example.name, size, &rgb, &example.labels, &[predicted], self.most);
+        let thumbnail = Thumbnail::new(&example.name, size, &rgb, &example.labels, &[predicted], self.most);
         match at {
-            Some(at) => self.kept.insert(at, (place, iou, shot)),
-            None => self.kept.push((place, None, shot)),
+            Some(at) => self.kept.insert(at, (place, iou, thumbnail)),
+            None => self.kept.push((place, None, thumbnail)),
         }
         let scored = self.kept.iter().take_while(|(_, iou, _)| iou.is_some()).count();
         if scored > self.worst {
-            let (place, _, shot) = self.kept.remove(self.worst);
+            let (place, _, thumbnail) = self.kept.remove(self.worst);
             if self.places.contains(&place) {
-                self.kept.push((place, None, shot));
+                self.kept.push((place, None, thumbnail));
             }
         }
         Ok(())
     }
 
     /// Returns the kept images: the worst in ascending order of mean I/U, then the evenly spread ones in their order, without duplicates.
-    pub fn kept(mut self) -> Vec<Shot> {
+    pub fn kept(mut self) -> Vec<Thumbnail> {
         self.kept.sort_by_key(|(place, iou, _)| if iou.is_some() { (false, 0) } else { (true, *place) });
-        self.kept.into_iter().map(|(_, _, shot)| shot).collect()
+        self.kept.into_iter().map(|(_, _, thumbnail)| thumbnail).collect()
     }
 
     fn mean_iou(&self, example: &Example, predicted: &[u8]) -> Result<Option<f64>> {

@@ -30,7 +30,7 @@ const LEAF_NIR: f32 = 0.45;
 
 /// Surface properties in a scene file that override those of a model.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Repaint {
+pub struct SurfaceOverride {
     /// GGX roughness α, 0–1.
     pub roughness: Option<f32>,
     /// Transmittance per band, 0–1.
@@ -41,12 +41,12 @@ pub struct Repaint {
 
 /// A surface of a model, prepared for shading.
 #[derive(Clone, Debug)]
-pub struct Painted {
+pub struct ModelSurface {
     color: Vec3,
     picture: Option<Arc<Texture>>,
     nir: Nir,
     relief: Option<NormalTexture>,
-    transmission: Option<Sheet>,
+    transmission: Option<Translucency>,
     coat: Option<Side>,
     /// Fixed mip level of the colour image for all rays; `None` for the level of each ray's width.
     level: Option<u32>,
@@ -63,20 +63,20 @@ enum Nir {
 
 /// Transmission of a translucent sheet.
 #[derive(Clone, Debug)]
-struct Sheet {
+struct Translucency {
     transmittance: Spectrum,
     picture: Option<Arc<Texture>>,
 }
 
-impl Painted {
+impl ModelSurface {
     /// Builds the material from a surface of a model file, with the scene file's overrides.
-    pub fn new(surface: &Surface, page: &Repaint) -> Self {
-        let own = |t: &Transmission| Sheet {
+    pub fn new(surface: &Surface, page: &SurfaceOverride) -> Self {
+        let own = |t: &Transmission| Translucency {
             transmittance: Spectrum(Vec3::from(t.color).extend(surface.nir_transmission.unwrap_or(LEAF_NIR))),
             picture: t.picture.clone(),
         };
         let transmission = match page.transmission {
-            Some(t) => (!t.is_black()).then_some(Sheet { transmittance: t, picture: None }),
+            Some(t) => (!t.is_black()).then_some(Translucency { transmittance: t, picture: None }),
             None => surface.transmission.as_ref().map(own),
         };
         let roughness = page.roughness.or(surface.roughness).unwrap_or(1.0).max(0.02);
@@ -122,11 +122,12 @@ impl Painted {
         match feature {
             // It remains a sheet, so that nothing else changes.
             Feature::Transmission => {
-                self.transmission = self.transmission.take().map(|s| Sheet { transmittance: Spectrum::ZERO, ..s });
+                self.transmission =
+                    self.transmission.take().map(|s| Translucency { transmittance: Spectrum::ZERO, ..s });
             }
             Feature::Coat => self.coat = None,
             Feature::Relief => self.relief = None,
-            Feature::Facets | Feature::Picture => {}
+            Feature::Facets | Feature::Texture => {}
         }
     }
 
@@ -216,7 +217,7 @@ mod tests {
         let transmits = |roughness: f32, passed: Option<f32>| {
             let transmission = passed.map(|t| Transmission { color: [t; 3], picture: None });
             let surface = Surface { roughness: Some(roughness), transmission, ..Surface::default() };
-            Painted::new(&surface, &Repaint::default()).scatter(&at, Vec3::Z).0.transmits()
+            ModelSurface::new(&surface, &SurfaceOverride::default()).scatter(&at, Vec3::Z).0.transmits()
         };
         assert!(!transmits(0.2, None) && !transmits(1.0, None));
         assert!(transmits(0.2, Some(0.1)) && transmits(1.0, Some(0.1)));
@@ -234,8 +235,8 @@ mod tests {
         ) {
             let transmission = Some(Transmission { color: passed, picture: None });
             let surface = Surface { color, transmission, ..Surface::default() };
-            let repaint = Repaint { nir, transmission: page.map(Spectrum::from), ..Repaint::default() };
-            let tone = Painted::new(&surface, &repaint).tone(|_| Vec3::ONE);
+            let repaint = SurfaceOverride { nir, transmission: page.map(Spectrum::from), ..SurfaceOverride::default() };
+            let tone = ModelSurface::new(&surface, &repaint).tone(|_| Vec3::ONE);
             let sum = (tone.reflectance + tone.transmittance).max();
             prop_assert!(sum <= 0.9901 && tone.transmittance.0.min_element() >= 0.0, "{tone:?}");
         }
@@ -246,13 +247,14 @@ mod tests {
         let picture =
             Texture::from_rgba8(2, 1, &[255, 0, 0, 255, 128, 0, 0, 255], furrow_optics::texture::ColorSpace::Srgb);
         let surface = Surface { picture: Some(Arc::new(picture)), ..Surface::default() };
-        let nir =
-            |page: Repaint, red: f32| Painted::new(&surface, &page).tone(|_| Vec3::new(red, 0.0, 0.0)).reflectance.0.w;
-        assert_eq!(nir(Repaint::default(), 0.3), 0.3);
+        let nir = |page: SurfaceOverride, red: f32| {
+            ModelSurface::new(&surface, &page).tone(|_| Vec3::new(red, 0.0, 0.0)).reflectance.0.w
+        };
+        assert_eq!(nir(SurfaceOverride::default(), 0.3), 0.3);
         let mean = mean(surface.picture.as_ref().unwrap()).x;
-        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, mean) - 0.2).abs() < 1e-6);
-        assert!((nir(Repaint { nir: Some(0.2), ..Repaint::default() }, 0.5 * mean) - 0.1).abs() < 1e-6);
-        let leaf = Repaint { transmission: Some(Spectrum::splat(0.1)), ..Repaint::default() };
+        assert!((nir(SurfaceOverride { nir: Some(0.2), ..SurfaceOverride::default() }, mean) - 0.2).abs() < 1e-6);
+        assert!((nir(SurfaceOverride { nir: Some(0.2), ..SurfaceOverride::default() }, 0.5 * mean) - 0.1).abs() < 1e-6);
+        let leaf = SurfaceOverride { transmission: Some(Spectrum::splat(0.1)), ..SurfaceOverride::default() };
         assert_eq!(nir(leaf, 0.3), LEAF_NIR);
     }
 }

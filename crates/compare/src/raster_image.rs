@@ -10,7 +10,7 @@ const NONE: u8 = 255;
 
 /// Image, with its pixels row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Picture {
+pub struct RasterImage {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -21,7 +21,7 @@ pub struct Picture {
     pub nir: Vec<u8>,
 }
 
-impl Picture {
+impl RasterImage {
     /// Reads a PNG or JPEG of any depth, and near infrared from a separate file.
     pub fn read(path: &Path, nir: Option<&Path>) -> Result<Self> {
         let (width, height, rgb) = furrow_output::read_photo(path)?;

@@ -31,7 +31,7 @@ const RECORD: &str = "record.json";
 
 /// An input image without labels.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct InputImage {
     /// Base name of the prediction files.
     pub name: String,
     /// Path of the RGB image; for an image in a pack, the path that it would have in an unpacked dataset.
@@ -70,7 +70,7 @@ pub struct Pixels {
     pub planes: Vec<Vec<u8>>,
 }
 
-impl Picture {
+impl InputImage {
     /// Reads the image and its bands. Fails if a file is not an image, if the image is gray but the network takes colour, or if the bands
     /// differ in size.
     pub fn read(&self) -> Result<Pixels> {
@@ -126,7 +126,7 @@ impl Picture {
 /// Lists the images that `inputs` (files, folders, datasets) hold, each once, in the order of the inputs; files of a folder are sorted by
 /// name. `elsewhere` gives folders for bands. Fails if an input holds no image, a band is missing, or two images would have the same
 /// prediction file.
-pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) -> Result<Vec<Picture>> {
+pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) -> Result<Vec<InputImage>> {
     for (band, folder) in elsewhere {
         if !shape.bands.contains(band) {
             let names: Vec<&str> = shape.bands.iter().map(Band::name).collect();
@@ -135,7 +135,7 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
         }
         std::fs::read_dir(folder).map_err(Error::reading(folder))?;
     }
-    let mut pictures: Vec<Picture> = Vec::new();
+    let mut pictures: Vec<InputImage> = Vec::new();
     for input in inputs {
         if let Some(selection) = selection(input)? {
             pictures.extend(images(&selection, shape)?);
@@ -148,7 +148,7 @@ pub fn find(inputs: &[PathBuf], shape: &Shape, elsewhere: &[(Band, PathBuf)]) ->
                 None => companion(&photo, band.name()),
             };
             let planes = planes(&photo, shape, &beside)?;
-            pictures.push(Picture { name: stem(&photo), photo, source: Source::Files(planes) });
+            pictures.push(InputImage { name: stem(&photo), photo, source: Source::Files(planes) });
         }
     }
     let pictures = first_of_each(pictures, |picture| picture.photo.clone());
@@ -174,7 +174,7 @@ fn selection(input: &Path) -> Result<Option<Selection>> {
 }
 
 /// Lists the selected images of a dataset, in folders or in packs, each with the files that the dataset's recipe defines.
-fn images(selection: &Selection, shape: &Shape) -> Result<Vec<Picture>> {
+fn images(selection: &Selection, shape: &Shape) -> Result<Vec<InputImage>> {
     let (set, numbers) = selection.open(Pick::All, 0)?;
     if set.recipe.labels_only() {
         return Err(Error::input("this dataset holds labels only, no images")
@@ -190,14 +190,14 @@ fn images(selection: &Selection, shape: &Shape) -> Result<Vec<Picture>> {
         let is_packed = set.recipe.pack.is_some() && !folder.join(RECORD).is_file();
         if is_packed && Image::of(set.as_ref(), &name).has(RECORD)? {
             let source = Source::Packed(Arc::clone(&set), shape.bands.clone());
-            return Ok(Picture { photo: folder.join(PHOTO), name, source });
+            return Ok(InputImage { photo: folder.join(PHOTO), name, source });
         }
         if !is_packed && folder.is_dir() {
             let missing = || folder.join(format!("rgb.{}", set.recipe.photo().ending()));
             let photo = photograph_in(&folder, "rgb", recipe).unwrap_or_else(missing);
             let beside = |band: &Band| photograph_in(&folder, band.name(), recipe);
             let source = Source::Files(planes(&photo, shape, &beside)?);
-            return Ok(Picture { name, photo, source });
+            return Ok(InputImage { name, photo, source });
         }
         Err(Error::input("this image is not there yet").in_file(folder).help("run the command that made the set again"))
     };
@@ -287,8 +287,8 @@ pub fn files(name: &str) -> [String; 2] {
     [format!("{name}.png"), format!("{name}.overlay.png")]
 }
 
-fn one_name_each(pictures: &[Picture]) -> Result<()> {
-    let mut taken: BTreeMap<String, &Picture> = BTreeMap::new();
+fn one_name_each(pictures: &[InputImage]) -> Result<()> {
+    let mut taken: BTreeMap<String, &InputImage> = BTreeMap::new();
     for picture in pictures {
         for file in files(&picture.name) {
             if let Some(other) = taken.insert(file.clone(), picture) {
@@ -339,7 +339,7 @@ pub const PREDICTION: &str = "prediction.json";
 impl Prediction {
     /// Reserves a folder for the predictions of these images and writes its `prediction.json`. Fails if the folder holds predictions of
     /// another network, size or refinement, or files that would be overwritten and are not predictions of these images.
-    pub fn claim(folder: &Path, card: &ModelCard, pixel_mm: Option<f64>, pictures: &[Picture]) -> Result<Self> {
+    pub fn claim(folder: &Path, card: &ModelCard, pixel_mm: Option<f64>, pictures: &[InputImage]) -> Result<Self> {
         let path = folder.join(PREDICTION);
         let refuse = |path: &Path, what: String| Err(Error::misuse(what).help("give another --out").in_file(path));
         let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;

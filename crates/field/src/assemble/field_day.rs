@@ -21,7 +21,7 @@ const EMERGING: f32 = 0.4;
 
 /// Day of a field.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Today {
+pub(super) struct FieldDay {
     /// Days after the emergence of its first crop.
     pub(super) day: u32,
     /// Degree of soil crusting: fraction of the final share, 0 to 1.
@@ -32,7 +32,7 @@ pub(super) struct Today {
     pace: Vary<Factor>,
 }
 
-impl Today {
+impl FieldDay {
     /// Returns day `asked`, or else the first day of the scene file; `None` if there is neither. A plant with `EmergesOn` is an error if
     /// there is no day.
     pub(super) fn of(

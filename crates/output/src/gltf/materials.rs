@@ -1,7 +1,7 @@
 //! Conversion of materials and masks to glTF materials, textures and images; each image is written once.
 
 use super::pack::Pack;
-use crate::png::{self, Picture};
+use crate::png::{self, ImageData};
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::Vec3;
@@ -20,18 +20,18 @@ use std::sync::Arc;
 type Key = ([usize; 2], usize);
 
 /// Materials used by the parts, in order of first use.
-pub(super) struct Looks<'a> {
+pub(super) struct Materials<'a> {
     scene: &'a Scene,
     /// Material, tint and mask of each glTF material.
-    worn: Vec<Worn<'a>>,
+    worn: Vec<MaterialVariant<'a>>,
     known: BTreeMap<(u32, [u32; 3], usize), usize>,
 }
 
 /// Material with a tint and a mask.
-type Worn<'a> = (u32, Vec3, Option<&'a Arc<AlphaMask>>);
+type MaterialVariant<'a> = (u32, Vec3, Option<&'a Arc<AlphaMask>>);
 
 /// Image shared by several glTF materials.
-struct Sheet<'a> {
+struct SharedImage<'a> {
     swatch: Swatch<'a>,
     mask: Option<&'a AlphaMask>,
     /// Component-wise maximum of the tints of all users. The image is multiplied by it so that no factor exceeds one.
@@ -49,7 +49,7 @@ fn address(mask: Option<&Arc<AlphaMask>>) -> usize {
     mask.map_or(0, |m| Arc::as_ptr(m) as usize)
 }
 
-impl<'a> Looks<'a> {
+impl<'a> Materials<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
         Self { scene, worn: Vec::new(), known: BTreeMap::new() }
     }
@@ -76,7 +76,7 @@ impl<'a> Looks<'a> {
         let scene = self.scene;
         let swatches = self.swatches();
         let dye = |material: u32, tint| swatches[&material].dyed(scene.materials[material as usize].tint_factors(tint));
-        let mut sheets: BTreeMap<Key, Sheet<'a>> = BTreeMap::new();
+        let mut sheets: BTreeMap<Key, SharedImage<'a>> = BTreeMap::new();
         // Numbered by first use, because addresses differ from run to run and files must not.
         let mut order: Vec<Key> = Vec::new();
         for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
@@ -89,7 +89,7 @@ impl<'a> Looks<'a> {
                 let mean = || [dye.mean.reflectance, dye.mean.transmittance].map(|s| s.0.truncate());
                 let most = if own.size.is_some() { most(&own) } else { mean() };
                 let mask = mask.map(|m| &**m);
-                Sheet {
+                SharedImage {
                     swatch: own,
                     mask,
                     tint: Vec3::ONE,
@@ -118,9 +118,9 @@ impl<'a> Looks<'a> {
             sampler(NEAREST, NEAREST),
             sampler(LINEAR, LINEAR_MIPMAP_LINEAR),
         ];
-        let drawn: Vec<Drawn> = order.iter().map(|key| sheets[key].draw()).collect::<Result<_>>()?;
+        let drawn: Vec<EncodedImages> = order.iter().map(|key| sheets[key].draw()).collect::<Result<_>>()?;
         let mut textures: BTreeMap<Key, [Option<usize>; 3]> = BTreeMap::new();
-        for (key, Drawn { reflected, transmitted, normals }) in order.iter().zip(drawn) {
+        for (key, EncodedImages { reflected, transmitted, normals }) in order.iter().zip(drawn) {
             let cut = usize::from(sheets[key].mask.is_none());
             let mut add = |bytes: Option<Vec<u8>>, what: &str, sampler: usize| {
                 bytes.map(|bytes| {
@@ -177,13 +177,13 @@ fn most(swatch: &Swatch<'_>) -> [Vec3; 2] {
 }
 
 /// Encoded PNG files of an image.
-struct Drawn {
+struct EncodedImages {
     reflected: Option<Vec<u8>>,
     transmitted: Option<Vec<u8>>,
     normals: Option<Vec<u8>>,
 }
 
-impl Sheet<'_> {
+impl SharedImage<'_> {
     /// Returns the factor on reflected colours: the tint divided by 1 − f.
     fn lift(&self) -> Vec3 {
         self.tint / (1.0 - self.share)
@@ -194,10 +194,10 @@ impl Sheet<'_> {
         if self.share > 0.0 { self.tint_transmitted / self.share } else { Vec3::ZERO }
     }
 
-    fn draw(&self) -> Result<Drawn> {
+    fn draw(&self) -> Result<EncodedImages> {
         let pictured = self.swatch.size.is_some();
         let Some((w, h)) = self.mask.map(AlphaMask::size).or(self.swatch.size) else {
-            return Ok(Drawn { reflected: None, transmitted: None, normals: None });
+            return Ok(EncodedImages { reflected: None, transmitted: None, normals: None });
         };
         let (sw, sh) = self.swatch.size.unwrap_or((1, 1));
         // The mask's size is used if it differs from the image's; the image is then sampled by its nearest texels.
@@ -212,13 +212,13 @@ impl Sheet<'_> {
                 let [r, g, b] = reflected(x, y);
                 [r, g, b, opacity(x, y)]
             };
-            png::encode(w, h, &Picture::Rgba(&places().map(rgba).collect::<Vec<_>>()), "")?
+            png::encode(w, h, &ImageData::Rgba(&places().map(rgba).collect::<Vec<_>>()), "")?
         } else {
-            png::encode(w, h, &Picture::Rgb(&places().map(|(x, y)| reflected(x, y)).collect::<Vec<_>>()), "")?
+            png::encode(w, h, &ImageData::Rgb(&places().map(|(x, y)| reflected(x, y)).collect::<Vec<_>>()), "")?
         };
         let transmitted = |(x, y): (u32, u32)| code(tone(x, y).transmittance.0.truncate() * self.lift_transmitted());
         let transmitted = (pictured && self.share > 0.0)
-            .then(|| png::encode(w, h, &Picture::Rgb(&places().map(transmitted).collect::<Vec<_>>()), ""))
+            .then(|| png::encode(w, h, &ImageData::Rgb(&places().map(transmitted).collect::<Vec<_>>()), ""))
             .transpose()?;
         let normal = |(x, y): (u32, u32)| {
             let slope = self.swatch.slope(scaled(x, w, sw), scaled(y, h, sh));
@@ -226,9 +226,9 @@ impl Sheet<'_> {
             n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5) as u8)
         };
         let normals = (pictured && self.raised)
-            .then(|| png::encode(w, h, &Picture::Linear(&places().map(normal).collect::<Vec<_>>()), ""))
+            .then(|| png::encode(w, h, &ImageData::Linear(&places().map(normal).collect::<Vec<_>>()), ""))
             .transpose()?;
-        Ok(Drawn { reflected: Some(reflected), transmitted, normals })
+        Ok(EncodedImages { reflected: Some(reflected), transmitted, normals })
     }
 
     fn material(&self, swatch: &Swatch<'_>, dye: Dye, textures: [Option<usize>; 3], number: usize) -> Material {

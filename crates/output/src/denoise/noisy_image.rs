@@ -4,7 +4,7 @@
 pub(super) type Rgb = [f32; 3];
 
 /// Noisy image, row by row from the top. All its layers have `size` pixels.
-pub(super) struct Picture<'a> {
+pub(super) struct NoisyImage<'a> {
     /// Width and height.
     pub(super) size: [u32; 2],
     pub(super) noisy: &'a [Rgb],
@@ -22,7 +22,7 @@ pub(super) enum Kind<'a> {
     Radiance { albedo: &'a [Rgb], normal: &'a [Rgb] },
 }
 
-impl Picture<'_> {
+impl NoisyImage<'_> {
     /// Returns the number of pixels.
     ///
     /// # Panics

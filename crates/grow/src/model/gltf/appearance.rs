@@ -6,7 +6,7 @@ use super::super::document::{
 };
 use super::super::files::Files;
 use super::super::notes::Notes;
-use super::super::settle::{Wrong, fraction};
+use super::super::settle::{ModelError, fraction};
 use super::super::uri::{Target, follow};
 use super::accessors::Accessors;
 use super::item;
@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Surface of a material, and how to read the primitives that use it.
-pub(super) struct Look {
+pub(super) struct Appearance {
     pub(super) surface: Surface,
     pub(super) slot: Slot,
     /// Wrap modes of the alpha mask's picture.
@@ -31,7 +31,7 @@ pub(super) struct Look {
     pub(super) absent: bool,
 }
 
-impl Look {
+impl Appearance {
     /// Returns whether the surface has any picture.
     pub(super) fn has_pictures(&self) -> bool {
         let Surface { picture, mask, relief, transmission, .. } = &self.surface;
@@ -56,7 +56,7 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    fn of(set: usize, extensions: &Map<String, Value>) -> Result<Self, Wrong> {
+    fn of(set: usize, extensions: &Map<String, Value>) -> Result<Self, ModelError> {
         let transform: Option<TextureTransform> = extension(extensions, TEXTURE_TRANSFORM)?;
         let set = transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(set);
         Ok(Self { set, transform: transform.map(|t| TextureTransform { tex_coord: None, ..t }) })
@@ -79,7 +79,7 @@ struct Base<'a> {
 }
 
 impl<'a> Base<'a> {
-    fn of(material: &'a Material) -> Result<Self, Wrong> {
+    fn of(material: &'a Material) -> Result<Self, ModelError> {
         if let Some(of) = extension::<SpecularGlossiness>(&material.extensions, SPECULAR_GLOSSINESS)? {
             return Ok(Self {
                 factor: of.diffuse_factor.unwrap_or([1.0; 4]),
@@ -108,7 +108,7 @@ struct Pictured {
 type Key = (usize, [u32; 2], bool);
 
 /// Reader of materials, which decodes each picture once.
-pub(super) struct Looks<'a, 'f> {
+pub(super) struct AppearanceReader<'a, 'f> {
     document: &'a Document,
     accessors: &'a Accessors<'a>,
     pub(super) files: Files<'f>,
@@ -119,14 +119,14 @@ pub(super) struct Looks<'a, 'f> {
     masks: BTreeMap<(usize, u8), Option<Arc<AlphaMask>>>,
 }
 
-impl<'a, 'f> Looks<'a, 'f> {
+impl<'a, 'f> AppearanceReader<'a, 'f> {
     pub(super) fn new(document: &'a Document, accessors: &'a Accessors<'a>, files: Files<'f>, notes: Notes) -> Self {
         let (textures, normals, masks) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         Self { document, accessors, files, notes, textures, normals, masks }
     }
 
     /// Reads the material with this index.
-    pub(super) fn look(&mut self, index: usize, material: &Material) -> Result<Look, Wrong> {
+    pub(super) fn appearance(&mut self, index: usize, material: &Material) -> Result<Appearance, ModelError> {
         let name = material.name.clone().unwrap_or_else(|| format!("material {index}"));
         warn_of_material(material, &name, &mut self.notes);
         let cutoff = match material.alpha_mode.as_deref() {
@@ -142,7 +142,7 @@ impl<'a, 'f> Looks<'a, 'f> {
             Some(info) => Some(self.texture(info.index, cutoff <= 0.0)?),
             None => None,
         };
-        let mut look = Look {
+        let mut appearance = Appearance {
             surface: Surface {
                 name,
                 color: base,
@@ -157,56 +157,56 @@ impl<'a, 'f> Looks<'a, 'f> {
             absent: false,
         };
         if cutoff > 0.0 {
-            self.cut(&mut look, cutoff / fraction(opacity), picture.as_ref());
+            self.cut(&mut appearance, cutoff / fraction(opacity), picture.as_ref());
         }
-        self.transmit(&mut look, material, base, &mut slots)?;
-        self.raise(&mut look, material, &mut slots)?;
-        look.slot = slots.0.unwrap_or_default();
-        Ok(look)
+        self.transmit(&mut appearance, material, base, &mut slots)?;
+        self.raise(&mut appearance, material, &mut slots)?;
+        appearance.slot = slots.0.unwrap_or_default();
+        Ok(appearance)
     }
 
     /// Cuts a surface where the alpha of its picture is below `least`, 0 to 1.
-    fn cut(&mut self, look: &mut Look, least: f32, picture: Option<&Pictured>) {
+    fn cut(&mut self, appearance: &mut Appearance, least: f32, picture: Option<&Pictured>) {
         // Smallest opaque alpha of a texel, 0 to 255.
         let least = (least * 255.0).ceil();
-        look.absent = least > 255.0;
-        if let (Some(Pictured { image, texture }), false) = (picture, look.absent) {
+        appearance.absent = least > 255.0;
+        if let (Some(Pictured { image, texture }), false) = (picture, appearance.absent) {
             let mask = || texture.alpha_mask_from(least as u8).map(Arc::new);
-            look.surface.mask.clone_from(self.masks.entry((*image, least as u8)).or_insert_with(mask));
+            appearance.surface.mask.clone_from(self.masks.entry((*image, least as u8)).or_insert_with(mask));
         }
     }
 
     /// Reads the transmission of a thin sheet.
     fn transmit(
         &mut self,
-        look: &mut Look,
+        appearance: &mut Appearance,
         material: &Material,
         base: [f32; 3],
         slots: &mut Slots,
-    ) -> Result<(), Wrong> {
+    ) -> Result<(), ModelError> {
         if let Some(of) = extension::<DiffuseTransmission>(&material.extensions, DIFFUSE_TRANSMISSION)? {
             let mut picture = None;
             if let Some(info) = &of.diffuse_transmission_color_texture {
                 if slots.takes(Some(&Slot::of(info.tex_coord, &info.extensions)?)) {
                     picture = Some(self.texture(info.index, true)?.texture);
                 } else {
-                    self.other_coordinates("transmission", &look.surface.name);
+                    self.other_coordinates("transmission", &appearance.surface.name);
                 }
             }
             let color = of.diffuse_transmission_color_factor.unwrap_or([1.0; 3]);
-            look.pass(fraction(of.diffuse_transmission_factor), color.map(fraction), picture);
+            appearance.pass(fraction(of.diffuse_transmission_factor), color.map(fraction), picture);
         } else if let Some(share) = material.extensions.get(TRANSMISSION) {
             let share = number(share, "transmissionFactor").unwrap_or(0.0);
-            look.pass(share, base, look.surface.picture.clone());
+            appearance.pass(share, base, appearance.surface.picture.clone());
         }
         Ok(())
     }
 
     /// Reads the normal map.
-    fn raise(&mut self, look: &mut Look, material: &Material, slots: &mut Slots) -> Result<(), Wrong> {
+    fn raise(&mut self, appearance: &mut Appearance, material: &Material, slots: &mut Slots) -> Result<(), ModelError> {
         let Some(info) = &material.normal_texture else { return Ok(()) };
         if !slots.takes(Some(&Slot::of(info.tex_coord, &info.extensions)?)) {
-            self.other_coordinates("normal", &look.surface.name);
+            self.other_coordinates("normal", &appearance.surface.name);
             return Ok(());
         }
         let (image, wrap) = self.image(info.index)?;
@@ -216,7 +216,7 @@ impl<'a, 'f> Looks<'a, 'f> {
             self.normals.insert(key, Arc::new(NormalMap::from_picture(&picture)));
         }
         let strength = info.scale.filter(|s| s.is_finite()).unwrap_or(1.0);
-        look.surface.relief = Some(NormalTexture { normals: self.normals[&key].clone(), strength });
+        appearance.surface.relief = Some(NormalTexture { normals: self.normals[&key].clone(), strength });
         Ok(())
     }
 
@@ -226,7 +226,7 @@ impl<'a, 'f> Looks<'a, 'f> {
     }
 
     /// Returns a texture of colours; without its alpha if `opaque`.
-    fn texture(&mut self, index: usize, opaque: bool) -> Result<Pictured, Wrong> {
+    fn texture(&mut self, index: usize, opaque: bool) -> Result<Pictured, ModelError> {
         let (image, wrap) = self.image(index)?;
         let key = (image, wrap, opaque);
         if let Some(known) = self.textures.get(&key) {
@@ -238,12 +238,12 @@ impl<'a, 'f> Looks<'a, 'f> {
     }
 
     /// Returns the index of a texture's image, and its wrap modes.
-    fn image(&self, texture: usize) -> Result<(usize, [u32; 2]), Wrong> {
+    fn image(&self, texture: usize) -> Result<(usize, [u32; 2]), ModelError> {
         let of = item(&self.document.textures, texture, "texture")?;
         let image = of.source.ok_or_else(|| {
             let names: Vec<&str> = of.extensions.keys().map(String::as_str).collect();
             let only = if names.is_empty() { String::new() } else { format!(", only that of {}", names.join(", ")) };
-            Wrong {
+            ModelError {
                 what: format!("texture {texture} has no PNG or JPEG image{only}"),
                 help: "export its pictures as PNG or JPEG",
             }
@@ -253,7 +253,7 @@ impl<'a, 'f> Looks<'a, 'f> {
         Ok((image, sampler.map_or([REPEAT; 2], |s| [code(s.wrap_s), code(s.wrap_t)])))
     }
 
-    fn decode(&mut self, (image, wrap, opaque): Key, space: ColorSpace) -> Result<Texture, Wrong> {
+    fn decode(&mut self, (image, wrap, opaque): Key, space: ColorSpace) -> Result<Texture, ModelError> {
         let source = item(&self.document.images, image, "image")?;
         let data: Cow<'_, [u8]> = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => match follow(uri)? {
@@ -292,7 +292,7 @@ impl Slots {
 }
 
 /// Reads the data of an extension, if the object has it.
-fn extension<T: DeserializeOwned>(of: &Map<String, Value>, name: &str) -> Result<Option<T>, Wrong> {
+fn extension<T: DeserializeOwned>(of: &Map<String, Value>, name: &str) -> Result<Option<T>, ModelError> {
     let read = |data: &Value| serde_json::from_value(data.clone()).map_err(|e| format!("{name} cannot be read: {e}"));
     Ok(of.get(name).map(read).transpose()?)
 }

@@ -8,7 +8,7 @@ use crate::model::split::Split;
 use crate::read::native;
 use furrow_base::Result;
 use furrow_field::record::SpeciesRecord;
-use furrow_output::Picture;
+use furrow_output::ImageData;
 use furrow_render::scene::tag::Class;
 use furrow_report::{count, data_url, percent};
 use maud::{Markup, html};
@@ -31,16 +31,17 @@ pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
         .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
         .collect();
     let samples: Vec<Sample> = all.par_iter().map(|name| native::sample(set, name)).collect::<Result<_>>()?;
-    let facts: Vec<Facts> = samples.iter().map(|sample| Facts::of(&sample.record, &set.recipe.species)).collect();
-    let unusual = unusual(&facts);
+    let properties: Vec<ImageProperties> =
+        samples.iter().map(|sample| ImageProperties::of(&sample.record, &set.recipe.species)).collect();
+    let unusual = unusual(&properties);
     let cards: Vec<Markup> = samples
         .par_iter()
-        .zip(&facts)
+        .zip(&properties)
         .zip(&unusual)
-        .map(|((sample, facts), unusual)| card(sample, facts, *unusual, set.recipe.pack.is_none()))
+        .map(|((sample, properties), unusual)| card(sample, properties, *unusual, set.recipe.pack.is_none()))
         .collect::<Result<_>>()?;
     Ok(html! {
-        (tools(&facts))
+        (tools(&properties))
         div.sheet { @for card in &cards { (card) } }
         dialog #large {
             form method="dialog" { button { "Close" } }
@@ -51,7 +52,7 @@ pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
 }
 
 /// Properties for filtering and sorting images.
-struct Facts {
+struct ImageProperties {
     /// Fractions of the image covered by crop and by weed, percent.
     cover: [f64; 2],
     /// BBCH stage of the oldest crop plant.
@@ -60,7 +61,7 @@ struct Facts {
     species: Vec<String>,
 }
 
-impl Facts {
+impl ImageProperties {
     fn of(record: &Record, table: &[SpeciesRecord]) -> Self {
         let pixels = f64::from(record.width) * f64::from(record.height);
         let share = |class: Class| {
@@ -82,15 +83,15 @@ impl Facts {
 
 /// Returns a measure of how unusual each image is: the largest distance of one of its values from the mean, in standard
 /// deviations.
-fn unusual(facts: &[Facts]) -> Vec<f64> {
-    let mut far = vec![0.0_f64; facts.len()];
+fn unusual(properties: &[ImageProperties]) -> Vec<f64> {
+    let mut far = vec![0.0_f64; properties.len()];
     for k in 0..3 {
-        let known = || facts.iter().map(|f| f.values()[k]).filter(|v| v.is_finite());
+        let known = || properties.iter().map(|f| f.values()[k]).filter(|v| v.is_finite());
         let n = known().count().max(1) as f64;
         let mean = known().sum::<f64>() / n;
         let sd = (known().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
-        for (far, facts) in far.iter_mut().zip(facts) {
-            let distance = (facts.values()[k] - mean).abs() / sd.max(1e-9);
+        for (far, properties) in far.iter_mut().zip(properties) {
+            let distance = (properties.values()[k] - mean).abs() / sd.max(1e-9);
             if distance.is_finite() && sd > 0.0 {
                 *far = far.max(distance);
             }
@@ -100,8 +101,8 @@ fn unusual(facts: &[Facts]) -> Vec<f64> {
 }
 
 /// Returns the controls for filtering and sorting; they are hidden without scripts.
-fn tools(facts: &[Facts]) -> Markup {
-    let mut species: Vec<&String> = facts.iter().flat_map(|f| &f.species).collect();
+fn tools(properties: &[ImageProperties]) -> Markup {
+    let mut species: Vec<&String> = properties.iter().flat_map(|f| &f.species).collect();
     species.sort();
     species.dedup();
     html! {
@@ -141,7 +142,7 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
 }
 
 /// Returns the card of one image: image, labels, caption.
-fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result<Markup> {
+fn card(sample: &Sample, properties: &ImageProperties, unusual: f64, has_files: bool) -> Result<Markup> {
     let Record { name, source, split, width, height, .. } = &sample.record;
     // Labels without a rendered image are shown on a uniform background.
     let earth = if sample.rgb.is_empty() { vec![EARTH; sample.pixels()] } else { Vec::new() };
@@ -149,10 +150,10 @@ fn card(sample: &Sample, facts: &Facts, unusual: f64, has_files: bool) -> Result
     let (shown, full) = if earth.is_empty() { (&sample.rgb, photograph) } else { (&earth, "semantics.png") };
     let (w, h, rgb) = furrow_output::shrink(*width, *height, shown, SIDE);
     let photograph = data_url("jpeg", &furrow_output::encode_jpeg(w, h, &rgb, QUALITY)?);
-    let labels = data_url("png", &furrow_output::encode_png(w, h, &Picture::Rgba(&overlay(sample, w, h)), "")?);
+    let labels = data_url("png", &furrow_output::encode_png(w, h, &ImageData::Rgba(&overlay(sample, w, h)), "")?);
     Ok(html! {
-        figure.shot data-name=(name) data-crop=(rounded(facts.cover[0])) data-weed=(rounded(facts.cover[1]))
-            data-stage=[facts.stage] data-unusual=(rounded(unusual)) data-species=(facts.species.join("|")) {
+        figure.shot data-name=(name) data-crop=(rounded(properties.cover[0])) data-weed=(rounded(properties.cover[1]))
+            data-stage=[properties.stage] data-unusual=(rounded(unusual)) data-species=(properties.species.join("|")) {
             label title=[source.as_ref()] {
                 input type="checkbox";
                 span.frame {
@@ -244,15 +245,20 @@ mod tests {
 
     #[test]
     fn the_image_that_is_unlike_the_others_is_the_most_unusual() {
-        let facts = |crop: f64, stage| Facts { cover: [crop, 1.0], stage, species: Vec::new() };
-        let all = [facts(10.0, Some(14)), facts(11.0, Some(14)), facts(12.0, None), facts(60.0, Some(14))];
+        let properties = |crop: f64, stage| ImageProperties { cover: [crop, 1.0], stage, species: Vec::new() };
+        let all = [
+            properties(10.0, Some(14)),
+            properties(11.0, Some(14)),
+            properties(12.0, None),
+            properties(60.0, Some(14)),
+        ];
         let far = unusual(&all);
         assert!(far[3] > 1.5 && far[..3].iter().all(|f| *f < far[3]), "{far:?}");
-        assert_eq!(unusual(&[facts(1.0, None)]), [0.0]);
+        assert_eq!(unusual(&[properties(1.0, None)]), [0.0]);
     }
 
     #[test]
-    fn every_split_is_shown_as_far_as_it_goes() {
+    fn every_split_is_shown_in_the_contact_sheet() {
         assert_eq!(chosen([10, 1, 1]), [(0..10).collect(), vec![0], vec![0]]);
         let many = chosen([80_000, 10_000, 10_000]);
         assert_eq!(many.each_ref().map(Vec::len), [8, 8, 8]);

@@ -2,7 +2,7 @@
 
 /// Generated texture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drawn {
+pub struct GeneratedTexture {
     /// Width, pixels.
     pub width: u32,
     /// Height, pixels.
@@ -12,12 +12,12 @@ pub struct Drawn {
     /// `true` if every pixel is opaque, so that no alpha channel is written.
     pub opaque: bool,
     /// Heights, if the recipe defines relief.
-    pub relief: Option<Grey>,
+    pub relief: Option<HeightImage>,
 }
 
 /// Height map with 16-bit grey values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grey {
+pub struct HeightImage {
     /// Width, pixels.
     pub width: u32,
     /// Height, pixels.
@@ -28,7 +28,7 @@ pub struct Grey {
     pub range_mm: f32,
 }
 
-impl Grey {
+impl HeightImage {
     /// Quantises heights in mm, clamped to 0..=`range_mm`. Only twelve bits are kept, because finer steps are noise
     /// that does not compress.
     pub(super) fn from_mm(width: u32, height: u32, heights: &[f32], range_mm: f32) -> Self {

@@ -13,9 +13,9 @@ use crate::make::finish::finish;
 use crate::make::generate::{MOST_AT_ONCE, formatted};
 use crate::make::meter;
 use crate::make::plan::{Draft, Order, draft};
-use crate::make::render::{LastField, RenderedSample, of_day, render};
+use crate::make::render::{CachedField, RenderedSample, of_day, render};
 use crate::model::invariants;
-use crate::model::recipe::{FILE, Made, Recipe, compact};
+use crate::model::recipe::{FILE, ImageOrigin, Recipe, compact};
 use crate::model::record::{CaptureRecord, Record};
 use crate::model::split::{Shares, Split};
 use crate::read::checksum_record::{BLOCK, ChecksumRecord, write_files};
@@ -26,7 +26,7 @@ use crate::read::set::Set;
 use crate::{File, report};
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, SceneFile, Threads};
-use furrow_render::render::Watch;
+use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Quality, RenderOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -60,7 +60,7 @@ const REPORTED: u64 = 24;
 
 /// Estimated cost of a dataset.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bill {
+pub struct CostEstimate {
     /// Number of images.
     pub images: u64,
     /// Number of fields that the images show.
@@ -89,7 +89,7 @@ pub struct Bill {
     pub image_memory: u64,
 }
 
-impl Bill {
+impl CostEstimate {
     /// Returns the largest memory of a process that renders on `cores` cores, bytes.
     pub fn memory(&self, cores: usize) -> u64 {
         // Images of one field are rendered one after another, so at most one image per scene construction is in
@@ -126,13 +126,13 @@ pub enum Step {
 ///
 /// # Errors
 /// The errors of [`plan`](crate::make::plan::plan()), for example if the folder contains another dataset.
-pub fn bill(
+pub fn estimate_cost(
     folder: &Path,
     order: &Order,
     threads: &Threads,
     begun: &dyn Fn(Step),
     stop: &Arc<AtomicBool>,
-) -> Result<(Bill, Vec<String>)> {
+) -> Result<(CostEstimate, Vec<String>)> {
     let Draft { recipe, files, mut warnings, scene, scene_sha256 } = draft(order, stop)?;
     let recipe = merged_recipe(folder, recipe, order.omit.is_some())?;
     // The run itself will need the same time as this process until here, for checking the order.
@@ -159,7 +159,7 @@ pub fn bill(
     begun(Step::Lists);
     let peak = meter::peak_memory().unwrap_or(0);
     let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
-    let all = threads.install(|| Together::of(&recipe, &files, &probes))?;
+    let all = threads.install(|| SharedFiles::of(&recipe, &files, &probes))?;
     let growings = recipe.count.div_ceil(recipe.captures_a_day());
     let (count, spp) = (recipe.count as f64, f64::from(images.spp));
     let (grow_s, sample_s) = (growings as f64 * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
@@ -173,7 +173,7 @@ pub fn bill(
             number += images * probes.first().map_or(0, |p| p.lying(&p.files[&split]));
         }
     }
-    let bill = Bill {
+    let cost = CostEstimate {
         images: recipe.count,
         fields: recipe.count.div_ceil(recipe.captures()),
         growings,
@@ -188,7 +188,7 @@ pub fn bill(
         base_memory,
         image_memory: (peak.saturating_sub(base_memory) as f64 * images.largest_over(&probes)) as u64,
     };
-    Ok((bill, warnings))
+    Ok((cost, warnings))
 }
 
 /// Returns the indices of possible probes: the first, the middle and the last image, then images at successively halved
@@ -279,7 +279,7 @@ impl Probe {
 impl Images {
     fn of(recipe: &Recipe, scene_sha256: String, scene: SceneFile) -> Result<Self> {
         let mut recipe = recipe.clone();
-        if let Made::Rendered(rendering) = &mut recipe.made {
+        if let ImageOrigin::Rendered(rendering) = &mut recipe.made {
             rendering.scene_sha256 = scene_sha256;
         }
         let options = recipe.rendering()?.options();
@@ -310,7 +310,7 @@ impl Images {
     /// Renders an image twice with few samples, and measures times and file sizes.
     fn probe(&self, index: u64, stop: &Arc<AtomicBool>) -> Result<Probe> {
         let scene = self.scene.clone().until(stop);
-        let mut kept = LastField::default();
+        let mut kept = CachedField::default();
         let begin = cpu()?;
         let field = kept.at(&self.set, &scene, index)?.field;
         let captures = field.grown().captures.iter().take_while(|capture| capture.frame == 0);
@@ -318,7 +318,7 @@ impl Images {
         let grown = cpu()?;
         let mut draw = |renderer: &Renderer| {
             let begin = cpu()?;
-            let made = render(&self.set, &scene, index, renderer, Watch { done: &|_| (), stop }, &mut kept)?;
+            let made = render(&self.set, &scene, index, renderer, RenderMonitor { done: &|_| (), stop }, &mut kept)?;
             // Called only to measure its time; the faults are ignored, because with few samples the classes by samples
             // and at the pixel centre differ more than in the dataset.
             let _ = invariants::faults(&self.set.recipe, &made.sample);
@@ -382,17 +382,17 @@ fn length(files: &[File]) -> u64 {
 }
 
 /// Estimated cost of the files that belong to the whole dataset.
-struct Together {
+struct SharedFiles {
     files: u64,
     bytes: f64,
     core_s: f64,
 }
 
-impl Together {
+impl SharedFiles {
     /// Estimates the cost for images like `probes` and a dataset that contains the files of `scene`.
     fn of(recipe: &Recipe, scene: &[File], probes: &[Probe]) -> Result<Self> {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
-        let small = Small::of(recipe, probes, 1);
+        let small = ProbeDataset::of(recipe, probes, 1);
         small.write(folder.path(), scene)?;
         let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count() as u64;
         let per_field = small.recipe.captures();
@@ -413,7 +413,7 @@ impl Together {
         let days = (recipe.days().len() as u64).saturating_sub(1);
         let later_days = whole_fields * days + of_cut.div_ceil(recipe.captures_a_day()).saturating_sub(1);
         let of_later_days = if later_days > 0 {
-            later_days * Small::of(recipe, probes, 2).files_of_a_field(scene, splits)?.saturating_sub(each)
+            later_days * ProbeDataset::of(recipe, probes, 2).files_of_a_field(scene, splits)?.saturating_sub(each)
         } else {
             0
         };
@@ -441,18 +441,18 @@ struct Finished {
 }
 
 /// A small dataset of copies of the probes, with the splits and cameras of the planned one.
-struct Small<'a> {
+struct ProbeDataset<'a> {
     recipe: Recipe,
     probes: &'a [Probe],
 }
 
-impl<'a> Small<'a> {
+impl<'a> ProbeDataset<'a> {
     /// Creates the recipe, with one frame per camera on each of the first `days` days.
     fn of(recipe: &Recipe, probes: &'a [Probe], days: usize) -> Self {
         let mut small = recipe.clone();
         small.split = Shares(images_of_splits(recipe).map(|images| u32::from(images > 0)));
         let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
-        if let Made::Rendered(rendering) = &mut small.made {
+        if let ImageOrigin::Rendered(rendering) = &mut small.made {
             rendering.days.truncate(days);
             rendering.captures = recipe.captures_a_day().min(cameras as u64) * rendering.days.len().max(1) as u64;
         }
@@ -542,7 +542,7 @@ mod tests {
     /// shards with eight images in progress each.
     #[test]
     fn images_of_one_field_are_not_shared_out() {
-        let bill = |growings| Bill {
+        let cost = |growings| CostEstimate {
             images: 1000,
             fields: growings,
             growings,
@@ -557,7 +557,7 @@ mod tests {
             base_memory: 7,
             image_memory: 100,
         };
-        assert_eq!((bill(1).shards(8), bill(1).memory(8)), (1, 107));
-        assert_eq!((bill(1000).shards(8), bill(1000).memory(8)), (24, 807));
+        assert_eq!((cost(1).shards(8), cost(1).memory(8)), (1, 107));
+        assert_eq!((cost(1000).shards(8), cost(1000).memory(8)), (24, 807));
     }
 }

@@ -4,25 +4,25 @@ use super::estimate::{Share, usual_memory};
 use furrow_base::geometry::Cost;
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};
-use furrow_optics::texture::{Allowance, Header, Need};
+use furrow_optics::texture::{Header, MemoryLimit, Need};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Key of a counted image: its file, its height map's file (empty if none), and a number for other parameters that it depends on.
-pub(super) type Picture = (PathBuf, PathBuf, u32);
+pub(super) type ImageKey = (PathBuf, PathBuf, u32);
 
 /// Memory needs of the images of the current field.
 #[derive(Clone, Default)]
-pub(super) struct Pictures {
+pub(super) struct ImageMemory {
     /// Memory limit, bytes; [`usual_memory`] if `None`.
     memory: Option<u64>,
     /// Needs of all images counted so far, for this field or earlier ones.
-    needs: BTreeMap<Picture, Need>,
+    needs: BTreeMap<ImageKey, Need>,
     /// Images of the current field.
-    asked: BTreeSet<Picture>,
+    asked: BTreeSet<ImageKey>,
 }
 
-impl Pictures {
+impl ImageMemory {
     /// Starts a new field with this memory limit in bytes.
     pub(super) fn begin(&mut self, memory: Option<u64>) {
         self.memory = memory;
@@ -30,7 +30,7 @@ impl Pictures {
     }
 
     /// Counts an image by its headers. If all images together exceed the limit, returns an error about the larger of its files.
-    pub(super) fn count(&mut self, picture: &Picture, need: fn(&Header, Option<&Header>) -> Need) -> Result<()> {
+    pub(super) fn count(&mut self, picture: &ImageKey, need: fn(&Header, Option<&Header>) -> Need) -> Result<()> {
         let need = match self.needs.get(picture) {
             Some(known) => Some(*known),
             None => self.weigh(picture, need)?,
@@ -44,13 +44,13 @@ impl Pictures {
     /// Returns an error if reading an environment map would take too much memory.
     pub(super) fn check_panorama(&self, file: &Path) -> Result<()> {
         let Some(header) = Header::of_panorama(file) else { return Ok(()) };
-        let refused = |what: String| Error::input(what).help(Allowance::HELP).in_file(file);
+        let refused = |what: String| Error::input(what).help(MemoryLimit::HELP).in_file(file);
         self.allowance().take(&header, header.panorama()).map_err(refused)
     }
 
     /// Returns the memory need of an image, checked against the limit together with the other images of the field. Returns `None` if the
     /// header cannot be read; decoding then reports the error.
-    fn weigh(&self, (file, beside, _): &Picture, need: fn(&Header, Option<&Header>) -> Need) -> Result<Option<Need>> {
+    fn weigh(&self, (file, beside, _): &ImageKey, need: fn(&Header, Option<&Header>) -> Need) -> Result<Option<Need>> {
         let Some(header) = Header::of_file(file) else { return Ok(None) };
         let height = if beside.as_os_str().is_empty() { None } else { Header::of_file(beside) };
         let (larger, of) = match &height {
@@ -58,31 +58,31 @@ impl Pictures {
             _ => (file, &header),
         };
         let need = need(&header, height.as_ref());
-        let refused = |what: String| Error::input(what).help(Allowance::HELP).in_file(larger);
+        let refused = |what: String| Error::input(what).help(MemoryLimit::HELP).in_file(larger);
         self.allowance().take(of, need).map_err(refused)?;
         Ok(Some(need))
     }
 
     /// Adds an image with a known need to the current field.
-    pub(super) fn note(&mut self, picture: Picture, need: Need) {
+    pub(super) fn note(&mut self, picture: ImageKey, need: Need) {
         self.needs.insert(picture.clone(), need);
         self.asked.insert(picture);
     }
 
     /// Adds images that were counted before to the current field.
-    pub(super) fn again(&mut self, pictures: &[Picture]) {
+    pub(super) fn again(&mut self, pictures: &[ImageKey]) {
         self.asked.extend(pictures.iter().cloned());
     }
 
     /// Returns the memory left for further images.
-    pub(super) fn allowance(&self) -> Allowance {
+    pub(super) fn allowance(&self) -> MemoryLimit {
         let most = self.memory.unwrap_or_else(usual_memory) as f64;
-        Allowance { most, taken: self.asked.iter().filter_map(|picture| self.needs.get(picture)).copied().sum() }
+        MemoryLimit { most, taken: self.asked.iter().filter_map(|picture| self.needs.get(picture)).copied().sum() }
     }
 
     /// Returns the memory cost of images by the places of the scene file that name them. An image counts at the first place that names it.
     /// Temporary memory for decoding is added at one place only, the one that needs most.
-    pub(super) fn shares(&self, places: Vec<(Vec<Step<'static>>, Vec<Picture>)>) -> Vec<Share> {
+    pub(super) fn shares(&self, places: Vec<(Vec<Step<'static>>, Vec<ImageKey>)>) -> Vec<Share> {
         let mut seen = BTreeSet::new();
         let mut all = Vec::new();
         for (at, mut pictures) in places {
@@ -111,15 +111,15 @@ fn name(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn leaf(name: &str) -> Picture {
+    fn leaf(name: &str) -> ImageKey {
         (Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../textures/leaf/{name}.png")), PathBuf::new(), 0)
     }
 
     /// Expected: an image counts once for each field that uses it, whether or not an earlier field did; the error names its file.
     #[test]
     fn each_field_counts_its_pictures_once() {
-        let mut pictures = Pictures::default();
-        let taken = |pictures: &Pictures| pictures.allowance().taken;
+        let mut pictures = ImageMemory::default();
+        let taken = |pictures: &ImageMemory| pictures.allowance().taken;
         pictures.count(&leaf("rape"), Header::leaf).unwrap();
         let one = taken(&pictures);
         pictures.count(&leaf("rape"), Header::leaf).unwrap();
@@ -137,7 +137,7 @@ mod tests {
     /// Expected: an image named at two places counts once, and the shares add up to the total of all images.
     #[test]
     fn shares_are_what_all_take() {
-        let mut pictures = Pictures::default();
+        let mut pictures = ImageMemory::default();
         for name in ["rape", "grass"] {
             pictures.count(&leaf(name), Header::leaf).unwrap();
         }

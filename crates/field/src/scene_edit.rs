@@ -5,7 +5,7 @@ use super::desc::{FieldDesc, SpeciesDesc};
 
 /// Functions that edit the descriptions after the files were read and before the field is built.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Growing {
+pub struct SceneEdit {
     /// Edits the description of the scene file.
     pub page: Option<fn(&mut FieldDesc)>,
     /// Edits the description of each species file.

@@ -6,7 +6,7 @@ use furrow_base::Result;
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Order;
-use furrow_dataset::make::bill::{self, Bill, Step};
+use furrow_dataset::make::cost_estimate::{self, CostEstimate, Step};
 use furrow_job::Threads;
 use furrow_report::{count, number};
 use std::path::{Path, PathBuf};
@@ -40,13 +40,14 @@ pub(crate) fn run(
     let threads = Threads::new(threads)?;
     let growing = Line::begin(quiet);
     order.progress.clone_from(growing.progress());
-    let told = bill::bill(folder, &order, &threads, &|step| growing.say(&words(step)), signals.heed());
+    let outcome =
+        cost_estimate::estimate_cost(folder, &order, &threads, &|step| growing.say(&words(step)), signals.catch());
     growing.end();
-    let (bill, warnings) = told?;
+    let (cost, warnings) = outcome?;
     for warning in warnings {
-        furrow_cli::tell!("warning: {warning}");
+        furrow_cli::message!("warning: {warning}");
     }
-    cli::print_rows(&rows(folder, &bill, threads.count()))?;
+    cli::print_rows(&rows(folder, &cost, threads.count()))?;
     Ok(Vec::new())
 }
 
@@ -71,17 +72,17 @@ fn listed(names: &[String]) -> String {
 }
 
 /// Formats an estimate as rows of a table.
-fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
-    let Bill { images, fields, core_s, grow_s, sample_s, bytes, files, .. } = *bill;
+fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> {
+    let CostEstimate { images, fields, core_s, grow_s, sample_s, bytes, files, .. } = *cost;
     let row = |name: &str, words: String| [name.to_owned(), words];
     let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
-    let mut probes: Vec<String> = bill.probes.iter().map(|index| furrow_dataset::Set::name(*index)).collect();
+    let mut probes: Vec<String> = cost.probes.iter().map(|index| furrow_dataset::Set::name(*index)).collect();
     probes.sort();
-    let [fewer, more] = bill.spp;
+    let [fewer, more] = cost.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
     let with = count(threads as u64, "thread", "threads");
     let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
-    let memory = (bill.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
+    let memory = (cost.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
     vec![
         row("from", format!("{} with {samples} samples per pixel", listed(&probes))),
         row(
@@ -102,8 +103,8 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
             "memory",
             format!(
                 "{} GiB for one image at a time, {} GiB with {}",
-                number(bill.memory(1) as f64 / GIB),
-                number(bill.memory(threads) as f64 / GIB),
+                number(cost.memory(1) as f64 / GIB),
+                number(cost.memory(threads) as f64 / GIB),
                 count(threads as u64, "core", "cores")
             ),
         ),
@@ -112,8 +113,8 @@ fn rows(folder: &Path, bill: &Bill, threads: usize) -> Vec<[String; 2]> {
             format!(
                 "trace dataset emit {} --scheduler slurm --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
                 folder.display(),
-                bill.shards(CORES),
-                number(core_s / 3600.0 / f64::from(CORES) / bill.shards(CORES) as f64)
+                cost.shards(CORES),
+                number(core_s / 3600.0 / f64::from(CORES) / cost.shards(CORES) as f64)
             ),
         ),
     ]
