@@ -382,3 +382,8 @@ fn is_zero(n: &usize) -> bool {
 fn is_false(b: &bool) -> bool {
     !b
 }
+
+/// Returns an item by its index; the error is a message.
+pub(super) fn item<'a, T>(of: &'a [T], index: usize, what: &str) -> Result<&'a T, String> {
+    of.get(index).ok_or_else(|| format!("{what} {index} is referenced, but there are {}", of.len()))
+}

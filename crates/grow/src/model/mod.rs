@@ -17,9 +17,9 @@ mod gltf;
 mod notes;
 mod obj;
 mod parts;
-#[cfg(test)]
-mod samples;
 mod settle;
+#[cfg(test)]
+mod tests;
 mod uri;
 
 pub use parts::{Label, Model, ModelPart, Up};

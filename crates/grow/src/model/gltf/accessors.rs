@@ -1,11 +1,10 @@
 //! Numbers in the buffers of a glTF file. Every index and byte range is checked.
 
-use super::super::document::{Document, FLOAT, SparseBytes, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
+use super::super::document::{Document, FLOAT, SparseBytes, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, item};
 use super::super::files::Files;
 use super::super::parts::MOST_TRIANGLES;
 use super::super::settle::ModelError;
 use super::super::uri::{Target, follow};
-use super::item;
 use std::borrow::Cow;
 
 /// Component type of signed 8-bit numbers.

@@ -2,14 +2,13 @@
 
 use super::super::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, MIRRORED_REPEAT, Material, REPEAT,
-    SPECULAR_GLOSSINESS, SpecularGlossiness, TEXTURE_TRANSFORM, TRANSMISSION, TextureInfo, TextureTransform,
+    SPECULAR_GLOSSINESS, SpecularGlossiness, TEXTURE_TRANSFORM, TRANSMISSION, TextureInfo, TextureTransform, item,
 };
 use super::super::files::Files;
 use super::super::notes::Notes;
 use super::super::settle::{ModelError, fraction};
 use super::super::uri::{Target, follow};
 use super::accessors::Accessors;
-use super::item;
 use super::passed_over::warn_of_material;
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::{Vec2, vec2};

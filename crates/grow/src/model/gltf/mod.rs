@@ -10,7 +10,7 @@ mod pose;
 #[cfg(test)]
 mod tests;
 
-use super::document::{Document, Material, Mesh as MeshDesc, Node, Primitive};
+use super::document::{Document, Material, Mesh as MeshDesc, Node, Primitive, item};
 use super::files::Files;
 use super::gather::UnplacedParts;
 use super::glb;
@@ -71,10 +71,6 @@ struct Read {
     bent: bool,
     /// Whether its texture coordinates are missing.
     bare: bool,
-}
-
-fn item<'a, T>(of: &'a [T], index: usize, what: &str) -> Result<&'a T, String> {
-    of.get(index).ok_or_else(|| format!("{what} {index} is referenced, but there are {}", of.len()))
 }
 
 impl Reader<'_> {

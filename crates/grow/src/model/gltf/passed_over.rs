@@ -44,13 +44,15 @@ pub(super) fn check_required(document: &Document) -> Result<(), ModelError> {
 /// Warns of cameras, lights, animations, other scenes, and extensions.
 pub(super) fn warn_of_contents(document: &Document, notes: &mut Notes) {
     let lights = document.extensions.get(LIGHTS).and_then(|of| of.get("lights")).and_then(Value::as_array);
+    // An export of this program has the camera and the lights of its scene, which nobody expects in another one.
+    let foreign = !document.asset.generator.as_ref().is_some_and(|name| name.starts_with("furrow "));
     let counts = [
         (document.cameras.len(), "camera", "cameras"),
         (lights.map_or(0, Vec::len), "light", "lights"),
         (document.animations.len(), "animation", "animations"),
         (document.scenes.len().saturating_sub(1), "other scene", "other scenes"),
     ];
-    let counts = counts.iter().filter(|(n, ..)| *n > 0);
+    let counts = counts.iter().filter(|(n, ..)| *n > 0 && foreign);
     let words: Vec<String> = counts.map(|(n, one, more)| format!("{n} {}", if *n == 1 { one } else { more })).collect();
     if !words.is_empty() {
         notes.add(format!("passed over: {}", words.join(", ")));

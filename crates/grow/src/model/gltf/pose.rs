@@ -1,9 +1,8 @@
 //! Meshes at rest: transforms of nodes, morph targets and skins.
 
-use super::super::document::{Document, Node, Primitive};
+use super::super::document::{Document, Node, Primitive, item};
 use super::super::settle::ModelError;
 use super::accessors::Accessors;
-use super::item;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{DMat3, DMat4, DQuat, DVec3, Vec3};
 

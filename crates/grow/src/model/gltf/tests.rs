@@ -1,6 +1,6 @@
 //! glTF features one by one. Source: Khronos glTF 2.0 specification, and those of its extensions.
 
-use super::super::samples::{self, Bytes, png};
+use super::super::tests::{self, Bytes, png};
 use super::super::{Model, Up};
 use furrow_base::Result;
 use furrow_base::math::{Vec2, Vec3, vec2, vec3};
@@ -28,7 +28,7 @@ fn square(edit: impl FnOnce(&mut Value, &mut Bytes)) -> Result<Model> {
         ],
     });
     edit(&mut document, &mut bytes);
-    samples::load(&[("model.glb", &bytes.glb(document))], Up::Z)
+    tests::load(&[("model.glb", &bytes.glb(document))], Up::Z)
 }
 
 /// Gives the material a picture of two by one texels, red and transparent.
@@ -280,6 +280,11 @@ fn what_is_passed_over_is_named() {
             "passed over: points and lines: `leaf`",
         ]
     );
+    let own = square(|d, _| {
+        d["asset"]["generator"] = json!("furrow 0.1.0");
+        d["cameras"] = json!([{ "type": "perspective" }]);
+    });
+    assert_eq!(own.unwrap().warnings, Vec::<String>::new());
     let bare = square(|d, b| {
         pictured(d, b);
         d["materials"][0]["alphaMode"] = json!("MASK");
@@ -347,5 +352,5 @@ fn a_byte_order_mark_before_the_document_is_ignored() {
     });
     let bytes: Vec<u8> = SQUARE[..9].iter().flat_map(|v| v.to_le_bytes()).collect();
     let text = [b"\xef\xbb\xbf", document.to_string().as_bytes()].concat();
-    assert!(samples::load(&[("model.gltf", &text), ("a.bin", &bytes)], Up::Y).is_ok());
+    assert!(tests::load(&[("model.gltf", &text), ("a.bin", &bytes)], Up::Y).is_ok());
 }

@@ -1,6 +1,6 @@
 //! OBJ and MTL features one by one. Source: the Alias|Wavefront formats, and files as common programs write them.
 
-use super::super::samples::{self, png};
+use super::super::tests::{self, png};
 use super::super::{Model, Up};
 use furrow_base::Result;
 use furrow_base::math::{Vec3, vec2, vec3};
@@ -11,7 +11,7 @@ const GREEN: &str = "newmtl green\nKd 0.1 0.5 0.1\n";
 fn load(obj: &[u8], mtl: &[u8]) -> Result<Model> {
     // The left half of the picture is transparent, and so is its upper half.
     let picture = png(2, &[[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [255, 0, 0, 255]]);
-    samples::load(&[("model.obj", obj), ("m.mtl", mtl), ("a picture.png", &picture)], Up::Z)
+    tests::load(&[("model.obj", obj), ("m.mtl", mtl), ("a picture.png", &picture)], Up::Z)
 }
 
 fn read(obj: &str, mtl: &str) -> Model {
