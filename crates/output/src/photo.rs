@@ -2,7 +2,7 @@
 
 use furrow_base::input;
 use furrow_base::{Error, Result};
-use furrow_optics::texture::picture::{self, CUT_SHORT, Picture, is_cut_short, over_white};
+use furrow_optics::texture::decoded_image::{self, CUT_SHORT, DecodedImage, is_cut_short, over_white};
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::{DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageResult, RgbImage, imageops};
 use std::io::Cursor;
@@ -29,15 +29,15 @@ pub struct Photo<T> {
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB.
 pub fn open_photo(path: &Path) -> Result<Photo<[u8; 3]>> {
     let rgb = |pixels: DynamicImage| pixels.into_rgb8().into_raw().as_chunks::<3>().0.to_vec();
-    Ok(photo_of(picture::read(path, u32::MAX)?, rgb))
+    Ok(photo_of(decoded_image::read(path, u32::MAX)?, rgb))
 }
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit gray.
 pub fn open_gray_photo(path: &Path) -> Result<Photo<u8>> {
-    Ok(photo_of(picture::read(path, u32::MAX)?, |pixels| pixels.into_luma8().into_raw()))
+    Ok(photo_of(decoded_image::read(path, u32::MAX)?, |pixels| pixels.into_luma8().into_raw()))
 }
 
-fn photo_of<T>(picture: Picture, values: impl FnOnce(DynamicImage) -> Vec<T>) -> Photo<T> {
+fn photo_of<T>(picture: DecodedImage, values: impl FnOnce(DynamicImage) -> Vec<T>) -> Photo<T> {
     let (orientation, stored_size) = (picture.orientation, picture.stored_size());
     let (flat, transparent) = over_white(picture.pixels);
     let size = (flat.width(), flat.height());
@@ -52,7 +52,7 @@ pub fn read_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
 
 /// Like [`read_photo`]. Returns an error for a grey image, in which colours cannot be distinguished.
 pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
-    let picture = picture::read(path, u32::MAX)?;
+    let picture = decoded_image::read(path, u32::MAX)?;
     if !picture.pixels.color().has_color() {
         return Err(Error::input("this picture is gray, but colour is required")
             .help("give photographs in red, green and blue")
@@ -65,7 +65,7 @@ pub fn read_color_photo(path: &Path) -> Result<(u32, u32, Vec<[u8; 3]>)> {
 
 /// Returns width and height of a PNG or JPEG photograph as it is shown, from its header.
 pub fn photo_size(path: &Path) -> Result<(u32, u32)> {
-    picture::size(path)
+    decoded_image::size(path)
 }
 
 /// Reads a photograph like [`open_gray_photo`]: width, height, values.

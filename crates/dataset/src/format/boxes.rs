@@ -4,7 +4,7 @@
 //! `data.yaml` has no `path`: Ultralytics then uses the folder of the file, whereas it would search for a relative path
 //! elsewhere. Splits without images are not listed.
 
-use super::{SetWriter, picture};
+use super::{SetWriter, image_file};
 use crate::File;
 use crate::format::labels::Labels;
 use crate::model::recipe::Recipe;
@@ -46,7 +46,7 @@ pub(super) fn files(folder: &str, sample: &Sample, rows: &[String]) -> Result<Ve
     // An empty line distinguishes an image without plants from a truncated file.
     let text = if rows.is_empty() { "\n".to_owned() } else { rows.iter().flat_map(|row| [row, "\n"]).collect() };
     Ok(vec![
-        picture::photograph(sample, &format!("{folder}/images/{split}/{name}"))?,
+        image_file::photograph(sample, &format!("{folder}/images/{split}/{name}"))?,
         File { path: format!("{folder}/labels/{split}/{name}.txt"), bytes: text.into_bytes() },
     ])
 }

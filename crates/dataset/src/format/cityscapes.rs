@@ -15,7 +15,7 @@
 //! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (its evaluation supports street
 //! scenes only: this is the layout, not the benchmark).
 
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use furrow_base::Result;
 use crate::File;
 use crate::format::labels::Labels;
@@ -40,7 +40,7 @@ impl Format for Writer {
         let of_set = Labels::of(recipe)?;
         let classes = of_set.pixels(sample);
         let at = |kind: &str, suffix: &str| path(recipe, record, kind, suffix);
-        let labels = |suffix: &str| picture::file(sample, at("gtFine", suffix), &ImageData::Gray(&classes));
+        let labels = |suffix: &str| image_file::file(sample, at("gtFine", suffix), &ImageData::Gray(&classes));
         let numbers = numbers(&of_set, record);
         // A pixel can have another class than its plant if there are classes of organs.
         let instance = |(class, plant): (&u8, &u32)| match numbers.get(plant) {
@@ -52,11 +52,11 @@ impl Format for Writer {
         let color = |class: &u8| of_class.get(usize::from(*class)).copied().unwrap_or([128; 3]);
         let colors: Vec<[u8; 3]> = classes.iter().map(color).collect();
         Ok(vec![
-            picture::photograph_as_png(sample, at("leftImg8bit", "leftImg8bit"))?,
+            image_file::photograph_as_png(sample, at("leftImg8bit", "leftImg8bit"))?,
             labels("gtFine_labelIds")?,
             labels("gtFine_labelTrainIds")?,
-            picture::file(sample, at("gtFine", "gtFine_instanceIds"), &ImageData::Gray16(&instances))?,
-            picture::file(sample, at("gtFine", "gtFine_color"), &ImageData::Rgb(&colors))?,
+            image_file::file(sample, at("gtFine", "gtFine_instanceIds"), &ImageData::Gray16(&instances))?,
+            image_file::file(sample, at("gtFine", "gtFine_color"), &ImageData::Rgb(&colors))?,
         ])
     }
 

@@ -24,7 +24,7 @@
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
 use super::videos::Videos;
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use crate::format::labels::Labels;
 use crate::model::recipe::Recipe;
 use crate::model::record::{Keypoint, Plant, PointState, Record, Seen};
@@ -43,7 +43,7 @@ const FOLDER: &str = "coco";
 impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
-        Ok(vec![picture::photograph(sample, &format!("{FOLDER}/images/{}/{name}", split.name()))?])
+        Ok(vec![image_file::photograph(sample, &format!("{FOLDER}/images/{}/{name}", split.name()))?])
     }
 
     fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {

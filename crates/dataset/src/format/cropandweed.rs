@@ -20,7 +20,7 @@
 //! `cnw/map_dataset.py`.
 
 use super::conditions::ConditionsSummary;
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use crate::format::labels;
 use crate::model::photo::Photo;
 use crate::model::recipe::Recipe;
@@ -96,9 +96,9 @@ impl Format for Writer {
         }
         let map: Vec<u8> = sample.plants.iter().map(|plant| of_plant.get(plant).copied().unwrap_or(0)).collect();
         Ok(vec![
-            picture::photograph_as_jpeg(sample, format!("{FOLDER}/images/{name}.jpg"), QUALITY)?,
+            image_file::photograph_as_jpeg(sample, format!("{FOLDER}/images/{name}.jpg"), QUALITY)?,
             File { path: format!("{FOLDER}/bboxes/CropAndWeed/{name}.csv"), bytes: rows },
-            picture::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &ImageData::Gray(&map))?,
+            image_file::file(sample, format!("{FOLDER}/labelIds/CropAndWeed/{name}.png"), &ImageData::Gray(&map))?,
             File { path: format!("{FOLDER}/params/{name}.csv"), bytes: Params::of(record).csv()? },
         ])
     }

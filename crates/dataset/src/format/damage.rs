@@ -9,7 +9,7 @@
 //!
 //! All are 0 without damage, and outside leaves.
 
-use super::{Format, picture};
+use super::{Format, image_file};
 use furrow_base::Result;
 use crate::File;
 use crate::model::recipe::Recipe;
@@ -39,7 +39,7 @@ impl Format for Writer {
         let map = |(map, share): (&str, Share)| {
             let values: Vec<u8> = damage.iter().map(|at| (share(at).clamp(0.0, 1.0) * 255.0).round() as u8).collect();
             let path = format!("{FOLDER}/{}/{map}/{}.png", record.split.name(), record.name);
-            picture::file(sample, path, &ImageData::Gray(&values))
+            image_file::file(sample, path, &ImageData::Gray(&values))
         };
         MAPS.into_iter().map(map).collect()
     }

@@ -9,7 +9,7 @@
 //! cards"; read with datasets 5.2.0, which preserves the numbers in 16-bit masks and in masks of three bytes.
 
 use super::conditions::ConditionsSummary;
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use furrow_base::Result;
 use crate::File;
 use crate::model::optional_maps::OmittableMap;
@@ -33,9 +33,9 @@ impl Format for Writer {
     fn image(&self, recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let Record { name, split, .. } = &sample.record;
         let below = |kind: &str| format!("{FOLDER}/{}/{kind}/{name}", split.name());
-        let file = |kind: &str, picture: &ImageData<'_>| picture::file(sample, below(kind) + ".png", picture);
+        let file = |kind: &str, picture: &ImageData<'_>| image_file::file(sample, below(kind) + ".png", picture);
         let mut files = vec![
-            picture::photograph(sample, &below("images"))?,
+            image_file::photograph(sample, &below("images"))?,
             // Grey values instead of palette indices, which a reader that converts images to RGB would lose.
             file("masks", &ImageData::Gray(&Labels::of(recipe)?.pixels(sample)))?,
         ];
@@ -49,7 +49,7 @@ impl Format for Writer {
             files.push(file("species", &ImageData::Gray(&sample.species))?);
         }
         if !sample.nir.is_empty() {
-            files.push(picture::near_infrared(sample, &below("nir"))?);
+            files.push(image_file::near_infrared(sample, &below("nir"))?);
         }
         Ok(files)
     }

@@ -82,9 +82,9 @@ pub trait Format: Sync {
 mod boxes;
 mod conditions;
 mod drives;
+mod image_file;
 pub mod labels;
 mod outline;
-mod picture;
 mod videos;
 
 macro_rules! formats {

@@ -15,7 +15,7 @@
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
 use super::videos::Videos;
-use super::{Format, SetWriter, coco, picture};
+use super::{Format, SetWriter, coco, image_file};
 use crate::format::labels::Labels;
 use crate::model::recipe::{Recipe, json};
 use crate::model::record::Record;
@@ -44,8 +44,8 @@ impl Format for Writer {
         let (ids, segments) = segments(&Labels::of(recipe)?, sample)?;
         let colors: Vec<[u8; 3]> = ids.iter().map(|id| packed(*id)).collect();
         Ok(vec![
-            picture::photograph(sample, &format!("{FOLDER}/images/{split}/{name}"))?,
-            picture::file(
+            image_file::photograph(sample, &format!("{FOLDER}/images/{split}/{name}"))?,
+            image_file::file(
                 sample,
                 format!("{FOLDER}/annotations/panoptic_{split}/{name}.png"),
                 &ImageData::Linear(&colors),

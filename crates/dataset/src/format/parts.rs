@@ -4,7 +4,7 @@
 //! Values are 8-bit indices with a palette; `parts/names.json` names them. 0 is the sky. Models that the scene file
 //! names are numbered from 101, in the order of their names in the file.
 
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use crate::model::recipe::Recipe;
 use crate::model::annotate::part_numbers;
 use crate::model::sample::Sample;
@@ -24,7 +24,7 @@ impl Format for Writer {
         let record = &sample.record;
         let path = format!("{FOLDER}/{}/{}.png", record.split.name(), record.name);
         let palette = PartKind::palette(recipe.models().len());
-        Ok(vec![picture::file(sample, path, &ImageData::Indexed(&numbers(FOLDER, sample)?, &palette))?])
+        Ok(vec![image_file::file(sample, path, &ImageData::Indexed(&numbers(FOLDER, sample)?, &palette))?])
     }
 
     fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {

@@ -18,7 +18,7 @@
 //! Source: Weyler et al. 2024, "PhenoBench", and its loader and evaluation, version 0.1.0. The loader's
 //! `make_unique_ids` changes a copy and so has no effect: numbers are unique without it.
 
-use super::{Format, picture};
+use super::{Format, image_file};
 use crate::model::recipe::{Recipe, Rendering};
 use crate::model::record::{Plant, Seen};
 use crate::model::sample::Sample;
@@ -43,7 +43,7 @@ impl Format for Writer {
     fn image(&self, _recipe: &Recipe, sample: &Sample) -> Result<Vec<File>> {
         let record = &sample.record;
         let at = |kind: &str| format!("{FOLDER}/{}/{kind}/{}.png", record.split.name(), record.name);
-        let mut files = vec![picture::photograph_as_png(sample, at("images"))?];
+        let mut files = vec![image_file::photograph_as_png(sample, at("images"))?];
         if record.split == Split::Test {
             return Ok(files);
         }
@@ -52,8 +52,8 @@ impl Format for Writer {
         let pixels = sample.plants.iter().zip(&sample.leaves);
         let leaf_of = |(plant, leaf): (&u32, &u16)| leaves.get(&(*plant, *leaf));
         let semantics = |(class, plant): (&u8, &u32)| semantics(*class, plants.get(plant).copied());
-        let gray16 = |kind: &str, map: &[u16]| picture::file(sample, at(kind), &ImageData::Gray16(map));
-        let gray = |kind: &str, map: &[u8]| picture::file(sample, at(kind), &ImageData::Gray(map));
+        let gray16 = |kind: &str, map: &[u16]| image_file::file(sample, at(kind), &ImageData::Gray16(map));
+        let gray = |kind: &str, map: &[u8]| image_file::file(sample, at(kind), &ImageData::Gray(map));
         let semantics: Vec<u16> = sample.semantics.iter().zip(&sample.plants).map(semantics).collect();
         files.push(gray16("semantics", &semantics)?);
         files.push(gray16("plant_instances", &plant_numbers(sample)?)?);

@@ -8,7 +8,7 @@
 //! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and
 //! 5; colours are those of its `VOClabelcolormap`.
 
-use super::{Format, SetWriter, picture};
+use super::{Format, SetWriter, image_file};
 use crate::format::labels::Labels;
 use crate::model::photo::Photo;
 use crate::model::recipe::Recipe;
@@ -73,10 +73,10 @@ impl Format for Writer {
         let colors = colors();
         let path = |folder: &str, ending: &str| format!("{FOLDER}/{folder}/{name}.{ending}");
         Ok(vec![
-            picture::photograph_as_jpeg(sample, path("JPEGImages", "jpg"), QUALITY)?,
+            image_file::photograph_as_jpeg(sample, path("JPEGImages", "jpg"), QUALITY)?,
             File { path: path("Annotations", "xml"), bytes: text.into_bytes() },
-            picture::file(sample, path("SegmentationClass", "png"), &ImageData::Indexed(&classes, &colors))?,
-            picture::file(sample, path("SegmentationObject", "png"), &ImageData::Indexed(&objects, &colors))?,
+            image_file::file(sample, path("SegmentationClass", "png"), &ImageData::Indexed(&classes, &colors))?,
+            image_file::file(sample, path("SegmentationObject", "png"), &ImageData::Indexed(&objects, &colors))?,
         ])
     }
 

@@ -6,6 +6,7 @@
 //! [`picture`] reads all PNG and JPEG files.
 
 mod cutout;
+pub mod decoded_image;
 pub mod draw;
 pub mod exr_size;
 mod grid;
@@ -18,7 +19,6 @@ pub mod noise;
 mod openexr;
 pub mod panorama;
 mod petiole;
-pub mod picture;
 mod primaries;
 mod pyramid;
 mod rgbe;
@@ -64,14 +64,16 @@ impl Texture {
     /// Decodes the bytes of a PNG or JPEG file of a model, whose texture coordinates refer to the pixels as stored. The
     /// error is a message.
     pub fn decode(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
-        let pixels = picture::decode_as_stored(bytes, MAX_SIZE).map_err(picture::Fault::words)?.into_rgba8();
+        let pixels =
+            decoded_image::decode_as_stored(bytes, MAX_SIZE).map_err(decoded_image::Fault::words)?.into_rgba8();
         let (width, height) = pixels.dimensions();
         Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
     }
 
     /// Decodes the bytes of a PNG or JPEG file without its alpha channel. The error is a message.
     pub fn decode_opaque(bytes: &[u8], space: ColorSpace) -> Result<Self, String> {
-        let mut pixels = picture::decode_as_stored(bytes, MAX_SIZE).map_err(picture::Fault::words)?.into_rgba8();
+        let mut pixels =
+            decoded_image::decode_as_stored(bytes, MAX_SIZE).map_err(decoded_image::Fault::words)?.into_rgba8();
         pixels.pixels_mut().for_each(|pixel| pixel.0[3] = u8::MAX);
         let (width, height) = pixels.dimensions();
         Ok(Self::from_rgba8(width, height, pixels.as_raw(), space))
@@ -211,7 +213,7 @@ fn bleed(planes: &mut [Plane<4>]) {
 
 /// Opens and decodes an image file, with error messages that suggest a remedy.
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let read = picture::read(path, MAX_SIZE).map_err(|error| {
+    let read = decoded_image::read(path, MAX_SIZE).map_err(|error| {
         if !error.is_not_found() {
             return error;
         }

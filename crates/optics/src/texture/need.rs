@@ -5,7 +5,7 @@
 //! height map peaks at 39 bytes per pixel, the estimate is 40. Four colour images of a model of that size take 7.4
 //! each, the estimate is 7.7.
 
-use super::picture::{MAX_BYTES, reader};
+use super::decoded_image::{MAX_BYTES, reader};
 use super::{MAX_SIZE, exr_size, rgbe};
 use furrow_base::input;
 use image::ImageDecoder;

@@ -18,14 +18,14 @@ pub(super) const MAX_BYTES: u64 = 1 << 29;
 
 /// A decoded picture, as viewers show it.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct DecodedImage {
     /// Its pixels, turned.
     pub pixels: DynamicImage,
     /// EXIF orientation that was applied, 1 to 8; 1 leaves a picture as it is stored.
     pub orientation: u8,
 }
 
-impl Picture {
+impl DecodedImage {
     /// Returns width and height of the picture as it is stored, before it was turned.
     pub fn stored_size(&self) -> (u32, u32) {
         turned((self.pixels.width(), self.pixels.height()), self.orientation)
@@ -56,7 +56,7 @@ impl Fault {
 }
 
 /// Reads a picture file of at most `most_side` pixels in width and height.
-pub fn read(path: &Path, most_side: u32) -> Result<Picture> {
+pub fn read(path: &Path, most_side: u32) -> Result<DecodedImage> {
     decode(&whole(path)?, most_side).map_err(|fault| fault.into_error(path))
 }
 
@@ -80,11 +80,11 @@ fn whole(path: &Path) -> Result<Vec<u8>> {
 }
 
 /// Decodes the bytes of a picture file, turned by its EXIF orientation.
-pub fn decode(bytes: &[u8], most_side: u32) -> Result<Picture, Fault> {
+pub fn decode(bytes: &[u8], most_side: u32) -> Result<DecodedImage, Fault> {
     contained(|| {
         let (mut pixels, orientation) = stored(bytes, most_side)?;
         pixels.apply_orientation(orientation);
-        Ok(Picture { pixels, orientation: orientation.to_exif() })
+        Ok(DecodedImage { pixels, orientation: orientation.to_exif() })
     })
 }
 
@@ -334,7 +334,7 @@ mod tests {
     }
 
     /// Returns the four corners of a picture as letters, row by row.
-    fn corners(picture: &Picture) -> String {
+    fn corners(picture: &DecodedImage) -> String {
         let all = picture.pixels.to_rgb8();
         let (w, h) = all.dimensions();
         let letter = |(x, y): (u32, u32)| match all.get_pixel(x, y).0.map(|c| c > 127) {
@@ -375,7 +375,7 @@ mod tests {
             assert_eq!((corners(&picture).as_str(), picture.orientation), ("RGBW", 1));
         }
         let model = decode_as_stored(&jpeg(Some(3)), MAX).unwrap();
-        assert_eq!(corners(&Picture { pixels: model, orientation: 1 }), "RGBW");
+        assert_eq!(corners(&DecodedImage { pixels: model, orientation: 1 }), "RGBW");
     }
 
     const MAX: u32 = u32::MAX;
