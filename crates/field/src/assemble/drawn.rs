@@ -1,11 +1,11 @@
 //! Values that a field draws from its scene file before anything is built: the input of every later step.
 
+use super::extent::PLANT_MARGIN;
 use super::field_day::FieldDay;
 use super::lighting::{Lighting, SceneLight};
 use super::options::Options;
 use super::season::Season;
-use super::view::VisibleGround;
-use super::{rig, scanner};
+use super::{lidar, rig};
 use crate::desc::{Detail, FieldDesc};
 use crate::drive::Capture;
 use crate::estimate::usual_memory;
@@ -16,16 +16,11 @@ use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_grow::plant::GrowOptions;
-use furrow_grow::soil::{Ground, Rect};
+use furrow_grow::scatter::Rows;
+use furrow_grow::soil::{Envelope, Ground, SeedRows};
 use furrow_optics::light::{Light, LightDesc, LightRecord};
 use furrow_optics::sensor::{Camera, Lidar};
 use std::sync::Arc;
-
-/// Maximum coordinate of a model or a camera along an axis, metres. Single precision resolves 0.06 mm there.
-pub(super) const FARTHEST: f32 = 1000.0;
-
-/// Width of the planted margin around the view, metres: plants in it may lean or cast shadows into the view.
-pub(super) const PLANT_MARGIN: f32 = 0.35;
 
 /// Random stream address of the season, beyond those of any number of lights.
 const SEASON: u64 = 1 << 32;
@@ -109,7 +104,7 @@ impl<'a> Drawn<'a> {
         let captures = rig::captures(page, desc, library, camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
-        let scanners = scanner::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
+        let scanners = lidar::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         let camera = captures.first().map_or(camera, |first| first.camera);
         let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, captures, scanners };
         Ok((drawn, DrawnLights { lights, records, lighting }, warnings))
@@ -127,7 +122,7 @@ impl<'a> Drawn<'a> {
     /// Returns the smallest ground footprint of a centre pixel over all cameras, metres; 1 mm if no camera looks down.
     /// For a scan, the spacing of the LiDAR's rays.
     pub(super) fn ground_pixel(&self) -> f32 {
-        if let Some(spacing) = scanner::scanned_ground(self) {
+        if let Some(spacing) = lidar::spacing_on_ground(&self.scanners) {
             return spacing;
         }
         let side = |camera: &Camera| {
@@ -153,7 +148,7 @@ impl<'a> Drawn<'a> {
 
     /// Returns the smallest pixel footprint on a plant at `at` over all images, metres, perpendicular to the line of sight.
     pub(super) fn pixel_at(&self, at: Vec2) -> f32 {
-        scanner::scanned_at(self, at).unwrap_or_else(|| self.camera_pixel_at(at))
+        lidar::spacing_at(&self.scanners, at).unwrap_or_else(|| self.camera_pixel_at(at))
     }
 
     /// Returns the smallest camera pixel footprint on a plant at `at`, metres, even for a scan. It decides which plants share meshes, so
@@ -169,7 +164,7 @@ impl<'a> Drawn<'a> {
     /// Returns the smallest pixel footprint on the ground over all images, metres; 1 mm if no camera looks down.
     /// For a scan, the spacing of the LiDAR's rays.
     pub(super) fn finest_pixel(&self) -> f32 {
-        if let Some(spacing) = scanner::scanned_ground(self) {
+        if let Some(spacing) = lidar::spacing_on_ground(&self.scanners) {
             return spacing;
         }
         let finest = |camera: &Camera| {
@@ -186,9 +181,18 @@ impl<'a> Drawn<'a> {
         self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty()
     }
 
-    /// Returns the area that plants and their shadows must reach to be part of the scene; `None` if all are.
-    pub(super) fn shown(&self, sight: &VisibleGround) -> Option<Rect> {
-        self.has_ground().then_some(sight.view.area)
+    /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
+    pub(super) fn seed_rows(&self) -> Option<SeedRows> {
+        self.sown.clone().next().map(|k| {
+            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
+            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
+        })
+    }
+
+    /// Returns the bounds of the ground's height.
+    pub(super) fn envelope(&self) -> Envelope {
+        let soil = self.desc.soil.as_ref();
+        soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, self.seed_rows(), &self.stream(Purpose::Soil, 0)))
     }
 }
 
@@ -216,4 +220,11 @@ impl Floor<'_> {
         let (height, normal) = self.ground.stance(self.maps, x, y, STANCE);
         (if self.flat { 0.0 } else { height }, normal)
     }
+}
+
+/// A query about a field that is not built, and its context.
+pub(super) struct Asked<'a> {
+    pub(super) drawn: &'a Drawn<'a>,
+    pub(super) library: &'a mut Library,
+    pub(super) warnings: &'a mut Vec<String>,
 }

@@ -1,20 +1,12 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
-use super::drawn::Drawn;
-use super::{Options, Source, ground, plausibility, view};
-use crate::library::Library;
+use super::drawn::{Asked, Drawn};
+use super::{Options, Source, ground, lidar, plausibility, sight};
 use furrow_base::Result;
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::{Rows, WeedsRecord};
 use furrow_optics::sensor::CameraRecord;
 use std::sync::PoisonError;
-
-/// A field that a query is about.
-pub(super) struct Asked<'a> {
-    pub(super) drawn: &'a Drawn<'a>,
-    pub(super) library: &'a mut Library,
-    pub(super) warnings: &'a mut Vec<String>,
-}
 
 impl Source {
     /// Returns the expected number of plants in view of field `options.index`: the mean over random placements, for the camera and the
@@ -27,7 +19,7 @@ impl Source {
     pub fn expected_warnings(&self, options: &Options) -> Result<Vec<String>> {
         self.query(options, |Asked { drawn, library, warnings }| {
             // Load soil and models first, so that unusable files are reported as errors.
-            let sight = view::sight(drawn, warnings)?;
+            let sight = sight::sight(drawn, warnings)?;
             if let Some(soil) = &self.desc.soil {
                 ground::soil(drawn, library, soil, sight.view)?;
             }
@@ -49,7 +41,7 @@ impl Source {
     pub(super) fn query<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let mut library = held().clone();
-        let desc = super::scanner::grown(&self.desc, options.scan.as_ref());
+        let desc = lidar::grown(&self.desc, options.scan.as_ref());
         let (drawn, _, mut warnings) = Drawn::draw(&self.page, &desc, options, &mut library)?;
         let answer = question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })?;
         // Keep the files that were read for the next field.
@@ -74,7 +66,7 @@ fn expected_plants(Asked { drawn, warnings, .. }: Asked<'_>) -> Result<f64> {
         .zip(1000..)
         .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, k)).per_m2));
     let per_m2: f64 = crops.chain(weeds).sum();
-    let sight = view::sight(drawn, warnings)?;
+    let sight = sight::sight(drawn, warnings)?;
     let area = match &sight.each[..] {
         [seen] if sight.view.is_graded() => seen.area(),
         _ => sight.view.area.area(),

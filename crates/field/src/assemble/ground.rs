@@ -20,10 +20,10 @@ use furrow_base::ron_file::{Step, Vary};
 use furrow_base::sampling::Purpose;
 use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
-use furrow_grow::scatter::{Disc, Rows};
+use furrow_grow::scatter::Disc;
 use furrow_grow::soil::{
-    self, Canopy, Clods, Debris, DebrisKind, Envelope, Expected, Ground, InView, LayerDesc, Pile, Rect, SeedRows, Site,
-    SoilDesc, SoilRecord,
+    self, Canopy, Clods, Debris, DebrisKind, Expected, Ground, InView, LayerDesc, Pile, Rect, Site, SoilDesc,
+    SoilRecord,
 };
 use furrow_optics::bsdf::{Bsdf, OrenNayar};
 use furrow_render::material::{BakedGround, Ground as GroundMaterial, Material, Solid};
@@ -161,22 +161,8 @@ pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
         growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
         level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
         smallest_mm,
-        rows: seed_rows(drawn),
+        rows: drawn.seed_rows(),
     }
-}
-
-/// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
-fn seed_rows(drawn: &Drawn<'_>) -> Option<SeedRows> {
-    drawn.sown.clone().next().map(|k| {
-        let rows = Rows::draw(&drawn.desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k as u64));
-        SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
-    })
-}
-
-/// Returns the bounds of the ground's height.
-pub(super) fn envelope(drawn: &Drawn<'_>) -> Envelope {
-    let soil = drawn.desc.soil.as_ref();
-    soil.map_or(Envelope::LEVEL, |soil| Envelope::of(soil, seed_rows(drawn), &drawn.stream(Purpose::Soil, 0)))
 }
 
 /// Returns the texel size of the ground's maps, metres.

@@ -67,6 +67,11 @@ impl GroundView {
     }
 }
 
+/// Returns the point where a ray meets the plane z = 0; `None` for a ray that does not descend or that starts below the plane.
+pub(super) fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
+    (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
+}
+
 /// A camera position and the ground in its image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Viewpoint {

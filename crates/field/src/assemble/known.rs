@@ -3,8 +3,8 @@
 use super::drawn::Drawn;
 use super::models::{self, called};
 use super::record::{CropRecord, SpeciesRecord, WeedRecord};
+use crate::PlantRecord;
 use crate::library::Library;
-use crate::{PartKind, PlantRecord};
 use furrow_base::ron_file::Step;
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
@@ -52,21 +52,6 @@ fn tell_apart(drawn: &Drawn<'_>, species: &[SpeciesRecord]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the names of models from disk in the scene file's order, each once. The list is the same for every index.
-pub(super) fn model_names(drawn: &Drawn<'_>) -> Result<Vec<String>> {
-    let mut all: Vec<String> = Vec::new();
-    for (k, desc) in drawn.desc.models.iter().enumerate() {
-        let Some(name) = desc.name.as_ref().filter(|name| !all.contains(name)) else { continue };
-        if let Some(fault) = fault_of_name(name, all.len()) {
-            let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
-            let help = "give a short name such as \"robot\"; models of the same class may share it";
-            return Err(drawn.page.blame(&at, Error::input(fault).help(help)));
-        }
-        all.push(name.clone());
-    }
-    Ok(all)
-}
-
 /// Returns the records of the crops that this field has, with their drawn values.
 pub(super) fn crop_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<CropRecord>> {
     let mut all = Vec::new();
@@ -88,17 +73,6 @@ pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
         all.push(WeedRecord { species, spread });
     }
     Ok(all)
-}
-
-/// Returns the fault of a new model name, if there is one; `known` is the number of other names.
-fn fault_of_name(name: &str, known: usize) -> Option<&'static str> {
-    if name.is_empty() || name.trim() != name || name.contains([',', ';', '=']) {
-        return Some("a class cannot have this name: it is empty, has spaces at an end, or contains `,`, `;` or `=`");
-    }
-    if name.contains(char::is_control) {
-        return Some("the name of this model contains a control character");
-    }
-    (known >= PartKind::MOST_NAMED).then_some("label maps have numbers for 100 model names, and this name exceeds that")
 }
 
 /// Sets each plant's `kind` to the number of its species in the table, from 1.

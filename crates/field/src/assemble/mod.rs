@@ -8,6 +8,7 @@ mod drawn;
 mod earth;
 mod estimate;
 mod expected;
+mod extent;
 mod field;
 mod field_day;
 mod ground;
@@ -16,6 +17,7 @@ mod grown;
 mod identity;
 mod individual;
 mod known;
+mod lidar;
 mod lighting;
 mod member;
 mod models;
@@ -29,6 +31,7 @@ mod rig;
 mod scanner;
 mod season;
 mod seedling;
+mod sight;
 mod sow;
 mod stand;
 mod terrain;
@@ -39,8 +42,7 @@ use super::estimate::Estimate;
 use super::library::Library;
 pub use super::scene_edit::SceneEdit;
 use contents::Contents;
-use drawn::Drawn;
-use expected::Asked;
+use drawn::{Asked, Drawn};
 pub use field::Field;
 use furrow_base::Result;
 use furrow_base::input::Scope;
@@ -142,7 +144,7 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
         let mut library = held().clone();
-        let desc = scanner::grown(&self.desc, options.scan.as_ref());
+        let desc = lidar::grown(&self.desc, options.scan.as_ref());
         let field = build(&self.page, &desc, options, &mut library)?;
         *held() = library;
         Ok(field)
@@ -151,7 +153,7 @@ impl Source {
     /// Estimates memory and time of field `options.index` without building it.
     pub fn estimate(&self, options: &Options) -> Result<Estimate> {
         self.query(options, |Asked { drawn, library, warnings }| {
-            let sight = view::sight(drawn, warnings)?;
+            let sight = sight::sight(drawn, warnings)?;
             estimate::estimate(drawn, library, &sight)
         })
     }
@@ -161,7 +163,7 @@ impl Source {
 fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Library) -> Result<Field> {
     let (drawn, lit, mut warnings) = Drawn::draw(page, desc, options, library)?;
     options.progress.enter(Stage::Estimate);
-    let sight = view::sight(&drawn, &mut warnings)?;
+    let sight = sight::sight(&drawn, &mut warnings)?;
     let estimate = estimate::estimate(&drawn, library, &sight)?;
     estimate.check(drawn.memory()).map_err(|(at, error)| page.blame(&at, error))?;
     warnings.extend(plausibility::camera(&drawn));
@@ -177,9 +179,9 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
             (stocked, Some(record))
         }
     };
-    let (species, models) = (known::species(&drawn, library)?, known::model_names(&drawn)?);
+    let (species, models) = (known::species(&drawn, library)?, models::names(&drawn)?);
     known::number_kinds(&mut plants, &species);
-    warnings.extend(plausibility::view(&drawn, &plants, drawn.shown(&sight)));
+    warnings.extend(plausibility::view(&drawn, &plants, sight.shown(&drawn)));
     let conditions = Conditions {
         camera: drawn.camera.record(),
         sensor: desc.sensor.build(&mut drawn.stream(Purpose::Sensor, 0)).record(),

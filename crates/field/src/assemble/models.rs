@@ -1,9 +1,9 @@
 //! Places models from disk on the ground and labels them.
 
 use super::contents::Contents;
-use super::drawn::{Drawn, FARTHEST, Floor};
+use super::drawn::{Drawn, Floor};
+use super::extent::FARTHEST;
 use super::identity;
-use super::known;
 use super::preview::PlacedModel;
 use crate::desc::ModelDesc;
 use crate::library::Library;
@@ -29,7 +29,7 @@ pub(super) fn models(
     numbered: usize,
     floor: Option<Floor<'_>>,
 ) -> Result<Vec<PlantRecord>> {
-    let names = known::model_names(drawn)?;
+    let names = names(drawn)?;
     let mut records: Vec<PlantRecord> = Vec::new();
     let mut last = numbered;
     for (k, desc) in drawn.desc.models.iter().enumerate() {
@@ -180,4 +180,30 @@ fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<T
 pub(super) fn called(desc: &ModelDesc) -> String {
     let of_file = || Path::new(&desc.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     desc.name.clone().unwrap_or_else(of_file)
+}
+
+/// Returns the names of models from disk in the scene file's order, each once. The list is the same for every index.
+pub(super) fn names(drawn: &Drawn<'_>) -> Result<Vec<String>> {
+    let mut all: Vec<String> = Vec::new();
+    for (k, desc) in drawn.desc.models.iter().enumerate() {
+        let Some(name) = desc.name.as_ref().filter(|name| !all.contains(name)) else { continue };
+        if let Some(fault) = fault_of_name(name, all.len()) {
+            let at = [Step::Field("models"), Step::Item(k), Step::Field("name")];
+            let help = "give a short name such as \"robot\"; models of the same class may share it";
+            return Err(drawn.page.blame(&at, Error::input(fault).help(help)));
+        }
+        all.push(name.clone());
+    }
+    Ok(all)
+}
+
+/// Returns the fault of a new model name, if there is one; `known` is the number of other names.
+fn fault_of_name(name: &str, known: usize) -> Option<&'static str> {
+    if name.is_empty() || name.trim() != name || name.contains([',', ';', '=']) {
+        return Some("a class cannot have this name: it is empty, has spaces at an end, or contains `,`, `;` or `=`");
+    }
+    if name.contains(char::is_control) {
+        return Some("the name of this model contains a control character");
+    }
+    (known >= PartKind::MOST_NAMED).then_some("label maps have numbers for 100 model names, and this name exceeds that")
 }

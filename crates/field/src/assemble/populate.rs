@@ -25,7 +25,7 @@ pub(super) fn populate(
     sight: &VisibleGround,
 ) -> Result<PlantsAndModels> {
     let mut parts = Contents::default();
-    let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, drawn.shown(sight))?;
+    let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, sight.shown(drawn))?;
     plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), floor)?);
     identity::settle(&mut plants);
     if floor.is_some() {

@@ -1,7 +1,8 @@
 //! Chooses the plants of a field: species, place and individual properties, before they grow.
 
 use super::census::{Census, Members, Population};
-use super::drawn::{Drawn, PLANT_MARGIN};
+use super::drawn::Drawn;
+use super::extent::PLANT_MARGIN;
 use super::individual::Individual;
 use super::seedling::Seedling;
 use super::view::{self, VisibleGround};

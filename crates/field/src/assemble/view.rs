@@ -4,13 +4,13 @@
 //! camera that sees the horizon, or ground farther away, gets bare ground there, with pixels labelled soil. The field then has a
 //! warning with the bare share of the ground in view. If that share is more than half, the scene is refused.
 
-use super::drawn::{Drawn, FARTHEST};
-use super::ground_view::{GroundView, Viewpoint};
+use super::drawn::Drawn;
+use super::extent::FARTHEST;
+use super::ground_view::{GroundView, Viewpoint, meets};
 use super::terrain::{Near, Seen, ViewLimits, ViewRay};
-use super::{ground, scanner};
 use crate::desc::Detail;
 use crate::drive::{Capture, FIRST};
-use furrow_base::math::{Vec2, Vec3, vec2};
+use furrow_base::math::{Vec2, vec2};
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};
 use furrow_grow::soil::Rect;
@@ -28,7 +28,7 @@ const TOO_BARE: f32 = 0.5;
 /// away, cells grow. Pixels there cover 4.5 times the length on the ground, and clods of some centimetres are a few pixels long.
 const NEAR: f32 = 4.5;
 /// With `detail: ByPixel`, the width of the planted margin around the view, metres: the shadow length of a plant of 0.5 m, plus
-/// [`PLANT_MARGIN`](super::builder::PLANT_MARGIN).
+/// [`PLANT_MARGIN`](super::extent::PLANT_MARGIN).
 const SIDEWAYS: f32 = 1.75;
 
 /// Ground that the images or scans of a field see.
@@ -37,6 +37,13 @@ pub(super) struct VisibleGround {
     pub(super) view: View,
     /// Its outline in each image or scan; empty for a scene of single plants and models.
     pub(super) each: Vec<GroundView>,
+}
+
+impl VisibleGround {
+    /// Returns the area that plants or their shadows must reach to be part of the scene; `None` if all are.
+    pub(super) fn shown(&self, drawn: &Drawn<'_>) -> Option<Rect> {
+        drawn.has_ground().then_some(self.view.area)
+    }
 }
 
 /// The extent of ground that cameras see.
@@ -78,20 +85,8 @@ fn around(a: Rect, b: Rect) -> Rect {
     Rect::new(lo.x, lo.y, hi.x, hi.y)
 }
 
-/// Returns the point where a ray meets the plane z = 0; `None` for a ray that does not descend or that starts below the plane.
-pub(super) fn meets(origin: Vec3, direction: Vec3) -> Option<Vec2> {
-    (direction.z < 0.0 && origin.z > 0.0).then(|| (origin + direction * (origin.z / -direction.z)).truncate())
-}
-
-/// Returns the ground that all images or scans see together, and adds a warning if some of it is not planted. Returns [`View::NONE`] for
-/// a scene of single plants and models.
-pub(super) fn sight(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<VisibleGround> {
-    if !drawn.has_ground() {
-        return Ok(VisibleGround { view: View::NONE, each: Vec::new() });
-    }
-    if !drawn.scanners.is_empty() {
-        return scanner::scanned(drawn, warnings);
-    }
+/// Returns the ground that all images see together. Adds a warning if some of it is not planted.
+pub(super) fn by_cameras(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<VisibleGround> {
     let mut whole: Option<View> = None;
     let mut each = Vec::new();
     for capture in &drawn.captures {
@@ -196,8 +191,7 @@ fn view_of(
     let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
     let near = nearest(drawn, raster(camera), area);
     let far = ViewLimits { field_m: reach, ray_m: f32::INFINITY, travel_m: camera.travel() };
-    let Seen { area, near, met, beyond: farther, terrain } =
-        Seen::of(ground::envelope(drawn), area, near, &view_rays, &far);
+    let Seen { area, near, met, beyond: farther, terrain } = Seen::of(drawn.envelope(), area, near, &view_rays, &far);
     // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
     let points = seen.iter().chain(&level).chain(&met).copied();
     each.push(GroundView::around(points.chain([below])));
