@@ -42,6 +42,10 @@ struct ScheduleState<I, T> {
     groups: Box<dyn Iterator<Item = Vec<I>> + Send>,
     /// Number of items that were started.
     started: u64,
+    /// Number of items of taken groups that were not started.
+    queued: usize,
+    /// Whether all groups are taken.
+    exhausted: bool,
     /// Started items that the consumer has not taken, by the order of their start; `None` while in progress.
     results: BTreeMap<u64, Option<Made<I, T>>>,
     /// Whether no further item may be started.
@@ -54,9 +58,15 @@ impl<I, T> ScheduleState<I, T> {
     /// Starts the next item of a group, or of the next group; returns `None` if there is none.
     fn next(&mut self, group: &mut std::vec::IntoIter<I>) -> Option<(u64, I)> {
         while group.len() == 0 {
-            *group = self.groups.next()?.into_iter();
+            let Some(items) = self.groups.next() else {
+                self.exhausted = true;
+                return None;
+            };
+            self.queued += items.len();
+            *group = items.into_iter();
         }
         let (number, item) = (self.started, group.next()?);
+        self.queued -= 1;
         self.started += 1;
         self.results.insert(number, None);
         Some((number, item))
@@ -69,6 +79,8 @@ impl<I, T> Schedule<I, T> {
         let inside = ScheduleState {
             groups: Box::new(groups),
             started: 0,
+            queued: 0,
+            exhausted: false,
             results: BTreeMap::new(),
             closed: false,
             left: false,
@@ -121,7 +133,6 @@ impl<I, T> Schedule<I, T> {
         let mut inside = self.changed.wait_while(self.lock(), full).unwrap_or_else(PoisonError::into_inner);
         inside.closed |= stopped();
         let next = if inside.closed { None } else { inside.next(group) };
-        inside.closed |= next.is_none();
         self.changed.notify_all();
         next
     }
@@ -144,7 +155,8 @@ impl<I, T> Schedule<I, T> {
             next.map(|(number, _)| *number)
         };
         let waits = |inside: &mut ScheduleState<I, T>| {
-            !inside.left && ready(inside).is_none() && !(inside.closed && inside.results.is_empty())
+            let no_more = inside.closed || inside.exhausted && inside.queued == 0;
+            !inside.left && ready(inside).is_none() && !(no_more && inside.results.is_empty())
         };
         let mut inside = self.changed.wait_while(self.lock(), waits).unwrap_or_else(PoisonError::into_inner);
         if inside.left {
@@ -185,6 +197,22 @@ mod tests {
 
     fn single(items: std::ops::Range<u64>, order: ResultOrder) -> Schedule<u64, u64> {
         Schedule::new(items.map(|item| vec![item]), order)
+    }
+
+    /// Rationale: a worker without work must not end the groups of the others. Expected: all items of a long group are
+    /// made although the other worker finds no group after its first item.
+    #[test]
+    fn a_worker_without_work_leaves_the_groups_of_others() {
+        for order in [ResultOrder::AsFinished, ResultOrder::InOrder { ahead: 3 }] {
+            let schedule = Schedule::new([vec![0], (1..9).collect::<Vec<u64>>()].into_iter(), order);
+            let workers = Threads::divided(2, 2).unwrap();
+            let make = |item: &u64, _: &Threads, (): &mut ()| {
+                std::thread::sleep(Duration::from_millis(if *item == 0 { 0 } else { 5 }));
+                Ok(*item)
+            };
+            let made = schedule.run(&workers, || false, make, || all(&schedule)).unwrap();
+            assert_eq!(made.len(), 9, "{order:?}");
+        }
     }
 
     fn all(schedule: &Schedule<u64, u64>) -> Vec<Made<u64, u64>> {
