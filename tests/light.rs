@@ -516,7 +516,7 @@ fn a_page_of_lights_is_written_as_it_was_read() {
         "Overcast(illuminance_klx:Uniform(5.0,25.0))",
         "Constant(radiance:(1.0,1.0,1.0,0.5))",
         r#"EnvironmentMap(file:"sky.exr",scale:1.0,rotate_deg:Uniform(0.0,360.0))"#,
-        r#"EnvironmentMap(file:"sky.exr",scale:2.0,rotate_deg:0.0,nir:Some(OfRed(0.8)))"#,
+        r#"EnvironmentMap(file:"sky.exr",scale:2.0,rotate_deg:0.0,nir:OfRed(0.8))"#,
     ] {
         let desc: LightDesc = RonFile::of(page).parse().unwrap();
         let text = RonFile::print(&desc).unwrap();

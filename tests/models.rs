@@ -474,7 +474,7 @@ fn broken_models_get_one_clear_error_at_the_place_that_names_them() {
         (SQUARE.replace("square.mtl", "gone.mtl"), "`gone.mtl`, which does not exist"),
         (SQUARE.replace("4/4", "5/4"), "a corner of the face refers to a missing element"),
         (SQUARE.replace("v 1 1 0", "v 1 NaN 0"), "not a finite number"),
-        (SQUARE.replace("v 1 1 0", "v one 1 0"), "line 3: `one` is not a number"),
+        (SQUARE.replace("v 1 1 0", "v one 1 0"), "line 5: `one` is not a number"),
         ("# nothing".to_owned(), "no triangles"),
     ] {
         write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");

@@ -402,7 +402,7 @@ fn slow_and_endless_requests_stop_nothing() {
         stream
     };
     let mut endless = open("GET / HTTP/1.1\r\nX: ");
-    endless.write_all(&[b'x'; 100_000]).unwrap();
+    endless.write_all("x".repeat(100_000).as_bytes()).unwrap();
     let mut answer = [0; 12];
     endless.read_exact(&mut answer).unwrap();
     assert_eq!(&answer, b"HTTP/1.1 431");

@@ -172,7 +172,7 @@ mod tests {
             prop_assert_eq!((n >> 1).to_i32().to_u32(), n >> 1);
             prop_assert_eq!(u32::from((n >> 16).to_u16()), n >> 16);
             prop_assert_eq!(u32::from((n >> 24).to_u8()), n >> 24);
-            prop_assert_eq!((u64::from(n) << 32 | 77).low_u32(), 77);
+            prop_assert_eq!((u64::from(n) << 32 | 0x4d).low_u32(), 0x4d);
         }
 
         /// Expected: the nearest number in `f64`'s and `f32`'s grid, as `as` returns it.
@@ -196,12 +196,12 @@ mod tests {
     #[test]
     fn floats_beyond_the_range_saturate() {
         assert_eq!(
-            [-0.9_f32, 255.9, 256.0, f32::INFINITY, f32::NAN].map(|x| x.trunc_to::<u8>()),
+            [-0.9_f32, 255.9, 256.0, f32::INFINITY, f32::NAN].map(RoundTo::trunc_to::<u8>),
             [0, 255, 255, 255, 0]
         );
-        assert_eq!([-0.5_f64, -1e300, 1e300].map(|x| x.floor_to::<i64>()), [-1, i64::MIN, i64::MAX]);
-        assert_eq!([-0.5_f32, 0.5, 1.4].map(|x| x.ceil_to::<usize>()), [0, 1, 2]);
-        assert_eq!([-2.5_f32, 2.5, 2.4].map(|x| x.round_to::<i16>()), [-3, 3, 2]);
+        assert_eq!([-0.5_f64, -1e300, 1e300].map(RoundTo::floor_to::<i64>), [-1, i64::MIN, i64::MAX]);
+        assert_eq!([-0.5_f32, 0.5, 1.4].map(RoundTo::ceil_to::<usize>), [0, 1, 2]);
+        assert_eq!([-2.5_f32, 2.5, 2.4].map(RoundTo::round_to::<i16>), [-3, 3, 2]);
     }
 
     #[test]

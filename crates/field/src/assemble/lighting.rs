@@ -152,7 +152,7 @@ mod tests {
             assert!(message.contains(&format!("page.ron:{place}")) && message.contains(why), "{message}");
             assert!(message.contains("\n help: "), "{message}");
         }
-        let alone: LightDesc = ron::from_str("OneOf([[Overcast()]])").unwrap();
+        let alone: LightDesc = RonFile::of("OneOf([[Overcast()]])").parse().unwrap();
         assert!(alone.build(&mut Stream::of(1, 0, Purpose::Test, 0)).is_err());
     }
 

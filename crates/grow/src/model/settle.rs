@@ -69,14 +69,13 @@ pub(super) fn into_one_tile(uvs: &mut [Vec2], wrap: [Wrap; 2], name: &str, notes
         let inside = high[k] - tile <= 1.001;
         let near = low[k] >= -FAR_TILES && high[k] <= FAR_TILES;
         match wrap {
-            Wrap::Clamp if inside && tile == 0.0 => {}
+            _ if inside && tile == 0.0 => {}
             Wrap::Clamp if near => {
                 notes.about(
                     "it is cut away where its texture coordinates are beyond the edge of a clamped picture",
                     name,
                 );
             }
-            Wrap::Repeat | Wrap::Mirror if inside && tile == 0.0 => {}
             Wrap::Repeat if inside => uvs.iter_mut().for_each(|uv| uv[k] -= tile),
             Wrap::Mirror if inside && tile.rem_euclid(2.0) == 0.0 => uvs.iter_mut().for_each(|uv| uv[k] -= tile),
             Wrap::Mirror if inside => uvs.iter_mut().for_each(|uv| uv[k] = 1.0 - (uv[k] - tile)),

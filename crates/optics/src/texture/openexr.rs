@@ -162,8 +162,7 @@ mod tests {
         // Values count up from the first pixel.
         let values = |first: f32| (0..size.0 * size.1).map(|k| first + k as f32).collect();
         let list = channels.iter().map(|(name, first)| AnyChannel::new(*name, FlatSamples::F32(values(*first))));
-        let mut attributes = LayerAttributes::default();
-        attributes.layer_position = Vec2(x, y);
+        let attributes = LayerAttributes { layer_position: Vec2(x, y), ..LayerAttributes::default() };
         let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(list.collect()));
         let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(display));
         let image = Image::from_layers(attributes, vec![layer]);

@@ -45,6 +45,7 @@ impl Default for Surface {
 
 impl Surface {
     /// Returns the surface with its colours alone.
+    #[must_use]
     pub fn without_pictures(&self) -> Self {
         let transmission = self.transmission.clone().map(|sheet| Transmission { picture: None, ..sheet });
         Self { picture: None, mask: None, relief: None, transmission, ..self.clone() }

@@ -165,5 +165,5 @@ fn a_radiance_image_is_no_texture() {
     let mut bytes = b"#?RADIANCE\n\n-Y 1 +X 1\n".to_vec();
     bytes.extend([128, 128, 128, 129]);
     let what = Texture::decode(&bytes, ColorSpace::Srgb).unwrap_err();
-    assert!(what.contains("format Hdr; PNG and JPEG"), "{what}");
+    assert!(what.contains("Radiance HDR picture; PNG and JPEG"), "{what}");
 }

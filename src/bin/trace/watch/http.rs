@@ -90,10 +90,10 @@ impl Connection {
             let seen = bytes.len().saturating_sub(2);
             bytes.extend_from_slice(&part[..read]);
             let ends = |w: &[u8]| w.ends_with(b"\n\n") || w == b"\n\r\n";
-            if bytes[seen..].windows(3).any(ends) {
-                if let Some(head) = parse(&bytes)? {
-                    return Ok(head);
-                }
+            if bytes[seen..].windows(3).any(ends)
+                && let Some(head) = parse(&bytes)?
+            {
+                return Ok(head);
             }
             if bytes.len() > LARGEST_HEAD {
                 return Err(refuse(431, "the headers of this request are too large"));

@@ -143,13 +143,12 @@ impl Server {
     fn accept(&self) {
         let mut warned: Option<Instant> = None;
         loop {
-            let admitted = match self.listener.accept() {
-                Ok((stream, _)) => self.admit(stream),
+            let admitted = if let Ok((stream, _)) = self.listener.accept() {
+                self.admit(stream)
+            } else {
                 // No more files can be opened, or the client has gone. Connections that end may help.
-                Err(_) => {
-                    std::thread::sleep(GLANCE);
-                    false
-                }
+                std::thread::sleep(GLANCE);
+                false
             };
             if !admitted && warned.is_none_or(|at| at.elapsed() > BEAT) {
                 warned = Some(Instant::now());

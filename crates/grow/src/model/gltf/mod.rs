@@ -186,7 +186,9 @@ impl Reader<'_> {
             self.notes.about(format!("no texture coordinates {named}, so the pictures are passed over"), name);
         }
         if let Some(appearance) = appearance.filter(|_| !bare) {
-            uvs.iter_mut().for_each(|uv| *uv = appearance.slot.transformed(*uv));
+            for uv in &mut uvs {
+                *uv = appearance.slot.transformed(*uv);
+            }
             if appearance.surface.mask.is_some() {
                 into_one_tile(&mut uvs, appearance.wrap, name, &mut self.notes)?;
             }

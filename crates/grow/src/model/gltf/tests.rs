@@ -296,10 +296,13 @@ fn what_is_passed_over_is_named() {
     assert!(surface.mask.is_none() && surface.picture.is_none() && surface.name == "green");
 }
 
+/// Edit of a model's document and buffer.
+type Edit<'a> = &'a dyn Fn(&mut Value, &mut Bytes);
+
 #[test]
 fn what_cannot_be_read_is_refused_by_name() {
     let draco = "KHR_draco_mesh_compression";
-    let edits: [(&dyn Fn(&mut Value, &mut Bytes), &str); 5] = [
+    let edits: [(Edit<'_>, &str); 5] = [
         (
             &|d, _| d["extensionsRequired"] = json!(["EXT_meshopt_compression"]),
             "requires the extension EXT_meshopt_compression",

@@ -9,16 +9,12 @@ pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
         return Err("its text is UTF-16; save it as UTF-8".into());
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    Ok(match std::str::from_utf8(bytes) {
-        Ok(text) => text.into(),
-        Err(_) => {
-            let line = |line: &[u8]| match std::str::from_utf8(line) {
-                Ok(line) => line.to_owned(),
-                Err(_) => line.iter().map(|byte| char::from(*byte)).collect(),
-            };
-            bytes.split(|byte| *byte == b'\n').map(line).collect::<Vec<_>>().join("\n").into()
-        }
-    })
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        return Ok(text.into());
+    }
+    let latin = |line: &[u8]| line.iter().map(|byte| char::from(*byte)).collect();
+    let line = |line: &[u8]| std::str::from_utf8(line).map_or_else(|_| latin(line), str::to_owned);
+    Ok(bytes.split(|byte| *byte == b'\n').map(line).collect::<Vec<String>>().join("\n").into())
 }
 
 /// A statement: the number of its first line, its keyword, and the rest without surrounding spaces.

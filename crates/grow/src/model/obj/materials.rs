@@ -87,13 +87,13 @@ fn wrap(map: Option<&Map>) -> Wrap {
 /// Materials of a model, and its pictures, each decoded once.
 pub(super) struct Materials<'a> {
     pub(super) files: Files<'a>,
-    materials: Vec<Material>,
+    all: Vec<Material>,
     known: BTreeMap<(String, bool), Arc<Texture>>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn open(files: Files<'a>) -> Self {
-        Self { files, materials: Vec::new(), known: BTreeMap::new() }
+        Self { files, all: Vec::new(), known: BTreeMap::new() }
     }
 
     /// Reads the libraries that a statement `mtllib` names: one whose name may have spaces, or several.
@@ -113,8 +113,8 @@ impl<'a> Materials<'a> {
             let found = materials(&text(&bytes).map_err(wrong)?, notes).map_err(wrong)?;
             // The first material of a name counts, as in other programs.
             for material in found {
-                if !self.materials.iter().any(|known| known.name == material.name) {
-                    self.materials.push(material);
+                if !self.all.iter().any(|known| known.name == material.name) {
+                    self.all.push(material);
                 }
             }
         }
@@ -123,7 +123,7 @@ impl<'a> Materials<'a> {
 
     /// Returns the surfaces of all materials.
     pub(super) fn appearances(&mut self, notes: &mut Notes) -> Result<Vec<Appearance>, ModelError> {
-        let materials = std::mem::take(&mut self.materials);
+        let materials = std::mem::take(&mut self.all);
         materials.iter().map(|material| self.appearance(material, notes)).collect()
     }
 

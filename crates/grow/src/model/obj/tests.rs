@@ -127,11 +127,9 @@ fn smoothing_groups_average_normals() {
 /// Rationale: coordinates of a national grid lose their shape in single precision before anything is computed.
 #[test]
 fn large_coordinates_keep_their_shape() {
-    let text: String = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2)]
-        .iter()
-        .map(|(x, y)| format!("v {:.3} {:.3} 312.125\n", 612_345.25 + x, 5_412_345.5 + y))
-        .collect();
-    let model = read(&(text + "f -4 -3 -2 -1\n"), "");
+    let corners = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2)];
+    let lines = corners.map(|(x, y)| format!("v {:.3} {:.3} 312.125\n", 612_345.25 + x, 5_412_345.5 + y));
+    let model = read(&(lines.concat() + "f -4 -3 -2 -1\n"), "");
     let (lo, hi) = model.parts[0].mesh.bounds().unwrap();
     assert!((lo - vec3(-0.15, -0.1, 0.0)).length() < 1e-6 && (hi - vec3(0.15, 0.1, 0.0)).length() < 1e-6, "{lo} {hi}");
     assert!(model.warnings[0].contains("far from the origin"), "{:?}", model.warnings);
