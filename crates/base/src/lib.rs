@@ -8,7 +8,7 @@
 //! | [`ron_file`] | RON files whose errors name line and column; numbers with bounds and distributions |
 //! | [`input`] | reading user-supplied files safely |
 //! | [`atomic_file`] | files that appear complete or not at all, also several together |
-//! | [`dispatch`] | enums of types that implement a common trait |
+//! | [`mod@dispatch`] | enums of types that implement a common trait |
 //! | [`error`] | the error type of all crates |
 //! | [`supervise`] | panics of worker threads as errors |
 

@@ -68,7 +68,7 @@ impl ImageStream {
     /// closes the pipe early.
     ///
     /// Fields that cannot be built are skipped, with a warning at once and an error at the end; [`MOST_LEFT_OUT`] of
-    /// them in a row end the stream. A stopped stream returns [`Kind::Interrupted`].
+    /// them in a row end the stream. A stopped stream returns [`furrow_base::error::Kind::Interrupted`].
     pub fn write(&self, work: &Work<'_>, out: impl Write + Send + 'static, listener: &Listener<'_>) -> Result<u64> {
         let set = &self.set;
         let Some(renderer) = renderer(set)? else { return Ok(0) };
