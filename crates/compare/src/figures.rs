@@ -136,8 +136,8 @@ impl Figures {
 /// compared if both images have it. Returns an error if the sizes differ.
 ///
 /// ```
-/// use furrow_compare::{PIXELS_PER_DEGREE, Picture, pair};
-/// let gray = |value| Picture { width: 16, height: 16, rgb: vec![[value; 3]; 256], nir: Vec::new() };
+/// use furrow_compare::{PIXELS_PER_DEGREE, RasterImage, pair};
+/// let gray = |value| RasterImage { width: 16, height: 16, rgb: vec![[value; 3]; 256], nir: Vec::new() };
 /// let figures = pair(&gray(100), &gray(151), None, PIXELS_PER_DEGREE)?;
 /// assert!((figures.all().mse - 0.04).abs() < 1e-12);
 /// # Ok::<(), furrow_base::Error>(())

@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 ///     lights: [Daylight(sun: Angles(elevation_deg: Uniform(30, 60), azimuth_deg: 140))],
 ///     plants: [(species: "species/sugar_beet.ron", growth: Bbch(14))],
 /// )"#;
-/// let field: furrow_field::desc::FieldDesc = ron::from_str(text).unwrap();
+/// let field: furrow_field::desc::FieldDesc = furrow_base::ron_file::RonFile::of(text).parse().unwrap();
 /// assert_eq!(field.plants.len(), 1);
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
