@@ -106,6 +106,7 @@ impl Players {
             refine: Refine::default(),
             pixel_mm: None,
             classes: plan.classes.clone(),
+            crops: Vec::new(),
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&values),
             plan_sha256: identity.hash()?,

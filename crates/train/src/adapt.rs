@@ -123,6 +123,6 @@ impl AdaptOptions<'_> {
             normalization: card.normalization,
         };
         let plan = Plan { adaptation: Some(adaptation), ..plan };
-        session::train(&plan, Some(self.run), Some(photos), machine, folder, callbacks)
+        session::train(&plan, &card.crops, Some(self.run), Some(photos), machine, folder, callbacks)
     }
 }

@@ -36,6 +36,9 @@ pub const RESULT: &str = "result.json";
 /// Valid range of a model card's pixel size on the ground, millimetres.
 pub const PIXEL_MM: RangeInclusive<f64> = ground::PIXEL_MM;
 
+/// Largest number of crops of a model card.
+const MOST_CROPS: usize = 64;
+
 /// Plan with checksums of its images. Two trainings with equal identities give the same weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
@@ -129,6 +132,9 @@ pub struct ModelCard {
     pub pixel_mm: Option<f64>,
     /// Classes, in the order of the network's outputs.
     pub classes: Classes,
+    /// English names of the crops that the network was trained for; empty if it was trained for crops of any kind.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub crops: Vec<String>,
     /// File name of the weights, in the folder of the card.
     pub weights: String,
     /// SHA-256 over names, shapes and values of the weights.
@@ -152,6 +158,10 @@ impl ModelCard {
         self.resize.check()?;
         self.classes.check()?;
         self.refine.check(&self.classes, bands)?;
+        let is_name = |name: &String| !name.trim().is_empty() && !name.contains(char::is_control);
+        if self.crops.len() > MOST_CROPS || !self.crops.iter().all(is_name) {
+            return Err(format!("its crops are not up to {MOST_CROPS} names"));
+        }
         if [width, height].iter().any(|side| **side < self.network.least_side()) {
             return Err(format!("{} does not support {width} × {height} pixels", self.network.name()));
         }

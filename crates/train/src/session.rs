@@ -58,7 +58,18 @@ pub fn fit(
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Results> {
-    train(plan, begin, None, machine, folder, callbacks)
+    train(plan, &[], begin, None, machine, folder, callbacks)
+}
+
+/// Like [`fit`], from random or pretrained weights, for a network of the named crops: its model card lists them.
+pub fn fit_crops(
+    plan: &Plan,
+    crops: &[String],
+    machine: &Machine,
+    folder: &Path,
+    callbacks: &Callbacks<'_>,
+) -> Result<Results> {
+    train(plan, crops, None, None, machine, folder, callbacks)
 }
 
 /// Returns the weights of the run to start from. Its network, normalization, and numbers of bands and classes must be those of
@@ -78,20 +89,22 @@ fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
     Ok(values)
 }
 
-/// Like [`fit`], and for a self-training also takes the photographs without labels.
+/// Like [`fit`]; `crops` are listed in the model card, and a self-training also takes the photographs without labels.
 pub(super) fn train(
     plan: &Plan,
+    crops: &[String],
     begin: Option<&Path>,
     photos: Option<Photos>,
     machine: &Machine,
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Results> {
-    guarded(|| train_here(plan, begin, photos, machine, folder, callbacks))
+    guarded(|| train_here(plan, crops, begin, photos, machine, folder, callbacks))
 }
 
 fn train_here(
     plan: &Plan,
+    crops: &[String],
     begin: Option<&Path>,
     photos: Option<Photos>,
     machine: &Machine,
@@ -175,6 +188,7 @@ fn train_here(
         refine: plan.hyper.refine,
         pixel_mm,
         classes: plan.classes.clone(),
+        crops: crops.to_vec(),
         weights: run::WEIGHTS.into(),
         weights_sha256: weights::hash(&outcome.values),
         plan_sha256: hash,
