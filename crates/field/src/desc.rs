@@ -5,7 +5,7 @@ use crate::drive::{DriveDesc, MountedDesc};
 use furrow_base::ron_file::{self, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
 use furrow_base::sampling::Stream;
 use furrow_grow::model::Up;
-use furrow_grow::plant::{ConditionDesc, PlantDesc, Stage};
+use furrow_grow::plant::{ConditionDesc, Form, PlantDesc, Stage};
 use furrow_grow::scatter::{RowsDesc, WeedsDesc};
 use furrow_grow::soil::SoilDesc;
 use furrow_optics::light::LightDesc;
@@ -446,6 +446,13 @@ impl Role {
 }
 
 impl SpeciesDesc {
+    /// Returns `true` if both species have the same growth form; maize and the small grasses count as one.
+    pub fn grows_like(&self, other: &Self) -> bool {
+        let grass = |form| matches!(form, Form::Tuft | Form::Cane);
+        let (own, other) = (self.plant.form, other.plant.form);
+        own == other || grass(own) && grass(other)
+    }
+
     /// Returns the paths of all leaf textures that the species file names.
     pub fn textures(&self) -> impl Iterator<Item = &str> {
         self.materials.values().flat_map(|leaf| leaf.texture.iter().flat_map(Pick::all)).map(String::as_str)

@@ -37,12 +37,14 @@
 //! | `run` | the folder of a training run |
 //! | [`zoo`] | trained networks that ship with the program |
 //! | `measure`, `figure` | scores; charts and report pages |
+//! | `crop` | networks for a named crop: species, scene file, recipe |
 //! | `baseline` | ExG threshold and component-size rules that a network must beat |
 //! | `deploy` | a trained model as ONNX or TorchScript; predictions for photographs without labels |
 
 #[cfg(feature = "torch")]
 pub mod adapt;
 pub mod baseline;
+pub mod crop;
 pub mod data;
 pub mod deploy;
 pub mod enlarge;
