@@ -18,7 +18,7 @@ pub(crate) struct InferenceArgs {
     /// Refinement of predictions: none, or a comma-separated list of colour (pixels of similar colour tend to be of the same kind, plant or
     /// soil), plants (connected plant pixels are of one class), rows (crop rows and plant sizes help to separate crop from weed; needs
     /// plants) and appearance (so do appearance features, learnt from all images given, which should be of one field; needs rows).
-    /// Default: as set in training.
+    /// Default: as set in training; colour alone for a network of `train make`, which knows the crop.
     #[arg(long, value_name = "NAMES", value_parser = Refine::parse)]
     refine: Option<Refine>,
 }

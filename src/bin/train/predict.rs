@@ -5,12 +5,14 @@ use crate::machine::MachineArgs;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
+use furrow_train::crop::check_crop;
 use furrow_train::data::Band;
-use furrow_train::deploy::input_images;
+use furrow_train::deploy::guard::{self, Implausible};
+use furrow_train::deploy::input_images::{self, InputImage, Prediction};
 use furrow_train::deploy::predict::{self, Options, Predictions};
 use furrow_train::ensemble::Ensemble;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `train predict`.
 #[derive(clap::Args)]
@@ -30,6 +32,10 @@ pub(crate) struct Args {
     /// Batch size: images that are predicted at once.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
     batch: u16,
+    /// Crop that is sown in the images, by any name of its species. A network that `train make` trained for other crops is refused; for a
+    /// network that knows no crop, a warning is printed.
+    #[arg(long, value_name = "NAME")]
+    crop: Option<String>,
     #[command(flatten)]
     inference: InferenceArgs,
     #[command(flatten)]
@@ -50,30 +56,85 @@ fn band(text: &str) -> Result<(Band, PathBuf), String> {
 /// Predicts the images; returns the paths of the files written.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut trained = Ensemble::open(&args.run)?;
+    let unknown = args.crop.as_deref().map(|name| check_crop(&trained.card, name)).transpose()?.flatten();
+    if let Some(warning) = unknown {
+        furrow_cli::message!("warning: {warning}");
+    }
     args.inference.apply(&mut trained.card)?;
     cli::check_folder(&args.out)?;
-    let pictures = input_images::find(&args.images, &trained.card.input, &args.bands)?;
-    let passes = predict::passes(&trained.card, pictures.len());
-    let bar = if args.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
-    let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let how = Options {
-        precision: &args.machine.precision,
-        threads: args.machine.threads(),
+    let job = Job {
+        images: &args.images,
+        bands: &args.bands,
         batch: args.batch.into(),
         pixel_mm: args.inference.pixel_mm(),
-        done: &|done| bar.set_position(done as u64),
-        stop: signals.catch(),
+        machine: &args.machine,
+        quiet: args.quiet,
+        signals,
     };
-    let predicted = predict::predict(&trained, &pictures, &args.out, &args.machine.machine(), &how);
-    bar.finish_and_clear();
-    let predicted = predicted?;
-    if !args.quiet && predicted.done > 0 {
-        let each = predicted.seconds / predicted.done as f64;
-        let pictures = if predicted.done == 1 { "image" } else { "images" };
-        furrow_cli::message!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
+    job.run(&trained, &args.out)
+}
+
+/// Images to predict, and how.
+pub(crate) struct Job<'a> {
+    /// Image files, folders of them, or images of datasets.
+    pub(crate) images: &'a [PathBuf],
+    /// Folders of bands.
+    pub(crate) bands: &'a [(Band, PathBuf)],
+    /// Batch size.
+    pub(crate) batch: usize,
+    /// Ground sampling distance of the images, if it was given.
+    pub(crate) pixel_mm: Option<f64>,
+    /// Device and threads.
+    pub(crate) machine: &'a MachineArgs,
+    /// Whether progress is hidden.
+    pub(crate) quiet: bool,
+    /// Signals that stop the prediction.
+    pub(crate) signals: &'a Signals,
+}
+
+impl Job<'_> {
+    /// Predicts the images into `out`. If a network for a named crop finds implausibly little of it, warns, and writes the predictions of
+    /// the network for any field beside them. Returns the paths of the files written.
+    pub(crate) fn run(&self, trained: &Ensemble, out: &Path) -> Result<Vec<PathBuf>> {
+        let pictures = input_images::find(self.images, &trained.card.input, self.bands)?;
+        let predicted = self.predict(trained, &pictures, out)?;
+        let found = Implausible::of(&trained.card, &predicted.pixels);
+        let mut paths = outcome(predicted, pictures.len())?;
+        let Some(found) = found else { return Ok(paths) };
+        furrow_cli::message!("warning: {}", found.warning(&trained.card));
+        Prediction::note(out, &found)?;
+        let other = Ensemble::open(Path::new(guard::OTHER))?;
+        let pictures = input_images::find(self.images, &other.card.input, &[])?;
+        let beside = Job { bands: &[], pixel_mm: None, ..*self };
+        let predicted = beside.predict(&other, &pictures, &out.join(&found.beside))?;
+        paths.extend(outcome(predicted, pictures.len())?);
+        Ok(paths)
     }
-    outcome(predicted, pictures.len())
+
+    /// Predicts the images into `out` and shows the progress.
+    fn predict(&self, trained: &Ensemble, pictures: &[InputImage], out: &Path) -> Result<Predictions> {
+        let passes = predict::passes(&trained.card, pictures.len());
+        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
+        let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let how = Options {
+            precision: &self.machine.precision,
+            threads: self.machine.threads(),
+            batch: self.batch,
+            pixel_mm: self.pixel_mm,
+            done: &|done| bar.set_position(done as u64),
+            stop: self.signals.catch(),
+        };
+        let predicted = predict::predict(trained, pictures, out, &self.machine.machine(), &how);
+        bar.finish_and_clear();
+        let predicted = predicted?;
+        if !self.quiet && predicted.done > 0 {
+            let each = predicted.seconds / predicted.done as f64;
+            let pictures = if predicted.done == 1 { "image" } else { "images" };
+            furrow_cli::message!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
+        }
+        Ok(predicted)
+    }
 }
 
 /// Returns the paths of the files, or an error that lists the images that could not be read; `asked` is the number of images.

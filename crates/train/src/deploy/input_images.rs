@@ -7,6 +7,7 @@
 //!
 //! Images of a packed dataset are read from its archives.
 
+use super::guard::Implausible;
 use crate::data::{Band, Pick, Resize, Selection, Shape, bands};
 use crate::refine::Refine;
 use crate::run::{self, ModelCard};
@@ -322,6 +323,12 @@ pub struct Prediction {
     /// Refinement of the predictions, in the syntax of `--refine`.
     #[serde(default, skip_serializing_if = "Refine::is_none")]
     pub refine: Refine,
+    /// Crops that the network was trained for; empty if it was trained for crops of any kind.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub crops: Vec<String>,
+    /// Result of the last prediction in this folder, if it labelled implausibly little vegetation as crop.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub implausible: Option<Implausible>,
     /// Class names in the order of the class numbers, with their sRGB colours.
     pub classes: Vec<(String, [u8; 3])>,
     /// Path of the image of each prediction, by prediction name.
@@ -382,11 +389,20 @@ impl Prediction {
             resize: card.resize.name(),
             pixel_mm,
             refine: card.refine,
+            crops: card.crops.clone(),
+            implausible: None,
             classes,
             pictures: all,
         };
         run::write_json(&path, &prediction)?;
         Ok(prediction)
+    }
+
+    /// Adds an implausible result to the `prediction.json` of a folder.
+    pub fn note(folder: &Path, implausible: &Implausible) -> Result<()> {
+        let path = folder.join(PREDICTION);
+        let there: Self = run::read_json(&path)?;
+        run::write_json(&path, &Self { implausible: Some(implausible.clone()), ..there })
     }
 
     /// Removes the named images, which could not be read, unless a prediction of them exists; deletes the file if none is left.

@@ -5,6 +5,7 @@
 //! | `onnx` | export as an ONNX graph that includes the input normalization |
 //! | `torchscript` | export for libtorch and PyTorch, with the same input |
 //! | `pictures` | input images, the files of their bands, and the names of the prediction files |
+//! | `guard` | predictions of a network for a named crop that can hardly be right |
 //! | `enlarge` | scores resized to the image's original size, and their argmax |
 //! | `overlay` | prediction blended over its image |
 //! | `predict` | prediction of images with a trained model |
@@ -18,6 +19,7 @@ use super::data::Band;
 use super::run::ModelCard;
 use serde::Serialize;
 
+pub mod guard;
 pub mod input_images;
 pub mod onnx;
 pub mod overlay;

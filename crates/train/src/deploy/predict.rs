@@ -50,6 +50,8 @@ pub struct Predictions {
     pub faults: Vec<Error>,
     /// Time spent in the network, seconds.
     pub seconds: f64,
+    /// Number of pixels of each class, in the order of the class numbers.
+    pub pixels: Vec<u64>,
 }
 
 /// An image that has been read and prepared for the network.
@@ -128,9 +130,15 @@ fn predict_here(
         for handle in handles {
             written.extend(supervised(|| handle.join().unwrap_or_else(|panic| resume_unwind(panic)))??);
         }
-        written.sort();
+        written.sort_by_key(|(number, _)| *number);
         made.done = written.len();
-        made.paths = written.into_iter().flat_map(|(_, paths)| paths).collect();
+        made.pixels = vec![0; card.classes.len()];
+        for (_, drawn) in written {
+            made.paths.extend(drawn.paths);
+            for (sum, pixels) in made.pixels.iter_mut().zip(drawn.pixels) {
+                *sum += pixels;
+            }
+        }
         Ok(())
     })?;
     if options.stop.load(Ordering::Relaxed) {
@@ -196,8 +204,15 @@ fn read<'s, 'a: 's>(
 
 /// Index of an image, the image, and its class scores.
 type Scored<'a> = (usize, PreparedImage<'a>, Scores);
-/// Index of each image and the files written for it.
-type Written = Result<Vec<(usize, [PathBuf; 2])>>;
+/// Index of each image and what was written for it.
+type Written = Result<Vec<(usize, Drawn)>>;
+
+/// Prediction of an image that was written.
+struct Drawn {
+    paths: [PathBuf; 2],
+    /// Number of pixels of each class.
+    pixels: Vec<u64>,
+}
 
 /// Starts a thread that writes the predictions sent to it; sets `failed` if a file cannot be written.
 fn write<'s, 'a: 's>(
@@ -213,7 +228,7 @@ fn write<'s, 'a: 's>(
         for (number, ready, mut scores) in receiver {
             let drawn = supervised(|| draw(card, out, &ready, &mut scores, appearance));
             match drawn.map_err(|bug| bug.within(&ready.picture.name)).and_then(|drawn| drawn) {
-                Ok(paths) => written.push((number, paths)),
+                Ok(drawn) => written.push((number, drawn)),
                 Err(e) => {
                     failed.store(true, Ordering::Relaxed);
                     return Err(e);
@@ -270,14 +285,14 @@ fn infer<'a>(
     Ok(seconds)
 }
 
-/// Refines the scores of one image and writes its class map and overlay; returns the two paths.
+/// Refines the scores of one image and writes its class map and overlay.
 fn draw(
     card: &ModelCard,
     out: &Path,
     ready: &PreparedImage<'_>,
     scores: &mut Scores,
     appearance: Option<&Appearance>,
-) -> Result<[PathBuf; 2]> {
+) -> Result<Drawn> {
     let (width, height) = (ready.width, ready.height);
     scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
     let colors = card.classes.colors();
@@ -297,5 +312,9 @@ fn draw(
         files.add(&paths[0], &labels)?;
         files.add(&paths[1], &over)
     })?;
-    Ok(paths)
+    let mut pixels = vec![0; card.classes.len()];
+    for class in &classes {
+        pixels[usize::from(*class)] += 1;
+    }
+    Ok(Drawn { paths, pixels })
 }
