@@ -55,6 +55,8 @@ mod labels;
 mod labels_only;
 mod layers;
 mod light;
+#[cfg(feature = "train")]
+mod make;
 mod measure;
 mod mitsuba;
 mod models;

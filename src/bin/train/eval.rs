@@ -9,7 +9,7 @@ use furrow_cli::cli::signal::Signals;
 use furrow_train::data::{Pick, Resize, Selection};
 use furrow_train::ensemble::Ensemble;
 use furrow_train::{session, zoo};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `train eval`.
 #[derive(clap::Args)]
@@ -46,14 +46,25 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         args.run.join("eval").join(name)
     });
     cli::check_folder(&out)?;
-    let (machine, threads) = (args.machine.machine(), args.machine.threads());
+    evaluate(&trained, &args.run, &args.set, &out, &args.machine, signals)
+}
+
+/// Evaluates a trained model of the folder `run` on a set, prints the scores, and writes the report to `out`.
+pub(crate) fn evaluate(
+    trained: &Ensemble,
+    run: &Path,
+    set: &Selection,
+    out: &Path,
+    machine: &MachineArgs,
+    signals: &Signals,
+) -> Result<Vec<PathBuf>> {
     let card = &trained.card;
-    let (_, images) = args.set.open(Pick::All, 0)?;
+    let (_, images) = set.open(Pick::All, 0)?;
     let mut thumbnails = report::thumbnails(images.len(), &card.input.bands, card.classes.len());
     let mut see = |seen: &session::Predicted<'_>| thumbnails.see(seen.example, seen.size, seen.predicted);
-    let report =
-        session::evaluate(&trained, &args.set, &args.machine.precision, threads, &machine, signals.catch(), &mut see)?;
-    let title = format!("{} on {}", args.run.display(), args.set);
+    let (precision, threads) = (&machine.precision, machine.threads());
+    let report = session::evaluate(trained, set, precision, threads, &machine.machine(), signals.catch(), &mut see)?;
+    let title = format!("{} on {set}", run.display());
     let lead = format!(
         "{}, {} parameters, {}{}{}.",
         card.network.about().trim_end_matches('.'),
@@ -66,7 +77,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         if card.refine.is_none() { ", not refined".into() } else { format!(", refined by {}", card.refine.name()) },
         if trained.size() > 1 { format!("; the mean of {} runs", trained.size()) } else { String::new() }
     );
-    let paths = report::write(&out, &title, &lead, &report, &thumbnails.kept(), &card.classes.colors())?;
+    let paths = report::write(out, &title, &lead, &report, &thumbnails.kept(), &card.classes.colors())?;
     furrow_cli::message!("{}", report.summary().markdown().trim_end());
     Ok(paths)
 }

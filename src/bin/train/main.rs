@@ -12,6 +12,7 @@ mod export;
 mod fit;
 mod inference;
 mod machine;
+mod make;
 mod pages;
 mod predict;
 mod report;
@@ -38,6 +39,7 @@ struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
+  train make --crop maize --photos photos/ --out nets/maize   a network for maize, and its predictions
   train fit --set data/d --out runs/d                     Basic SegNet on the training set of a dataset
   train fit --set data/d --set data/real@0..10*4 --network unet --size 240x180 --out runs/augmented
   train eval runs/d --set data/real@12..20                scores on a test set of real images
@@ -57,6 +59,8 @@ Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, H
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Make a network for a named crop in one command: scene file, images, training, evaluation, predictions for photographs.
+    Make(Box<make::Args>),
     /// Train a network.
     Fit(Box<fit::Args>),
     /// Evaluate a trained network on a test set: scores, confusion matrix, report.
@@ -93,6 +97,7 @@ fn main() -> ExitCode {
     let signals = signal::Signals::watch();
     // A panic ends the program with exit code 1 and a message like any other error.
     let done = supervised(|| match verb {
+        Verb::Make(args) => make::run(&args, &signals),
         Verb::Fit(args) => fit::run(&args, &signals),
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),

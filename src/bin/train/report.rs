@@ -1,10 +1,12 @@
 //! Reports of evaluations and training runs: tables, figure and HTML page.
 
 use furrow_base::Result;
-use furrow_output::write_files;
+use furrow_dataset::model::classes::Classes;
+use furrow_output::{read_indexed, write_atomically, write_files};
 use furrow_report::chart::{Chart, Curve};
 use furrow_train::data::Band;
-use furrow_train::figure::{Page, Thumbnail, Thumbnails, compose};
+use furrow_train::deploy::input_images::{InputImage, files};
+use furrow_train::figure::{Page, Thumbnail, Thumbnails, compose, spread};
 use furrow_train::fit::checkpoint::History;
 use furrow_train::fit::log;
 use furrow_train::measure::Report;
@@ -17,6 +19,13 @@ const WORST: usize = 8;
 const SPREAD: usize = 4;
 /// Maximum width and height of the images shown, pixels.
 const LARGEST: u32 = 360;
+
+/// Name of the page of an evaluation.
+pub(crate) const EVALUATION: &str = "report.html";
+/// Name of the page of predictions.
+pub(crate) const PREDICTIONS: &str = "predictions.html";
+/// Largest number of images on a page of predictions.
+const SHOWN: usize = 24;
 
 /// Returns a collector for the images to show of a set of `images` images: the worst by mean I/U over `classes` classes, and some
 /// spread over the set.
@@ -46,12 +55,51 @@ pub(crate) fn write(
         ..Page::default()
     };
     let files = [
-        ("report.html", page.html()?.into_bytes()),
+        (EVALUATION, page.html()?.into_bytes()),
         ("figure.png", compose(thumbnails, palette, true).png()?),
         ("report.json", run::json(report)?),
         ("report.md", tables.into_bytes()),
     ];
     write_files(out, &files)
+}
+
+/// Writes the page `predictions.html` with some of the images, evenly spread, and their predictions in `folders`, which are named by the
+/// heads of their columns. Returns its path.
+pub(crate) fn write_predictions(
+    out: &Path,
+    (title, lead): (&str, &str),
+    pictures: &[InputImage],
+    folders: &[(String, PathBuf)],
+    classes: &Classes,
+) -> Result<PathBuf> {
+    let mut thumbnails = Vec::new();
+    for picture in spread(pictures.len(), SHOWN).into_iter().map(|k| &pictures[k]) {
+        let maps = folders.iter().map(|(_, folder)| folder.join(&files(&picture.name)[0]));
+        let maps: Vec<PathBuf> = maps.filter(|map| map.is_file()).collect();
+        // Images that could not be read have no prediction.
+        if maps.len() < folders.len() {
+            continue;
+        }
+        let image = picture.read()?;
+        let maps = maps.iter().map(|map| Ok(read_indexed(map)?.2)).collect::<Result<Vec<_>>>()?;
+        let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
+        thumbnails.push(Thumbnail::new(&picture.name, (image.width, image.height), &image.rgb, &[], &maps, LARGEST));
+    }
+    let heads: Vec<String> = folders.iter().map(|(head, _)| head.clone()).collect();
+    let (palette, names) = (classes.colors(), classes.names());
+    let page = Page {
+        kind: "Predictions",
+        title,
+        lead,
+        thumbnails: &thumbnails,
+        predictors: &heads,
+        palette: &palette,
+        classes: &names,
+        ..Page::default()
+    };
+    let path = out.join(PREDICTIONS);
+    write_atomically(&path, page.html()?.as_bytes())?;
+    Ok(path)
 }
 
 /// Returns the charts of a training run: loss (`loss` is its name), learning rate and validation I/U.

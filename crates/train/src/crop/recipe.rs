@@ -42,9 +42,9 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// About ten minutes on two cores: 36 images to train on and 4 to evaluate.
+    /// Less than ten minutes on two cores by the estimate: 36 images to train on and 4 to evaluate.
     pub const QUICK: Self = Self { images: 40, spp: 4, steps: 300, size: SIZE, network: NETWORK };
-    /// About an hour on two cores: 360 images to train on and 40 to evaluate.
+    /// Less than an hour on two cores by the estimate: 360 images to train on and 40 to evaluate.
     pub const USUAL: Self = Self { images: 400, spp: 8, steps: 600, ..Self::QUICK };
 
     /// Returns the order of the dataset of the scene file.

@@ -18,7 +18,7 @@ const INDENT: &str = "        ";
 const SPREAD: &str = "spread: (per_m2: Weighted([(0, 5), (3, 1), (15, 1)]))";
 /// Rows of a crop that the wide scene file does not list: estimates, from cereals to maize.
 const ROWS: &str = "rows: (spacing_m: Uniform(0.15, 0.75), in_row_m: Uniform(0.05, 0.3), azimuth_deg: Uniform(0, 180), offset_m: Uniform(-0.2, 0.2), emergence: Uniform(0.6, 0.97))";
-/// BBCH stage from which plants flower; the ages of a species that the wide scene file does not list end before it.
+/// First BBCH stage with inflorescences; the ages of a species that the wide scene file does not list end before it.
 const FLOWERING: u32 = 50;
 /// Three overlapping parts of a plant's growth, as fractions: seedlings, young plants, grown ones.
 const AGES: [(f64, f64); 3] = [(0.0, 0.4), (0.25, 0.7), (0.6, 1.0)];
@@ -127,7 +127,7 @@ impl Wide {
     }
 }
 
-/// Returns the name by which a scene file in any folder finds a file that ships: its own name for species and soils, its absolute path
+/// Returns what a scene file in any folder writes for a file that ships: the bare name for species and soils, its absolute path
 /// for others. Returns `None` if there is no such file.
 fn found_anywhere(file: &Path) -> Option<String> {
     if !file.is_file() {

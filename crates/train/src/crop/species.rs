@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Number of similar names that the error about an unknown name lists.
 const NEAR: usize = 3;
 
-/// A species, with the name by which a scene file finds it.
+/// A species, and how a scene file names it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Species {
     /// Species file.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Smallest plausible fraction of crop among the vegetation pixels of a set of photographs. A crop that was sown and has emerged covers
 /// more than a twentieth of what all plants cover, unless weeds have overgrown it. An estimate, not fitted to any set.
 pub const LEAST_CROP: f64 = 0.05;
-/// Smallest fraction of vegetation among all pixels from which the fraction of crop is judged: below it there may be no crop yet.
+/// Smallest fraction of vegetation among all pixels for this check: with less, there may be no crop yet.
 pub const LEAST_VEGETATION: f64 = 0.005;
 /// Network whose predictions are given beside implausible ones: it ships, and knows no crop in particular.
 pub const OTHER: &str = "any-field";
