@@ -21,7 +21,7 @@
 
 #[doc(inline)]
 pub use furrow_base::ron_file::{
-    Bound, Count, Distribution, Elevation, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary,
+    Bound, Count, Distribution, Elevation, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Signed, Vary,
 };
 #[doc(inline)]
 pub use furrow_field::desc::{CropDesc, FieldDesc, Growth, ModelDesc, PlacedDesc, Role, SpeciesDesc, WeedDesc};

@@ -565,7 +565,7 @@ fn invalid_drives_are_reported() {
         ("twice", "\"right\"", "\"camera\"", "two cameras are called `camera`"),
         ("taken", "\"right\"", "\"next\"", "a camera cannot be called `next`"),
         ("rows", "Straight(heading_deg: 30, speed_m_s: 0.2)", "Poses(\"none.tum\")", "none.tum"),
-        ("far", "speed_m_s: 0.2", "speed_m_s: 500", "more than the 144 m² of one field"),
+        ("far", "speed_m_s: 0.2", "speed_m_s: 100", "more than the 144 m² of one field"),
         ("many", "frames: 3", "frames: 90000", "are too many for one field"),
         ("capitals", "\"right\"", "\"Camera\"", "two cameras are called `camera` and `Camera`"),
         (

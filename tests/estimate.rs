@@ -89,14 +89,14 @@ fn dense_ground_grows_as_estimated() {
 #[test]
 fn what_would_take_too_much_is_refused_where_it_stands() {
     for (soil, blamed) in [
-        ("soil: (\n clods: (over_5mm_per_m2: 9e11)\n)", "clods"),
+        ("soil: (\n clods: (over_5mm_per_m2: 9e7)\n)", "clods"),
         ("soil: (\n clods: (min_mm: 0.001),\n)", "clods"),
         ("soil: (\n crumbs: (min_mm: 0.0001),\n)", "crumbs"),
         ("soil: (\n stones: [(cover: 0.5), (cover: 0.5, median_mm: 0.0001, min_mm: 0.0001)],\n)", "stones"),
         ("soil: (\n litter: (straw_cover: 0.9, straw_width_mm: 0.0001),\n)", "straw_cover"),
-        ("soil: (\n litter: (sticks_per_m2: 1e12),\n)", "sticks_per_m2"),
+        ("soil: (\n litter: (sticks_per_m2: 1e8),\n)", "sticks_per_m2"),
         ("soil: (\n litter: (sticks_per_m2: 10, stubs: 1000000),\n)", "sticks_per_m2"),
-        ("soil: (\n litter: (bits_per_m2: 1e12),\n)", "bits_per_m2"),
+        ("soil: (\n litter: (bits_per_m2: 1e8),\n)", "bits_per_m2"),
     ] {
         let (keep, path) = with_soil(soil);
         let out = keep.path().join("out");
@@ -223,7 +223,7 @@ fn pictures_of_a_model_are_counted_together() {
 /// Every command that builds a field refuses it.
 #[test]
 fn every_verb_that_grows_a_field_refuses_it() {
-    let (keep, path) = with_soil("soil: (clods: (over_5mm_per_m2: 9e11))");
+    let (keep, path) = with_soil("soil: (clods: (over_5mm_per_m2: 9e7))");
     let scene = path.to_str().expect("UTF-8");
     let out = keep.path().join("out.png");
     let out = out.to_str().expect("UTF-8");
@@ -254,7 +254,7 @@ fn what_no_field_was_meant_to_have_is_refused() {
         Ok(_) => panic!("not refused: {text:.100}"),
         Err(error) => error.to_string(),
     };
-    assert!(refused(&camera("4000000000")).contains("more than 1000 m"));
+    assert!(refused(&camera("4000")).contains("at most 1000"));
     assert!(refused(&lights(257)).contains("257 lights"));
     assert!(assemble::field_of(&lights(256), &Options { width: Some(8), ..Options::default() }).is_ok());
 }

@@ -266,7 +266,7 @@ fn record_of_pack(bytes: &[u8]) -> Option<String> {
     let listed = serde_json::to_string(&images).ok()?;
     let open = format!("{{\"pack\":\"train-000000\",\"tar\":{tar},\"members\":{members},\"images\":{listed}");
     let hash = Checksum::of(format!("{open}}}\n").as_bytes()).sha256;
-    Some(format!("{open},\"seal_sha256\":\"{hash}\"}}"))
+    Some(format!("{open},\"seal_sha256\":\"{hash}\"}}\n"))
 }
 
 fn pack(bytes: &[u8]) {

@@ -42,7 +42,7 @@ pub struct DaysDesc {
     pub pace: Vary<Factor>,
     /// Time constant of soil crusting by rain, days: after this time, crusts have 63 % of their final share. Crusts form on soil layers
     /// with `clods` below 0.5, from sowing on, ten days before emergence.
-    pub crust_days: Num<Positive>,
+    pub crust_days: Num<Positive<1000>>,
 }
 
 impl Default for DaysDesc {

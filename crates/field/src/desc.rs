@@ -2,7 +2,7 @@
 
 use crate::days::DaysDesc;
 use crate::drive::{DriveDesc, MountedDesc};
-use furrow_base::ron_file::{self, Finite, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{self, Bound, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_grow::model::Up;
 use furrow_grow::plant::{ConditionDesc, Form, PlantDesc, Stage};
@@ -62,7 +62,7 @@ pub struct FieldDesc {
     /// Planted distance to the east, north, west and south of the point below each camera (for a scan, below the LiDAR), metres; at
     /// most 100.
     #[serde(default = "reach", skip_serializing_if = "is_reach")]
-    pub reach_m: Num<Positive>,
+    pub reach_m: Num<Positive<100>>,
     /// Pixel reconstruction filter.
     #[serde(default = "point_spread")]
     pub filter: Filter,
@@ -127,12 +127,12 @@ impl Detail {
 /// Default of `reach_m`, metres: at most 144 m², about 1,500 beets. A camera at 10 m with a 60° angle of view sees this area.
 const REACH_M: f64 = 6.0;
 
-fn reach() -> Num<Positive> {
+fn reach() -> Num<Positive<100>> {
     Num::new(REACH_M)
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
-fn is_reach(reach_m: &Num<Positive>) -> bool {
+fn is_reach(reach_m: &Num<Positive<100>>) -> bool {
     reach_m.get() == REACH_M
 }
 
@@ -193,13 +193,13 @@ fn point_spread() -> Filter {
 pub enum Growth {
     /// Age in days after emergence.
     #[schemars(extend("x-example" = "(Uniform(18, 28))"))]
-    AgeDays(Vary<NonNegative>),
+    AgeDays(Vary<NonNegative<1000>>),
     /// Growth stage, BBCH scale (Meier 2001).
     #[schemars(extend("x-example" = "(Choice([12, 14]))"))]
     Bbch(Vary<PositiveCount>),
     /// Day of emergence, for a field with `days`; days count from the emergence of the first crop.
     #[schemars(extend("x-example" = "(Normal(mean: 12, sd: 2))"))]
-    EmergesOn(Vary<Finite>),
+    EmergesOn(Vary<Signed<1000>>),
     /// One of these growths. One index is drawn per field and used for every such list of the scene file, so all lists have the same
     /// length.
     Either(Vec<Growth>),
@@ -248,9 +248,9 @@ pub struct CropDesc {
     /// Age or growth stage of each plant.
     pub growth: Growth,
     /// Factor on plant sizes, in addition to that of the species file: below 1 if cold or drought kept plants small for their leaf number.
-    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[serde(default = "as_it_is::<Positive<100>>", skip_serializing_if = "is_as_it_is")]
     #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
-    pub vigour: Vary<Positive>,
+    pub vigour: Vary<Positive<100>>,
     /// Seed rows.
     pub rows: RowsDesc,
     /// Age, health and damage of the plants; that of the species file by default.
@@ -268,9 +268,9 @@ pub struct WeedDesc {
     /// Age or growth stage of each plant.
     pub growth: Growth,
     /// Factor on plant sizes, in addition to that of the species file: below 1 if cold or drought kept plants small for their leaf number.
-    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[serde(default = "as_it_is::<Positive<100>>", skip_serializing_if = "is_as_it_is")]
     #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
-    pub vigour: Vary<Positive>,
+    pub vigour: Vary<Positive<100>>,
     /// Density and clustering.
     #[serde(default)]
     pub spread: WeedsDesc,
@@ -289,16 +289,16 @@ pub struct PlacedDesc {
     /// Age or growth stage.
     pub growth: Growth,
     /// Factor on plant sizes, in addition to that of the species file: below 1 if cold or drought kept the plant small for its leaf number.
-    #[serde(default = "as_it_is", skip_serializing_if = "is_as_it_is")]
+    #[serde(default = "as_it_is::<Positive<100>>", skip_serializing_if = "is_as_it_is")]
     #[schemars(extend("x-example" = "Uniform(0.9, 1.1)"))]
-    pub vigour: Vary<Positive>,
+    pub vigour: Vary<Positive<100>>,
     /// Point where the stem meets the ground, metres east and north.
     #[serde(default = "origin")]
     #[schemars(extend("x-example" = "(0.1, Uniform(-0.1, 0.1))"))]
-    pub position_m: (Vary<Finite>, Vary<Finite>),
+    pub position_m: (Vary<Signed<1000>>, Vary<Signed<1000>>),
     /// Rotation about its axis, degrees clockwise when seen from above.
-    #[serde(default = "no_turn")]
-    pub turn_deg: Vary<Finite>,
+    #[serde(default = "no_turn::<Signed<360>>")]
+    pub turn_deg: Vary<Signed<360>>,
     /// Number of the only leaf to keep, counted from 1 including cotyledons; by default the whole plant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "3"))]
@@ -338,16 +338,16 @@ pub struct ModelDesc {
     /// Position of its origin, metres east and north.
     #[serde(default = "origin")]
     #[schemars(extend("x-example" = "(0.1, Uniform(-0.1, 0.1))"))]
-    pub position_m: (Vary<Finite>, Vary<Finite>),
+    pub position_m: (Vary<Signed<1000>>, Vary<Signed<1000>>),
     /// Height of its origin above the ground there, metres; a negative value sinks it in.
-    #[serde(default = "no_turn")]
-    pub lift_m: Vary<Finite>,
+    #[serde(default = "no_turn::<Signed<100>>")]
+    pub lift_m: Vary<Signed<100>>,
     /// Rotation about the vertical axis, degrees clockwise when seen from above.
-    #[serde(default = "no_turn")]
-    pub turn_deg: Vary<Finite>,
+    #[serde(default = "no_turn::<Signed<360>>")]
+    pub turn_deg: Vary<Signed<360>>,
     /// Scale factor: 0.001 for a file in millimetres.
-    #[serde(default = "as_it_is")]
-    pub scale: Vary<Positive>,
+    #[serde(default = "as_it_is::<Positive<1_000_000>>")]
+    pub scale: Vary<Positive<1_000_000>>,
     /// Axis of the file that points up: Y, as in glTF and most OBJ files, or Z.
     #[serde(default)]
     pub up: Up,
@@ -366,19 +366,19 @@ pub struct ModelDesc {
 /// A fraction in each of R, G, B, NIR.
 pub type Shares = (Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>);
 
-fn as_it_is() -> Vary<Positive> {
+fn as_it_is<B: Bound>() -> Vary<B> {
     Vary::fixed(1.0)
 }
 
-fn is_as_it_is(factor: &Vary<Positive>) -> bool {
+fn is_as_it_is<B: Bound>(factor: &Vary<B>) -> bool {
     *factor == as_it_is()
 }
 
-fn origin() -> (Vary<Finite>, Vary<Finite>) {
+fn origin() -> (Vary<Signed<1000>>, Vary<Signed<1000>>) {
     (Vary::fixed(0.0), Vary::fixed(0.0))
 }
 
-fn no_turn() -> Vary<Finite> {
+fn no_turn<B: Bound>() -> Vary<B> {
     Vary::fixed(0.0)
 }
 

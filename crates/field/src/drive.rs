@@ -7,7 +7,7 @@
 //! Source: Uhlenbeck & Ornstein 1930, "On the theory of the Brownian motion"; the exact discretisation, Gillespie 1996.
 
 use furrow_base::math::{Mat3, Vec2, Vec3, vec2};
-use furrow_base::ron_file::{Finite, NonNegative, Num, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_base::{Error, Result};
 use furrow_optics::sensor::{Camera, Lidar, Pose};
@@ -35,7 +35,7 @@ pub struct DriveDesc {
     pub frames: Num<PositiveCount>,
     /// Frame rate, images per second.
     #[serde(default = "ten")]
-    pub rate_hz: Num<Positive>,
+    pub rate_hz: Num<Positive<100_000>>,
     /// Path of the vehicle.
     #[serde(default)]
     pub path: PathDesc,
@@ -52,25 +52,25 @@ pub enum PathDesc {
     Straight {
         /// Heading, degrees clockwise from north; default 0.
         #[serde(default = "north")]
-        heading_deg: Vary<Finite>,
+        heading_deg: Vary<Signed<360>>,
         /// Speed over the ground, m/s; default 0.5.
         #[serde(default = "walk")]
-        speed_m_s: Vary<Positive>,
+        speed_m_s: Vary<Positive<100>>,
     },
     /// A straight line from the world's origin, parallel to the rows of the field's first crop.
     AlongRows {
         /// Speed over the ground, m/s; default 0.5.
         #[serde(default = "walk")]
-        speed_m_s: Vary<Positive>,
+        speed_m_s: Vary<Positive<100>>,
     },
     /// Straight legs from point to point. The vehicle changes heading at each point and stops at the last.
     Polyline {
         /// Points of the path, metres east and north; at least two.
         #[schemars(extend("x-example" = "[(0, 0), (0, 1), (0.4, 1.5)]"))]
-        points_m: Vec<(Num<Finite>, Num<Finite>)>,
+        points_m: Vec<(Num<Signed<1000>>, Num<Signed<1000>>)>,
         /// Speed over the ground, m/s; default 0.5.
         #[serde(default = "walk")]
-        speed_m_s: Vary<Positive>,
+        speed_m_s: Vary<Positive<100>>,
     },
     /// Poses of the first camera from a file, one image per line: time (s), position (m), quaternion x y z w that maps the camera's axes
     /// (right, down, forward) to the world, separated by blanks or commas. This is the format of the TUM RGB-D benchmark, and of
@@ -86,15 +86,15 @@ impl Default for PathDesc {
     }
 }
 
-fn ten() -> Num<Positive> {
+fn ten() -> Num<Positive<100_000>> {
     Num::new(10.0)
 }
 
-fn north() -> Vary<Finite> {
+fn north() -> Vary<Signed<360>> {
     Vary::fixed(0.0)
 }
 
-fn walk() -> Vary<Positive> {
+fn walk() -> Vary<Positive<100>> {
     Vary::fixed(0.5)
 }
 
@@ -103,24 +103,31 @@ fn walk() -> Vary<Positive> {
 #[serde(deny_unknown_fields, default)]
 pub struct ShakeDesc {
     /// Vertical deflection.
-    pub height_mm: Num<NonNegative>,
+    pub height_mm: Num<NonNegative<10_000>>,
     /// Sideways deflection.
-    pub across_mm: Num<NonNegative>,
+    pub across_mm: Num<NonNegative<10_000>>,
     /// Roll about the driving direction.
-    pub roll_deg: Num<NonNegative>,
+    pub roll_deg: Num<NonNegative<360>>,
     /// Pitch: nose up and down.
-    pub pitch_deg: Num<NonNegative>,
+    pub pitch_deg: Num<NonNegative<360>>,
     /// Yaw: nose left and right.
-    pub yaw_deg: Num<NonNegative>,
+    pub yaw_deg: Num<NonNegative<360>>,
     /// Correlation time τ, seconds: the autocorrelation of a deflection falls to 1/e in this time.
-    pub correlation_s: Num<Positive>,
+    pub correlation_s: Num<Positive<10_000>>,
 }
 
 impl Default for ShakeDesc {
     fn default() -> Self {
-        let none = Num::new(0.0);
+        let (still, straight) = (Num::new(0.0), Num::new(0.0));
         let correlation_s = Num::new(0.3);
-        Self { height_mm: none, across_mm: none, roll_deg: none, pitch_deg: none, yaw_deg: none, correlation_s }
+        Self {
+            height_mm: still,
+            across_mm: still,
+            roll_deg: straight,
+            pitch_deg: straight,
+            yaw_deg: straight,
+            correlation_s,
+        }
     }
 }
 

@@ -237,9 +237,9 @@ mod tests {
         );
         assert_eq!(desc.textures().collect::<Vec<_>>(), ["a/../pictures/leaf.png"]);
         assert_eq!(desc.plant.form, furrow_grow::plant::Form::Erect);
-        let sizes: Vec<Vec<Vary<NonNegative>>> =
+        let sizes: Vec<Vec<Vary<NonNegative<10_000>>>> =
             desc.plant.stages.iter().map(|s| s.layers.iter().map(|l| l.blade_mm.clone()).collect()).collect();
-        let fixed = Vary::<NonNegative>::fixed;
+        let fixed = Vary::<NonNegative<10_000>>::fixed;
         assert_eq!(sizes, [vec![fixed(10.0)], vec![fixed(20.0), fixed(12.0)]]);
         assert_eq!((desc.like, desc.plant.leaves), (None, String::new()));
         assert!((desc.materials["leaf"].pigments.chlorophyll.get() - 30.0).abs() < 1e-9);

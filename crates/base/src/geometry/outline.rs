@@ -35,11 +35,11 @@ pub enum Outline {
     Power {
         /// Exponent at the base: small values are blunt, values above 1 taper.
         #[serde(deserialize_with = "exponent")]
-        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS))]
+        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS, "minimum" = EXPONENTS.start, "exclusiveMaximum" = EXPONENTS.end))]
         a: f32,
         /// Exponent at the tip.
         #[serde(deserialize_with = "exponent")]
-        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS))]
+        #[schemars(extend("x-range" = EXPONENTS_IN_WORDS, "minimum" = EXPONENTS.start, "exclusiveMaximum" = EXPONENTS.end))]
         b: f32,
     },
     /// The whole rectangle of the image: for photographs and for lobed leaves, whose alpha channel cuts the shape.

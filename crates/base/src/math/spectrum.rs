@@ -91,21 +91,6 @@ impl Spectrum {
     }
 }
 
-impl schemars::JsonSchema for Spectrum {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Spectrum".into()
-    }
-
-    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        let number = schemars::json_schema!({ "type": "number" });
-        schemars::json_schema!({ "type": "array", "prefixItems": [number, number, number, number] })
-    }
-}
-
 impl From<[f32; 4]> for Spectrum {
     fn from(v: [f32; 4]) -> Self {
         Self(Vec4::from_array(v))

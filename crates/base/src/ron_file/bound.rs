@@ -5,15 +5,26 @@ use std::fmt;
 /// Range of valid values of a number.
 pub trait Bound: Copy + Clone + fmt::Debug + PartialEq {
     /// Smallest value.
-    const MIN: f64 = f64::NEG_INFINITY;
+    const MIN: f64;
     /// Largest value.
-    const MAX: f64 = f64::INFINITY;
+    const MAX: f64;
     /// `true` if the smallest value itself is not allowed.
     const ABOVE_MIN: bool = false;
     /// `true` if only whole numbers are allowed.
     const WHOLE: bool = false;
-    /// The range in words, to follow "must be".
-    const WORDS: &'static str;
+    /// The range in words, to follow "must be"; empty for words made of the limits.
+    const WORDS: &'static str = "";
+
+    /// Returns the range in words, to follow "must be".
+    fn words() -> String {
+        let (min, max) = (Self::MIN, Self::MAX);
+        match Self::WORDS {
+            "" if Self::WHOLE => format!("a whole number from {min} to {max}"),
+            "" if Self::ABOVE_MIN => format!("above {min}, at most {max}"),
+            "" => format!("between {min} and {max}"),
+            words => words.into(),
+        }
+    }
 
     /// Returns `true` if `x` is within the bound.
     fn holds(x: f64) -> bool {
@@ -27,13 +38,13 @@ pub trait Bound: Copy + Clone + fmt::Debug + PartialEq {
     /// Returns the message for a value `x` that is not within the bound.
     fn refuse(x: f64) -> String {
         if !x.is_finite() {
-            format!("{x} cannot be used: it must be {}", Self::WORDS)
+            format!("{x} cannot be used: it must be {}", Self::words())
         } else if x.abs() > LARGEST {
             format!("{x:e} is out of range: numbers here go up to {LARGEST:e}")
         } else if x != 0.0 && x.abs() < SMALLEST {
             format!("{x:e} is too close to 0 to be distinguished from it")
         } else {
-            format!("{x} is out of range: it must be {}", Self::WORDS)
+            format!("{x} is out of range: it must be {}", Self::words())
         }
     }
 }
@@ -54,20 +65,64 @@ macro_rules! bounds {
 }
 
 bounds! {
-    /// Any finite number.
-    Finite { const WORDS: &'static str = "a finite number"; }
-    /// Above zero.
-    Positive { const MIN: f64 = 0.0; const ABOVE_MIN: bool = true; const WORDS: &'static str = "above 0"; }
-    /// Zero or above.
-    NonNegative { const MIN: f64 = 0.0; const WORDS: &'static str = "0 or above"; }
     /// Between 0 and 1.
-    Fraction { const MIN: f64 = 0.0; const MAX: f64 = 1.0; const WORDS: &'static str = "between 0 and 1"; }
+    Fraction { const MIN: f64 = 0.0; const MAX: f64 = 1.0; }
     /// A factor relative to the usual value.
-    Factor { const MIN: f64 = 0.0; const MAX: f64 = 10.0; const ABOVE_MIN: bool = true; const WORDS: &'static str = "above 0, at most 10"; }
+    Factor { const MIN: f64 = 0.0; const MAX: f64 = 10.0; const ABOVE_MIN: bool = true; }
     /// A whole number, 0 or above.
-    Count { const MIN: f64 = 0.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 0 to 1000000"; }
+    Count { const MIN: f64 = 0.0; const MAX: f64 = 1e6; const WHOLE: bool = true; }
     /// A whole number, 1 or above.
-    PositiveCount { const MIN: f64 = 1.0; const MAX: f64 = 1e6; const WHOLE: bool = true; const WORDS: &'static str = "a whole number from 1 to 1000000"; }
+    PositiveCount { const MIN: f64 = 1.0; const MAX: f64 = 1e6; const WHOLE: bool = true; }
     /// Elevation above the horizon, degrees.
     Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
+}
+
+/// From `-MAX` to `MAX`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Signed<const MAX: u64>;
+
+impl<const MAX: u64> Bound for Signed<MAX> {
+    const MIN: f64 = -(MAX as f64);
+    const MAX: f64 = MAX as f64;
+}
+
+/// Above zero, at most `MAX`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Positive<const MAX: u64>;
+
+impl<const MAX: u64> Bound for Positive<MAX> {
+    const MIN: f64 = 0.0;
+    const MAX: f64 = MAX as f64;
+    const ABOVE_MIN: bool = true;
+}
+
+/// From zero to `MAX`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NonNegative<const MAX: u64>;
+
+impl<const MAX: u64> Bound for NonNegative<MAX> {
+    const MIN: f64 = 0.0;
+    const MAX: f64 = MAX as f64;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bound_has_two_ends_and_says_them() {
+        for (words, holds) in [
+            (Signed::<360>::words(), [Signed::<360>::holds(-360.0), Signed::<360>::holds(360.5)]),
+            (Positive::<20>::words(), [Positive::<20>::holds(20.0), Positive::<20>::holds(0.0)]),
+            (NonNegative::<20>::words(), [NonNegative::<20>::holds(0.0), NonNegative::<20>::holds(20.1)]),
+            (Count::words(), [Count::holds(3.0), Count::holds(3.5)]),
+        ] {
+            assert_eq!(holds, [true, false], "{words}");
+        }
+        assert_eq!(Signed::<360>::words(), "between -360 and 360");
+        assert_eq!(Positive::<20>::words(), "above 0, at most 20");
+        assert_eq!(NonNegative::<20>::words(), "between 0 and 20");
+        assert_eq!(PositiveCount::words(), "a whole number from 1 to 1000000");
+        assert_eq!(Elevation::refuse(91.0), "91 is out of range: it must be between -90 and 90 degrees");
+    }
 }

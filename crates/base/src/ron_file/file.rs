@@ -361,7 +361,7 @@ mod tests {
     #[serde(deny_unknown_fields)]
     #[allow(dead_code)]
     struct Sun {
-        elevation_deg: Vary<Positive>,
+        elevation_deg: Vary<Positive<1000>>,
         azimuth_deg: f64,
     }
 
@@ -398,17 +398,17 @@ mod tests {
         #[serde(deny_unknown_fields)]
         #[allow(dead_code)]
         struct Sheet {
-            side: Option<Vary<Positive>>,
-            size: Option<(Vary<Positive>, Vary<Positive>)>,
-            all: Option<Vec<Vary<Positive>>>,
+            side: Option<Vary<Positive<1000>>>,
+            size: Option<(Vary<Positive<1000>>, Vary<Positive<1000>>)>,
+            all: Option<Vec<Vary<Positive<1000>>>>,
             step: Option<Pace>,
         }
         #[derive(Debug, Deserialize, JsonSchema)]
         #[allow(dead_code)]
         enum Pace {
-            Even(Vary<Positive>),
-            Each(Vec<Vary<Positive>>),
-            Both(Vary<Positive>, Vary<Positive>),
+            Even(Vary<Positive<1000>>),
+            Each(Vec<Vary<Positive<1000>>>),
+            Both(Vary<Positive<1000>>, Vary<Positive<1000>>),
         }
         let stated = |text: &str| RonFile::of(text).parse_all::<Sheet>().unwrap_err().to_string();
         for (text, words) in [

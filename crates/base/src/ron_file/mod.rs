@@ -24,7 +24,7 @@ mod spliced;
 mod suggest;
 mod vary;
 
-pub use bound::{Bound, Count, Elevation, Factor, Finite, Fraction, NonNegative, Positive, PositiveCount};
+pub use bound::{Bound, Count, Elevation, Factor, Fraction, NonNegative, Positive, PositiveCount, Signed};
 pub use entries::entries;
 pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;

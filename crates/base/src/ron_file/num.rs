@@ -1,6 +1,6 @@
 //! A number that is the same in every field: a distribution is not allowed.
 
-use super::bound::{Bound, Finite};
+use super::bound::Bound;
 use super::fault::{Fault, from_raw, parse_in, whole};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::marker::PhantomData;
@@ -12,10 +12,10 @@ pub(super) const DISTRIBUTIONS: [&str; 5] = ["Uniform", "Normal", "LogNormal", "
 ///
 /// ```
 /// use furrow_base::ron_file::{Num, Positive};
-/// assert_eq!(ron::from_str::<Num<Positive>>("2.5").unwrap().get(), 2.5);
+/// assert_eq!(ron::from_str::<Num<Positive<1000>>>("2.5").unwrap().get(), 2.5);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Num<B: Bound = Finite>(f64, PhantomData<B>);
+pub struct Num<B: Bound>(f64, PhantomData<B>);
 
 impl<B: Bound> Num<B> {
     /// Builds a number for defaults and tests; `x` must be within the bound.

@@ -10,7 +10,7 @@ use std::borrow::Cow;
 /// Schema key for the kind of a value: [`FIXED`], [`DRAWN`] or [`PICKED`].
 pub const KIND: &str = "x-kind";
 
-/// Schema key for a number's bound in words, from [`Bound::WORDS`].
+/// Schema key for a number's bound in words, from [`Bound::words`].
 pub const RANGE: &str = "x-range";
 
 /// Schema key for the effective default, as RON, of an optional field without a default of its own.
@@ -120,7 +120,12 @@ macro_rules! numbers {
             }
 
             fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                json_schema!({ "type": "number", "x-kind": $kind, "x-range": B::WORDS })
+                let low = if B::ABOVE_MIN { "exclusiveMinimum" } else { "minimum" };
+                let mut schema = json_schema!({
+                    "type": "number", "maximum": B::MAX, "x-kind": $kind, "x-range": B::words()
+                });
+                schema.insert(low.to_owned(), B::MIN.into());
+                schema
             }
         }
     )*};

@@ -2,12 +2,12 @@
 //!
 //! ```
 //! use furrow_base::ron_file::{Positive, Vary};
-//! let spacing: Vary<Positive> = ron::from_str("Normal(mean: 0.20, sd: 0.02, min: 0.1, max: 0.3)").unwrap();
-//! let age: Vary<Positive> = ron::from_str("24").unwrap();
-//! assert!(ron::from_str::<Vary<Positive>>("Uniform(-3, 2)").is_err());
+//! let spacing: Vary<Positive<1000>> = ron::from_str("Normal(mean: 0.20, sd: 0.02, min: 0.1, max: 0.3)").unwrap();
+//! let age: Vary<Positive<1000>> = ron::from_str("24").unwrap();
+//! assert!(ron::from_str::<Vary<Positive<1000>>>("Uniform(-3, 2)").is_err());
 //! ```
 
-use super::bound::{Bound, Finite, NonNegative, Positive};
+use super::bound::Bound;
 use super::fault::{Fault, from_raw, inside, parse_in, whole};
 use super::num::{DISTRIBUTIONS, Num, name_of, number};
 use super::place::Step;
@@ -69,9 +69,19 @@ const fn highest() -> f64 {
     f64::MAX
 }
 
+/// Bound of a standard deviation and of a weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spread;
+
+impl Bound for Spread {
+    const MIN: f64 = 0.0;
+    const MAX: f64 = f64::INFINITY;
+    const WORDS: &'static str = "0 or above";
+}
+
 /// A number that is fixed or sampled from a distribution.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Vary<B: Bound = Finite> {
+pub enum Vary<B: Bound> {
     /// A constant.
     Fixed(Num<B>),
     /// A distribution to sample from.
@@ -162,15 +172,15 @@ impl<B: Bound> Vary<B> {
                 wrong(
                     at,
                     format!("{name} {}", B::refuse(x)),
-                    &format!("every value that may be drawn must be {}", B::WORDS),
+                    &format!("every value that may be drawn must be {}", B::words()),
                 )
             }
         };
         let spread = |at: &[Step<'static>], name: &str, x: f64| {
-            if NonNegative::holds(x) {
+            if Spread::holds(x) {
                 Ok(())
             } else {
-                wrong(at, format!("{name} {}", NonNegative::refuse(x)), "write 0 or a number above it")
+                wrong(at, format!("{name} {}", Spread::refuse(x)), "write 0 or a number above it")
             }
         };
         let bell = |name: &'static str, centre: f64, min: f64, max: f64| {
@@ -213,7 +223,7 @@ impl<B: Bound> Vary<B> {
                 if *median <= 0.0 {
                     return wrong(
                         &[Field("median")],
-                        format!("median {}", Positive::refuse(*median)),
+                        format!("median {median} is out of range: it must be above 0"),
                         "all values of a LogNormal are above 0",
                     );
                 }
@@ -420,7 +430,7 @@ impl<T: Serialize> Serialize for Pick<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::bound::Count;
+    use super::super::bound::{Count, NonNegative};
     use super::*;
     use crate::sampling::Purpose;
 
@@ -438,8 +448,8 @@ mod tests {
             ("Choice([4, 5])", 4.0, 5.0),
             ("Weighted([(1, 0), (2, 3)])", 2.0, 2.0),
         ] {
-            let v: Vary<NonNegative> = ron::from_str(text).unwrap();
-            let again: Vary<NonNegative> = ron::from_str(&ron::to_string(&v).unwrap()).unwrap();
+            let v: Vary<NonNegative<1000>> = ron::from_str(text).unwrap();
+            let again: Vary<NonNegative<1000>> = ron::from_str(&ron::to_string(&v).unwrap()).unwrap();
             assert_eq!(v, again, "{text}");
             let mut s = stream();
             assert!((0..500).map(|_| v.draw(&mut s)).all(|x| x >= lo && x <= hi), "{text}");
@@ -462,7 +472,7 @@ mod tests {
             "Unifrom(1, 2)",
             "\"a\"",
         ] {
-            assert!(ron::from_str::<Vary<NonNegative>>(text).is_err(), "{text}");
+            assert!(ron::from_str::<Vary<NonNegative<1000>>>(text).is_err(), "{text}");
         }
     }
 
@@ -476,11 +486,11 @@ mod tests {
             ("[100, 150]", "Uniform(100, 150)"),
             ("[1, 2, 3]", "Choice([1, 2, 3])"),
         ] {
-            let error_text = ron::from_str::<Vary<NonNegative>>(wrong).unwrap_err().to_string();
+            let error_text = ron::from_str::<Vary<NonNegative<1000>>>(wrong).unwrap_err().to_string();
             assert!(error_text.contains(&format!("write {right}")), "{error_text}");
-            ron::from_str::<Vary<NonNegative>>(right).unwrap();
+            ron::from_str::<Vary<NonNegative<1000>>>(right).unwrap();
         }
-        let usual = |text: &str| ron::from_str::<Vary<NonNegative>>(text).unwrap().usual();
+        let usual = |text: &str| ron::from_str::<Vary<NonNegative<1000>>>(text).unwrap().usual();
         assert_eq!(usual("Normal(mean: 3, sd: 2)"), (0.0, 7.0));
         assert_eq!(usual("Choice([2, 1, 5])"), (1.0, 5.0));
         assert_eq!(usual("4"), (4.0, 4.0));

@@ -103,7 +103,7 @@ fn plain(schema: &serde_json::Map<String, Value>) -> String {
         _ if range.starts_with("a whole number") => one("2", "Choice([2, 3])"),
         _ if range == "between 0 and 1" => one("0.5", "Uniform(0.2, 0.5)"),
         _ if range.starts_with("between 0 and") && range.contains("degrees") => one("45", "Uniform(30, 60)"),
-        _ if range.starts_with("above") || range.starts_with("0 or above") => one("1", "Uniform(1, 2)"),
+        _ if range.starts_with("above") || range.starts_with("between 0 and") => one("1", "Uniform(1, 2)"),
         _ if range.starts_with("between 1.7") => one("3", "Uniform(2, 5)"),
         _ => one("1.5", "Uniform(1.4, 1.6)"),
     }

@@ -43,6 +43,63 @@ fn examples_of_experiment_files_are_read() {
     every_example_is_read::<furrow_train::table::ExperimentDesc>(&super::experiment());
 }
 
+/// Returns the paths of the numbers in a schema that lack a lower or an upper bound. A seed is any number of 64 bits.
+fn unbounded(schema: &serde_json::Value, path: &str, found: &mut Vec<String>) {
+    use serde_json::Value;
+    let is_number = |value: &Value| value == "number" || value == "integer";
+    match schema {
+        Value::Object(fields) => {
+            let kind = fields.get("type");
+            let number =
+                kind.is_some_and(|of| is_number(of) || of.as_array().is_some_and(|of| of.iter().any(is_number)));
+            let has = |names: [&str; 2]| names.iter().any(|name| fields.contains_key(*name));
+            let bounded = has(["minimum", "exclusiveMinimum"]) && has(["maximum", "exclusiveMaximum"]);
+            if number && !bounded && !path.ends_with(".seed") {
+                found.push(path.to_owned());
+            }
+            for (name, inner) in fields.iter().filter(|(name, _)| *name != "default" && !name.starts_with("x-")) {
+                unbounded(inner, &format!("{path}.{name}"), found);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|inner| unbounded(inner, path, found)),
+        _ => {}
+    }
+}
+
+/// Rationale: a length of 10¹² m or an angle of 10⁹ degrees is a mistake, and nothing downstream is made for it. Expected: every number
+/// of the files has a lower and an upper bound, which the parser checks because they are those of its type.
+#[test]
+fn every_number_has_bounds() {
+    for reference in [scene(), species(), texture()] {
+        let mut found = Vec::new();
+        unbounded(&reference.types.0, reference.root, &mut found);
+        assert!(found.is_empty(), "{} numbers without bounds:\n{}", found.len(), found.join("\n"));
+    }
+    for (path, file, range) in [
+        ("camera.JaiAd130.focal_mm", "Field(camera: JaiAd130(focal_mm: 1e9))", "above 0, at most 10000"),
+        (
+            "lidar.Vlp16.range_noise_m",
+            "Field(camera: JaiAd130(), lidar: Vlp16(range_noise_m: 1e12))",
+            "between 0 and 10",
+        ),
+        (
+            "soil.layers.size_m",
+            "Field(camera: JaiAd130(), soil: (layers: [(albedo: \"a.png\", size_m: 1e12, height_mm: (-1, 1))]))",
+            "above 0, at most 100",
+        ),
+        (
+            "soil.layers.height_mm",
+            "Field(camera: JaiAd130(), soil: (layers: [(albedo: \"a.png\", size_m: 1, height_mm: (-10, 1e12))]))",
+            "between -10000 and 10000",
+        ),
+    ] {
+        assert!(scene().find(path).is_some(), "{path}");
+        let error = RonFile::of(file).parse::<FieldDesc>().unwrap_err().to_string();
+        let words = format!("is out of range: it must be {range}\n");
+        assert!(error.contains(&words) && error.contains("^^^"), "{path}: {error}");
+    }
+}
+
 /// Rationale: an example that the program rejects is worse than none. Expected: every example of a hyper-parameter applies to a plan.
 #[cfg(feature = "train")]
 #[test]
@@ -92,6 +149,6 @@ fn paths_lead_where_they_say() {
     assert_eq!(scene.named("max_mm"), ["soil.clods.max_mm", "soil.stones.max_mm"]);
     let (_, entry) = scene.find("soil.clods.over_5mm_per_m2").unwrap();
     let entry = entry.unwrap();
-    assert_eq!((entry.unit, entry.range.as_str()), ("m⁻²", "0 or above"));
+    assert_eq!((entry.unit, entry.range.as_str()), ("m⁻²", "between 0 and 100000000"));
     assert_eq!(entry.default.as_deref(), Some("Uniform(8000, 14000)"));
 }

@@ -20,7 +20,7 @@ pub struct Reference {
     pub title: &'static str,
     /// Sections: the whole file first, then the others in depth-first order.
     pub sections: Vec<Section>,
-    types: Types,
+    pub(super) types: Types,
 }
 
 impl Reference {

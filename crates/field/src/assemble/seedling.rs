@@ -40,7 +40,7 @@ pub(super) struct Seedling {
     /// Individual that gives shape and age, if all plants of the species are alike.
     pub(super) individual: Option<Individual>,
     /// Scale factor of the plant's sizes.
-    pub(super) vigour: Vary<Positive>,
+    pub(super) vigour: Vary<Positive<100>>,
     pub(super) condition: Option<ConditionDesc>,
     /// Identity before collisions are resolved; see [`super::identity::of`].
     pub(super) id: u32,
@@ -50,7 +50,7 @@ pub(super) struct Seedling {
 
 impl Seedling {
     /// Sets the vigour and, if there is one, the condition from the plant's entry in the scene file.
-    pub(super) fn tended(self, vigour: &Vary<Positive>, condition: Option<&ConditionDesc>) -> Self {
+    pub(super) fn tended(self, vigour: &Vary<Positive<100>>, condition: Option<&ConditionDesc>) -> Self {
         let condition = condition.cloned().or(self.condition);
         Self { vigour: vigour.clone(), condition, ..self }
     }

@@ -5,7 +5,7 @@ use super::inflorescence::check;
 use super::kind::LeafKind;
 use super::stage::{MOST_SHOOTS, StageDesc, Tilt};
 use super::twine::TwineDesc;
-use furrow_base::ron_file::{self, Finite, NonNegative, Num, Positive, Step, Vary};
+use furrow_base::ron_file::{self, NonNegative, Num, Positive, Signed, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -92,23 +92,23 @@ pub struct PlantDesc {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(default)]
     #[schemars(extend("x-example" = "{31: 32, 33: 44, 39: 60}"))]
-    pub cover_days: BTreeMap<u32, Num<NonNegative>>,
+    pub cover_days: BTreeMap<u32, Num<NonNegative<1000>>>,
     /// Factor on all sizes of one plant.
     #[schemars(default = "vigour")]
-    pub vigour: Vary<Positive>,
+    pub vigour: Vary<Positive<100>>,
     /// Factor on the sizes of one leaf, drawn for each leaf (the random factor r of Di Cicco et al. 2017).
     #[schemars(default = "size")]
-    pub size: Vary<Positive>,
+    pub size: Vary<Positive<100>>,
     /// Deviation of a leaf's azimuth from its place in the layer.
     #[schemars(default = "azimuth")]
-    pub azimuth_deg: Vary<Finite>,
+    pub azimuth_deg: Vary<Signed<360>>,
     /// Angle between the axis and the vertical.
     #[schemars(default = "lean")]
     pub lean_deg: Vary<Tilt>,
     /// Two ratios of length to width of a stem of a `Runner` or `Whorl`: above the first it sinks under its own weight,
     /// at the second it lies on the soil.
     #[schemars(default = "lies_at")]
-    pub lies_at: (Num<Positive>, Num<Positive>),
+    pub lies_at: (Num<Positive<1000>>, Num<Positive<1000>>),
     /// How shoots of a `Runner` twine upwards, around each other or around an invisible support. If absent, all shoots
     /// creep.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -138,17 +138,17 @@ struct Written {
     #[serde(default)]
     leaves: String,
     #[serde(default)]
-    cover_days: BTreeMap<u32, Num<NonNegative>>,
+    cover_days: BTreeMap<u32, Num<NonNegative<1000>>>,
     #[serde(default = "vigour")]
-    vigour: Vary<Positive>,
+    vigour: Vary<Positive<100>>,
     #[serde(default = "size")]
-    size: Vary<Positive>,
+    size: Vary<Positive<100>>,
     #[serde(default = "azimuth")]
-    azimuth_deg: Vary<Finite>,
+    azimuth_deg: Vary<Signed<360>>,
     #[serde(default = "lean")]
     lean_deg: Vary<Tilt>,
     #[serde(default = "lies_at")]
-    lies_at: (Num<Positive>, Num<Positive>),
+    lies_at: (Num<Positive<1000>>, Num<Positive<1000>>),
     #[serde(default)]
     twine: Option<TwineDesc>,
     #[serde(default)]
@@ -157,15 +157,15 @@ struct Written {
     stem_material: String,
 }
 
-fn vigour() -> Vary<Positive> {
+fn vigour() -> Vary<Positive<100>> {
     Vary::uniform(0.94, 1.06)
 }
 
-fn size() -> Vary<Positive> {
+fn size() -> Vary<Positive<100>> {
     Vary::uniform(0.93, 1.07)
 }
 
-fn azimuth() -> Vary<Finite> {
+fn azimuth() -> Vary<Signed<360>> {
     Vary::uniform(-10.0, 10.0)
 }
 
@@ -184,7 +184,7 @@ fn kept(mut stages: Vec<StageDesc>) -> Vec<StageDesc> {
     stages
 }
 
-fn lies_at() -> (Num<Positive>, Num<Positive>) {
+fn lies_at() -> (Num<Positive<1000>>, Num<Positive<1000>>) {
     (Num::new(40.0), Num::new(105.0))
 }
 

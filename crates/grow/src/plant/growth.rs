@@ -204,7 +204,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     let spin = turn(stream);
     let hypocotyl = between.draw(whole, None, &own, 2, |s| &s.hypocotyl_mm) * MM;
     // Rounded at both stages, so that the number of shoots is as written; in between shoots appear or disappear one by one.
-    let whole_at = |slot: u64, pick: fn(&StageDesc) -> &Vary<NonNegative>| {
+    let whole_at = |slot: u64, pick: fn(&StageDesc) -> &Vary<NonNegative<1000>>| {
         let drawn = |stage| pick(stage).draw32(&mut own.child(Purpose::Leaf, slot)).round();
         lerp(drawn(from), drawn(to), u)
     };

@@ -2,7 +2,7 @@
 
 use super::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{Count, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Geometry of a blade.
@@ -21,7 +21,7 @@ pub enum Shape {
         /// Number of pairs of lobes on the longest pinna.
         lobes: Vary<PositiveCount>,
         /// Width of a segment.
-        segment_mm: Vary<Positive>,
+        segment_mm: Vary<Positive<10_000>>,
         /// Fraction of the rachis, from its base, without pinnae. With a long bare part, some of the other pinnae are
         /// missing too and the tip is a small blade.
         #[serde(default = "num::<Fraction, 0>", skip_serializing_if = "Num::is_zero")]
@@ -34,7 +34,7 @@ pub enum Shape {
         /// Number of pairs of pinnules on the longest pinna.
         pinnules: Vary<PositiveCount>,
         /// Width of a segment.
-        segment_mm: Vary<Positive>,
+        segment_mm: Vary<Positive<10_000>>,
     },
     /// Leaflets on a rachis, each a sheet within an outline: two pairs for peanut; one pair and a terminal leaflet for
     /// soybean. The blade's width is the span of the lowest pair; the length of the rachis is given by `rib`.
@@ -44,16 +44,16 @@ pub enum Shape {
         /// Number of pairs of leaflets.
         pairs: Num<PositiveCount>,
         /// Ratio of a leaflet's width to its length.
-        aspect: Num<Positive>,
+        aspect: Num<Positive<100>>,
         /// Angle between rachis and leaflet, for the lowest and for the foremost pair.
-        spread_deg: (Num<Positive>, Num<Positive>),
+        spread_deg: (Num<Positive<360>>, Num<Positive<360>>),
         /// Ratio of the terminal leaflet's length to that of the others; 0 for no terminal leaflet. With one, the pairs
         /// are placed below the tip of the rachis.
-        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
-        terminal: Num<NonNegative>,
+        #[serde(default = "num::<NonNegative<100>, 0>", skip_serializing_if = "Num::is_zero")]
+        terminal: Num<NonNegative<100>>,
         /// Ratio of the length of small leaflets between the pairs (potato) to that of the others; 0 for none.
-        #[serde(default = "num::<NonNegative, 0>", skip_serializing_if = "Num::is_zero")]
-        interjected: Num<NonNegative>,
+        #[serde(default = "num::<NonNegative<100>, 0>", skip_serializing_if = "Num::is_zero")]
+        interjected: Num<NonNegative<100>>,
         /// Positions of the pairs along the rachis, increasing, as fractions of its length. If empty, the pairs are
         /// evenly spaced.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -63,11 +63,11 @@ pub enum Shape {
         /// leaf's halves.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("x-example" = "Uniform(-10, 25)"))]
-        rise_deg: Option<Vary<Finite>>,
+        rise_deg: Option<Vary<Signed<360>>>,
         /// Bend of a level leaflet from base to tip. Default: that of the whole leaf.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("x-example" = "Uniform(5, 30)"))]
-        leaflet_bend_deg: Option<Vary<Finite>>,
+        leaflet_bend_deg: Option<Vary<Signed<3600>>>,
     },
 }
 
@@ -84,7 +84,7 @@ pub struct Spines {
     pub lobes: Num<PositiveCount>,
     /// Length of the spines on the lobe tips of a full-grown leaf. On blades shorter than 50 mm they are proportionally
     /// shorter.
-    pub length_mm: Vary<Positive>,
+    pub length_mm: Vary<Positive<10_000>>,
 }
 
 /// Stipules of a kind of leaf.
@@ -92,7 +92,7 @@ pub struct Spines {
 #[serde(deny_unknown_fields, default)]
 pub struct Stipules {
     /// Length of the end lobe as a fraction of the blade's length; 0 for no stipules.
-    pub length: Num<NonNegative>,
+    pub length: Num<NonNegative<100>>,
     /// Number of lobes on each side of the end lobe; the outer side has one more.
     pub lobes: Num<Count>,
 }
@@ -151,62 +151,62 @@ pub struct LeafKind {
     /// are parallel or not visible. Default: the angle of the secondary veins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "60"))]
-    pub branch_angle_deg: Option<Num<NonNegative>>,
+    pub branch_angle_deg: Option<Num<NonNegative<180>>>,
     /// Elevations of each half at the two hinges of its branches, at the midrib and half-way out; negative angles let
     /// it hang. Each branch draws its own. A stage's `fold_deg` is added at the midrib.
     #[serde(default = "level", skip_serializing_if = "is_level")]
-    pub branch_bend_deg: (Vary<Finite>, Vary<Finite>),
+    pub branch_bend_deg: (Vary<Signed<3600>>, Vary<Signed<3600>>),
     /// Spines on the blade's margin; only for `Sheet`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(lobes: 6, length_mm: Uniform(1.5, 3))"))]
     pub spines: Option<Spines>,
     /// Angle between midrib and secondary veins; 0 for parallel veins, which give the skeleton no branches.
-    #[serde(default = "num::<NonNegative, 55>")]
-    pub vein_angle_deg: Num<NonNegative>,
+    #[serde(default = "num::<NonNegative<180>, 55>")]
+    pub vein_angle_deg: Num<NonNegative<180>>,
     /// Number of pairs of secondary veins; blisters form between them.
     #[serde(default = "num::<PositiveCount, 6>")]
     pub vein_pairs: Num<PositiveCount>,
     /// Bend of each half between midrib and margin; negative values let the margins hang.
-    #[serde(default = "vary::<Finite, 0>")]
-    pub curl_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<3600>, 0>")]
+    pub curl_deg: Vary<Signed<3600>>,
     /// Amplitude of the waves of the margin, as a fraction of the blade's length.
-    #[serde(default = "vary::<NonNegative, 0>")]
-    pub wave: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<100>, 0>")]
+    pub wave: Vary<NonNegative<100>>,
     /// Period of the waves of the margin, as a fraction of the blade's length.
     #[serde(default = "period")]
-    pub wave_period: Vary<Positive>,
+    pub wave_period: Vary<Positive<100>>,
     /// Height of the blisters between secondary veins, as a fraction of the blade's length.
-    #[serde(default = "vary::<NonNegative, 0>")]
-    pub quilt: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<100>, 0>")]
+    pub quilt: Vary<NonNegative<100>>,
     /// Difference between the widths of the two halves, as a fraction of the half-width.
     #[serde(default = "asymmetry")]
-    pub asymmetry: Vary<Finite>,
+    pub asymmetry: Vary<Signed<100>>,
     /// Standard deviation of each leaf's outline from the texture's, as a fraction of the half-width. The two margins
     /// vary independently, so teeth and lobes are in different places on every leaf.
     #[serde(default = "margin_sd")]
     pub margin_sd: Num<Fraction>,
     /// Sideways bow of the midrib, as a fraction of the blade's length.
     #[serde(default = "sway")]
-    pub sway: Vary<Finite>,
+    pub sway: Vary<Signed<100>>,
     /// Twist of the blade about its midrib from base to tip.
     #[serde(default = "twist")]
-    pub twist_deg: Vary<Finite>,
+    pub twist_deg: Vary<Signed<3600>>,
     /// Rotation of the whole leaf about its stalk.
     #[serde(default = "twist")]
-    pub roll_deg: Vary<Finite>,
+    pub roll_deg: Vary<Signed<3600>>,
     /// Standard deviation of the random bend of each joint.
-    #[serde(default = "num::<NonNegative, 2>")]
-    pub wobble_deg: Num<NonNegative>,
+    #[serde(default = "num::<NonNegative<180>, 2>")]
+    pub wobble_deg: Num<NonNegative<180>>,
     /// Width of the stalk where it meets the blade, as a fraction of the blade's length.
     #[serde(default = "stalk_width")]
-    pub stalk_width: Num<Positive>,
+    pub stalk_width: Num<Positive<100>>,
     /// Ratio of the stalk's width at its base to its width at the blade.
     #[serde(default = "stalk_base")]
-    pub stalk_base: Num<Positive>,
+    pub stalk_base: Num<Positive<100>>,
     /// Depth of the channel on the stalk's upper side: 0 is flat, 1 as deep as the stalk; negative values bulge, −1 is
     /// round.
-    #[serde(default = "vary::<Finite, 0>")]
-    pub channel: Vary<Finite>,
+    #[serde(default = "vary::<Signed<100>, 0>")]
+    pub channel: Vary<Signed<100>>,
     /// Length of the raised midrib under the blade, as a fraction of the blade's length.
     #[serde(default = "rib")]
     pub rib: Num<Fraction>,
@@ -215,8 +215,8 @@ pub struct LeafKind {
     #[schemars(extend("x-example" = "(length: 0.75, lobes: 2)"))]
     pub stipules: Stipules,
     /// Outward arch of the stalk of a full-sized leaf.
-    #[serde(default = "vary::<Finite, 15>")]
-    pub stalk_bend_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<3600>, 15>")]
+    pub stalk_bend_deg: Vary<Signed<3600>>,
     /// Whether the blades are flat sheets: no fold, curl, wave, blister, twist or bend. Not a key of species files;
     /// ablation experiments set it.
     #[serde(skip)]
@@ -261,11 +261,11 @@ impl LeafKind {
     }
 }
 
-fn level() -> (Vary<Finite>, Vary<Finite>) {
+fn level() -> (Vary<Signed<3600>>, Vary<Signed<3600>>) {
     (Vary::fixed(0.0), Vary::fixed(0.0))
 }
 
-fn is_level(bends: &(Vary<Finite>, Vary<Finite>)) -> bool {
+fn is_level(bends: &(Vary<Signed<3600>>, Vary<Signed<3600>>)) -> bool {
     *bends == level()
 }
 
@@ -290,11 +290,11 @@ fn normal<B: furrow_base::ron_file::Bound>(sd: f64) -> Vary<B> {
     Vary::Drawn(Distribution::Normal { mean: 0.0, sd, min: -3.0 * sd, max: 3.0 * sd })
 }
 
-fn period() -> Vary<Positive> {
+fn period() -> Vary<Positive<100>> {
     Vary::uniform(0.14, 0.22)
 }
 
-fn asymmetry() -> Vary<Finite> {
+fn asymmetry() -> Vary<Signed<100>> {
     normal(0.06)
 }
 
@@ -302,19 +302,19 @@ fn margin_sd() -> Num<Fraction> {
     Num::new(0.06)
 }
 
-fn sway() -> Vary<Finite> {
+fn sway() -> Vary<Signed<100>> {
     normal(0.02)
 }
 
-fn twist() -> Vary<Finite> {
+fn twist() -> Vary<Signed<3600>> {
     normal(8.0)
 }
 
-fn stalk_width() -> Num<Positive> {
+fn stalk_width() -> Num<Positive<100>> {
     Num::new(0.05)
 }
 
-fn stalk_base() -> Num<Positive> {
+fn stalk_base() -> Num<Positive<100>> {
     Num::new(1.3)
 }
 

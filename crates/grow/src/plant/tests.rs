@@ -411,7 +411,7 @@ fn pages_that_do_not_fit_together_are_refused() {
             "angle_deg: 50), (kind: \"leaf\", blade_mm: 5, width_mm: 3, angle_deg: 50)]), (bbch: 13, days: 9, hypocotyl_mm: 5, stem_mm: 1, layers: [(kind: \"leaf\", blade_mm: 5, width_mm: 3, angle_deg: 50)])]",
             "lost",
         ),
-        ("blade_mm: 5", "blade_mm: -5", "0 or above"),
+        ("blade_mm: 5", "blade_mm: -5", "between 0 and 10000"),
         ("stem_mm: 1,", "stem_mm: 1, tillers: 30,", "up to 30 side shoots"),
         ("stem_mm: 1,", "stem_mm: 1, lean_deg: 91,", "between -90 and 90"),
         ("form: Rosette", "form: Rosete", "Rosete"),

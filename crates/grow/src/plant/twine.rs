@@ -38,13 +38,13 @@ pub struct TwineDesc {
     pub share: Num<Fraction>,
     /// Radius of the helix.
     #[schemars(extend("x-example" = "Uniform(2, 4)"))]
-    pub radius_mm: Vary<Positive>,
+    pub radius_mm: Vary<Positive<1000>>,
     /// Height of one turn.
     #[schemars(extend("x-example" = "Uniform(25, 45)"))]
-    pub pitch_mm: Vary<Positive>,
+    pub pitch_mm: Vary<Positive<1000>>,
     /// Height of the support's upper end above the soil.
     #[schemars(extend("x-example" = "Uniform(80, 160)"))]
-    pub height_mm: Vary<Positive>,
+    pub height_mm: Vary<Positive<10_000>>,
 }
 
 /// Helix of one shoot.
@@ -65,7 +65,8 @@ impl Helix {
     pub(super) fn draw(desc: &TwineDesc, line: Vec2, stream: &mut Stream) -> Option<Self> {
         let twines = stream.chance(desc.share.get());
         let [radius, pitch, height] =
-            [&desc.radius_mm, &desc.pitch_mm, &desc.height_mm].map(|mm| mm.draw32(stream) * 1e-3);
+            [desc.radius_mm.draw32(stream), desc.pitch_mm.draw32(stream), desc.height_mm.draw32(stream)]
+                .map(|mm| mm * 1e-3);
         let turn = pitch.hypot(TAU * radius);
         twines.then_some(Self { line, radius, climb: pitch / turn, step: turn / STEPS, height })
     }

@@ -2,7 +2,7 @@
 
 use super::{Area, Disc, Spot, outside, within};
 use furrow_base::math::{Vec2, vec2};
-use furrow_base::ron_file::{Finite, Fraction, NonNegative, Positive, Vary};
+use furrow_base::ron_file::{Fraction, NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
@@ -19,22 +19,22 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct RowsDesc {
     /// Distance between rows: sugar beet 0.45 to 0.5, maize 0.75, cereals 0.12, carrot 0.25 to 0.45.
-    pub spacing_m: Vary<Positive>,
+    pub spacing_m: Vary<Positive<100>>,
     /// Distance between seeds in the row: sugar beet 0.18 to 0.22, maize 0.13 to 0.17, cereals 0.02, carrot 0.02 to
     /// 0.04.
-    pub in_row_m: Vary<Positive>,
+    pub in_row_m: Vary<Positive<100>>,
     /// Standard deviation of a seed's place along the row.
-    pub jitter_along_m: Vary<NonNegative>,
+    pub jitter_along_m: Vary<NonNegative<10>>,
     /// Standard deviation of a seed's place across the row.
-    pub jitter_across_m: Vary<NonNegative>,
+    pub jitter_across_m: Vary<NonNegative<10>>,
     /// Fraction of the seeds that emerge; the others leave gaps.
     pub emergence: Vary<Fraction>,
     /// Fraction of the places with two seeds.
     pub doubles: Vary<Fraction>,
     /// Direction of the rows, clockwise from north.
-    pub azimuth_deg: Vary<Finite>,
+    pub azimuth_deg: Vary<Signed<360>>,
     /// Distance of row 0 from the world's origin, towards the rows' right-hand side.
-    pub offset_m: Vary<Finite>,
+    pub offset_m: Vary<Signed<1000>>,
 }
 
 impl Default for RowsDesc {

@@ -26,15 +26,15 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct WeedsDesc {
     /// Mean number, m⁻².
-    pub per_m2: Vary<NonNegative>,
+    pub per_m2: Vary<NonNegative<100_000_000>>,
     /// Aggregation: k of the negative binomial, 0.2–1.5 for seedlings; 1000 is even.
-    pub k: Vary<Positive>,
+    pub k: Vary<Positive<1_000_000>>,
     /// Size of the patches, metres: 0.3–3.
-    pub range_m: Vary<Positive>,
+    pub range_m: Vary<Positive<1000>>,
     /// Clusters around former mother plants.
     pub clusters: ClustersDesc,
     /// Minimum distance between two stems.
-    pub min_distance_m: Vary<NonNegative>,
+    pub min_distance_m: Vary<NonNegative<100>>,
 }
 
 impl Default for WeedsDesc {
@@ -56,9 +56,9 @@ pub struct ClustersDesc {
     /// Fraction of the plants that are in clusters.
     pub share: Vary<Fraction>,
     /// Mean number of plants in a cluster: 3–15.
-    pub plants: Vary<Positive>,
+    pub plants: Vary<Positive<1_000_000>>,
     /// Standard deviation of their distance along each axis, metres: 0.03–0.08.
-    pub sd_m: Vary<Positive>,
+    pub sd_m: Vary<Positive<1000>>,
 }
 
 impl Default for ClustersDesc {

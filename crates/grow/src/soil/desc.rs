@@ -2,7 +2,7 @@
 
 use super::{SoilColor, WheelDesc};
 use furrow_base::math::Spectrum;
-use furrow_base::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Vary};
+use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Signed, Vary};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -93,13 +93,13 @@ pub struct LayerDesc {
     pub height: PathBuf,
     /// Side of one tile, metres.
     #[schemars(extend("x-example" = "0.5"))]
-    pub size_m: Num<Positive>,
+    pub size_m: Num<Positive<100>>,
     /// Heights of the map's black and of its white.
     #[schemars(extend("x-example" = "(-4, 8)"))]
-    pub height_mm: (Num<Finite>, Num<Finite>),
+    pub height_mm: (Num<Signed<10_000>>, Num<Signed<10_000>>),
     /// Share of the ground, relative to the other layers.
-    #[serde(default = "one")]
-    pub share: Vary<Positive>,
+    #[serde(default = "one::<Positive<1000>>")]
+    pub share: Vary<Positive<1000>>,
     /// Fraction of the clods and crumbs on it: 1 all, 0 none (a bare crust).
     #[serde(default = "whole")]
     pub clods: Num<Fraction>,
@@ -109,7 +109,7 @@ fn unnamed(path: &std::path::Path) -> bool {
     path.as_os_str().is_empty()
 }
 
-fn one() -> Vary<Positive> {
+fn one<B: Bound>() -> Vary<B> {
     Vary::fixed(1.0)
 }
 
@@ -122,14 +122,14 @@ fn whole() -> Num<Fraction> {
 #[serde(deny_unknown_fields, default)]
 pub struct BlendDesc {
     /// Size of the largest patches, metres.
-    pub scale_m: Vary<Positive>,
+    pub scale_m: Vary<Positive<100>>,
     /// Octaves of Perlin noise.
     pub octaves: Num<PositiveCount>,
     /// Sharpness of the borders: 0 mixes evenly everywhere; 20 gives hard borders.
-    pub sharpness: Vary<NonNegative>,
+    pub sharpness: Vary<NonNegative<1000>>,
     /// Weight of the layers' heights at a border: with larger values the high parts of a layer protrude from the
     /// others.
-    pub height: Num<NonNegative>,
+    pub height: Num<NonNegative<100>>,
 }
 
 impl Default for BlendDesc {
@@ -143,13 +143,13 @@ impl Default for BlendDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct ReliefDesc {
     /// Root mean square height of the noise: 2–5 rolled, 5–10 a sugar-beet seedbed, 8–15 harrowed, 20–40 ploughed.
-    pub rms_mm: Vary<NonNegative>,
+    pub rms_mm: Vary<NonNegative<1000>>,
     /// Hurst exponent H: each octave has 2^−H times the amplitude of the one before.
     pub hurst: Vary<Fraction>,
     /// Longest wavelength, metres.
-    pub longest_m: Vary<Positive>,
+    pub longest_m: Vary<Positive<1000>>,
     /// Slope of the whole field, degrees, in a random direction.
-    pub tilt_deg: Vary<NonNegative>,
+    pub tilt_deg: Vary<NonNegative<90>>,
     /// Furrow and ridge along the rows.
     pub row: RowReliefDesc,
     /// Wheel tracks along the rows; default none.
@@ -174,11 +174,11 @@ impl Default for ReliefDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct RowReliefDesc {
     /// Depth of the press wheel's furrow, 5–15.
-    pub depth_mm: Vary<NonNegative>,
+    pub depth_mm: Vary<NonNegative<1000>>,
     /// Width of the furrow, 40–80.
-    pub width_mm: Vary<Positive>,
+    pub width_mm: Vary<Positive<10_000>>,
     /// Height of a sinusoidal ridge with its crest on the row; its width at half height is half the row spacing.
-    pub ridge_mm: Vary<NonNegative>,
+    pub ridge_mm: Vary<NonNegative<1000>>,
 }
 
 impl Default for RowReliefDesc {
@@ -196,7 +196,7 @@ pub struct MoistureDesc {
     /// Standard deviation between patches.
     pub spread: Vary<Fraction>,
     /// Size of the largest patches, metres: 0.02–0.15 in images of a square metre, some metres in images of a field.
-    pub patch_m: Vary<Positive>,
+    pub patch_m: Vary<Positive<1000>>,
     /// Decrease of the moisture per standard deviation of height above the surroundings.
     pub drying: Num<Fraction>,
 }
@@ -218,7 +218,7 @@ impl Default for MoistureDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct CrumbsDesc {
     /// Smallest length. The largest is the clods' smallest length; the size distribution is that of the clods.
-    pub min_mm: Num<Positive>,
+    pub min_mm: Num<Positive<1000>>,
     /// Fraction of the number that the clods' size distribution gives; 0 for none.
     pub amount: Vary<Fraction>,
 }
@@ -238,26 +238,26 @@ impl Default for CrumbsDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct ClodsDesc {
     /// Number longer than 5 mm, m⁻²; 0 for none, including crumbs.
-    pub over_5mm_per_m2: Vary<NonNegative>,
+    pub over_5mm_per_m2: Vary<NonNegative<100_000_000>>,
     /// Length of the shortest body; smaller aggregates are crumbs, which are part of the surface.
-    pub min_mm: Num<Positive>,
+    pub min_mm: Num<Positive<1000>>,
     /// Length of the longest body.
-    pub max_mm: Num<Positive>,
+    pub max_mm: Num<Positive<1000>>,
     /// Exponent D: larger values give fewer large aggregates per small one.
-    pub exponent: Vary<Positive>,
+    pub exponent: Vary<Positive<100>>,
     /// Standard deviation of the logarithm of their local number density.
-    pub clustering: Vary<NonNegative>,
+    pub clustering: Vary<NonNegative<1000>>,
     /// Size of the clusters, metres.
-    pub cluster_m: Vary<Positive>,
+    pub cluster_m: Vary<Positive<1000>>,
     /// Relative standard deviation of the exponent between patches, which makes some patches coarse and others fine.
     pub sorting: Num<Fraction>,
     /// Standard deviation of the logarithm of their brightness.
-    pub tint_sigma: Num<NonNegative>,
+    pub tint_sigma: Num<NonNegative<10>>,
     /// Scale of the exponential distribution of the logarithms of green over red and of blue over green between clods;
     /// the standard deviation is 0.8 of it. Iron, humus and algae are distributed unevenly, so that some clods are
     /// yellow or almost green. Source: patches of 2 mm on 20 images of SugarBeets2016, 0.042 and 0.044, minus in
     /// quadrature the values of rendered images without this variation, 0.026 and 0.029.
-    pub hue_sigma: Num<NonNegative>,
+    pub hue_sigma: Num<NonNegative<10>>,
     /// Fraction of the ground's moisture that clods and crumbs have lost: 0 as wet as the ground, 1 air-dry. On damp
     /// ground dry clods are the most conspicuous feature.
     pub dryness: Vary<Fraction>,
@@ -294,22 +294,31 @@ pub struct StonesDesc {
     /// Fraction of the ground that they cover: loess 0–0.01, loam 0.01–0.05, moraine and chalk 0.05–0.2.
     pub cover: Vary<Fraction>,
     /// Median length.
-    pub median_mm: Num<Positive>,
+    pub median_mm: Num<Positive<1000>>,
     /// Standard deviation of the length's logarithm.
-    pub sigma: Num<NonNegative>,
+    pub sigma: Num<NonNegative<10>>,
     /// Length of the shortest stone.
-    pub min_mm: Num<Positive>,
+    pub min_mm: Num<Positive<1000>>,
     /// Length of the longest stone.
-    pub max_mm: Num<Positive>,
+    pub max_mm: Num<Positive<1000>>,
     /// Mean reflectance: R, G, B, NIR.
+    #[serde(deserialize_with = "reflectance")]
+    #[schemars(with = "(Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>)")]
     pub albedo: Spectrum,
     /// Standard deviation of the logarithm of their brightness.
-    pub tint_sigma: Num<NonNegative>,
+    pub tint_sigma: Num<NonNegative<10>>,
     /// Fraction of a stone's upward faces that is covered by soil, drawn for each stone.
     pub dust: Vary<Fraction>,
     /// Number of stones in a group, within about one length of each other; above 1 for broken pieces such as grains of
     /// fertiliser.
     pub together: Vary<PositiveCount>,
+}
+
+/// Reads a reflectance in each of R, G, B, NIR.
+fn reflectance<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Spectrum, D::Error> {
+    type Shares = (Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>);
+    let (r, g, b, nir) = Shares::deserialize(deserializer)?;
+    Ok(Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32()))
 }
 
 impl Default for StonesDesc {
@@ -335,19 +344,19 @@ pub struct LitterDesc {
     /// Fraction of the ground covered by straw: conventional tillage below 0.15, reduced 0.15–0.3, conservation above.
     pub straw_cover: Vary<Fraction>,
     /// Length of a straw.
-    pub straw_mm: Vary<Positive>,
+    pub straw_mm: Vary<Positive<10_000>>,
     /// Width of a straw.
-    pub straw_width_mm: Vary<Positive>,
+    pub straw_width_mm: Vary<Positive<1000>>,
     /// Number of sticks, m⁻².
-    pub sticks_per_m2: Vary<NonNegative>,
+    pub sticks_per_m2: Vary<NonNegative<100_000_000>>,
     /// Length of a stick.
-    pub stick_mm: Vary<Positive>,
+    pub stick_mm: Vary<Positive<10_000>>,
     /// Diameter of a stick at its thick end.
-    pub stick_width_mm: Vary<Positive>,
+    pub stick_width_mm: Vary<Positive<1000>>,
     /// Number of bits of dead leaves and roots, m⁻².
-    pub bits_per_m2: Vary<NonNegative>,
+    pub bits_per_m2: Vary<NonNegative<100_000_000>>,
     /// Length of a bit.
-    pub bit_mm: Vary<Positive>,
+    pub bit_mm: Vary<Positive<1000>>,
     /// Number of stubs on a stick.
     pub stubs: Vary<Count>,
     /// Fraction of a piece's upward faces that is covered by soil, drawn for each piece.

@@ -162,7 +162,7 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
     let on_it = f64::from(area.area());
     let [straws, sticks, bits] =
         [straws_per_m2(desc, &drawn, stream), drawn.sticks_per_m2, drawn.bits_per_m2].map(|n| on_it * f64::from(n));
-    let widest = |width: &Vary<Positive>| width.usual().1;
+    let widest = |width: &Vary<Positive<1000>>| width.usual().1;
     [
         Cost::of(straw, 1.0) * (straws * made) + heaps(widest(&desc.straw_width_mm), 24, straws),
         Cost::of(stick + stubs, 1.0) * (sticks * made) + heaps(widest(&desc.stick_width_mm), 32, sticks),

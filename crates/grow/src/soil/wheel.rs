@@ -2,7 +2,7 @@
 
 use super::record::WheelRecord;
 use furrow_base::math::{Vec2, smoothstep, vec2};
-use furrow_base::ron_file::{Finite, NonNegative, Positive, Vary};
+use furrow_base::ron_file::{NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -13,16 +13,16 @@ use serde::{Deserialize, Serialize};
 pub struct WheelDesc {
     /// Distance from the first row's line to the centre of the track, towards the row's right-hand side; if nothing is
     /// sown, from the world's origin to the east.
-    pub offset_m: Vary<Finite>,
+    pub offset_m: Vary<Signed<1000>>,
     /// Width.
-    pub width_mm: Vary<Positive>,
+    pub width_mm: Vary<Positive<10_000>>,
     /// Depth of the track's floor.
-    pub depth_mm: Vary<NonNegative>,
+    pub depth_mm: Vary<NonNegative<1000>>,
     /// Distance between lugs; 0 for a smooth tyre.
-    pub lugs_mm: Vary<NonNegative>,
+    pub lugs_mm: Vary<NonNegative<1000>>,
     /// Distance between repeated tracks, for a machine that makes several passes: its working width, such as 5.4 for a
     /// drill of twelve rows 0.45 m apart, or 24 for a sprayer in its tramlines. 0: a single track.
-    pub every_m: Vary<NonNegative>,
+    pub every_m: Vary<NonNegative<1000>>,
 }
 
 impl Default for WheelDesc {

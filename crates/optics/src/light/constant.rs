@@ -73,7 +73,12 @@ impl Portable for Constant {
 pub struct ConstantDesc {
     /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
     #[schemars(extend("x-example" = "(0.3, 0.3, 0.3, 0.2)"))]
-    pub radiance: (Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
+    pub radiance: (
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+    ),
 }
 
 /// Sampled values of `Constant`.

@@ -14,7 +14,7 @@ use super::position::{SunPosition, Utc, sun_position};
 use super::sky::{Dome, Sky};
 use super::sun::Sun;
 use furrow_base::math::{Spectrum, Vec3, direction, vec3};
-use furrow_base::ron_file::{Bound, Finite, Fraction, Pick, Vary};
+use furrow_base::ron_file::{Bound, Fraction, Pick, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -82,8 +82,8 @@ pub enum SunDesc {
         #[schemars(extend("x-example" = "\"2016-05-02T10:00:00Z\""))]
         utc: Pick<Utc>,
         /// Hours added to `utc`: `Uniform(0, 6)` for any time of an afternoon.
-        #[serde(default = "zero::<Finite>")]
-        later_h: Vary<Finite>,
+        #[serde(default = "zero::<Signed<48>>")]
+        later_h: Vary<Signed<48>>,
     },
     /// Position given as a direction.
     Angles {
@@ -91,7 +91,7 @@ pub enum SunDesc {
         elevation_deg: Vary<AboveHorizon>,
         /// Degrees clockwise from north.
         #[schemars(extend("x-example" = "140"))]
-        azimuth_deg: Vary<Finite>,
+        azimuth_deg: Vary<Signed<360>>,
     },
 }
 

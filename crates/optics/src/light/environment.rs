@@ -4,7 +4,7 @@ use super::described::{Described, Open, Recorded, irradiance};
 use super::environment_map::{EnvironmentMap, Infrared};
 use furrow_base::Result;
 use furrow_base::math::Spectrum;
-use furrow_base::ron_file::{Finite, NonNegative, Positive, Vary};
+use furrow_base::ron_file::{NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub enum InfraredDesc {
     /// Extrapolated from blue and red, as for a sky.
     Sky,
     /// Red times this factor.
-    OfRed(Vary<NonNegative>),
+    OfRed(Vary<NonNegative<100>>),
 }
 
 /// Fields of `EnvironmentMap`.
@@ -30,20 +30,20 @@ pub struct EnvironmentMapDesc {
     pub file: String,
     /// Factor from the file's values to radiance, W·m⁻²·sr⁻¹·nm⁻¹; default 1.
     #[serde(default = "as_it_is")]
-    pub scale: Vary<Positive>,
+    pub scale: Vary<Positive<1_000_000_000>>,
     /// Azimuth of the middle column, degrees clockwise from north; default 0.
     #[serde(default = "north")]
-    pub rotate_deg: Vary<Finite>,
+    pub rotate_deg: Vary<Signed<360>>,
     /// Source of near infrared; by default the file's channel NIR, or the extrapolation for a sky if it has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nir: Option<InfraredDesc>,
 }
 
-fn as_it_is() -> Vary<Positive> {
+fn as_it_is() -> Vary<Positive<1_000_000_000>> {
     Vary::fixed(1.0)
 }
 
-fn north() -> Vary<Finite> {
+fn north() -> Vary<Signed<360>> {
     Vary::fixed(0.0)
 }
 

@@ -12,7 +12,7 @@ use super::described::{Described, Open, Recorded};
 use super::form::{Form, Outline, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, vec3};
-use furrow_base::ron_file::{Finite, NonNegative, Positive, Vary};
+use furrow_base::ron_file::{NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::sampling::warp;
 use furrow_base::{Error, Result};
@@ -196,16 +196,16 @@ pub enum ShapeDesc {
     Rectangle {
         /// Horizontal side, metres.
         #[schemars(extend("x-example" = "0.3"))]
-        width_m: Vary<Positive>,
+        width_m: Vary<Positive<100>>,
         /// Other side, metres.
         #[schemars(extend("x-example" = "0.12"))]
-        height_m: Vary<Positive>,
+        height_m: Vary<Positive<1000>>,
     },
     /// Disc.
     Disc {
         /// Radius, metres.
         #[schemars(extend("x-example" = "0.05"))]
-        radius_m: Vary<Positive>,
+        radius_m: Vary<Positive<100>>,
     },
 }
 
@@ -214,39 +214,44 @@ pub enum ShapeDesc {
 #[serde(deny_unknown_fields)]
 pub enum GlowDesc {
     /// Radiance in R, G, B, NIR, W·m⁻²·sr⁻¹·nm⁻¹.
-    Radiance(Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>, Vary<NonNegative>),
+    Radiance(
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+        Vary<NonNegative<1_000_000_000>>,
+    ),
     /// Halogen lamp, 3000 K, given by the G irradiance of a plane that faces the lamp at a distance on its axis.
     Halogen {
         /// Irradiance in G, W·m⁻²·nm⁻¹; that of the noon sun is 1.4.
         #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
-        irradiance: Vary<NonNegative>,
+        irradiance: Vary<NonNegative<1_000_000_000>>,
         /// Distance of that plane, metres.
         #[schemars(extend("x-example" = "0.8"))]
-        at_m: Vary<Positive>,
+        at_m: Vary<Positive<1000>>,
     },
     /// White light-emitting diode, given by the G irradiance of a plane that faces the lamp at a distance on its axis.
     WhiteLed {
         /// Irradiance in G, W·m⁻²·nm⁻¹.
         #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
-        irradiance: Vary<NonNegative>,
+        irradiance: Vary<NonNegative<1_000_000_000>>,
         /// Distance of that plane, metres.
         #[schemars(extend("x-example" = "0.8"))]
-        at_m: Vary<Positive>,
+        at_m: Vary<Positive<1000>>,
     },
     /// Infrared light-emitting diode, 810 to 850 nm, given by the NIR irradiance of a plane that faces the lamp at a
     /// distance on its axis.
     NirLed {
         /// Irradiance in NIR, W·m⁻²·nm⁻¹.
         #[schemars(extend("x-example" = "Uniform(0.2, 0.7)"))]
-        irradiance: Vary<NonNegative>,
+        irradiance: Vary<NonNegative<1_000_000_000>>,
         /// Distance of that plane, metres.
         #[schemars(extend("x-example" = "0.8"))]
-        at_m: Vary<Positive>,
+        at_m: Vary<Positive<1000>>,
     },
 }
 
 /// Point with coordinates in metres.
-pub type PointDesc = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
+pub type PointDesc = (Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Signed<1000>>);
 
 fn origin() -> PointDesc {
     (Vary::fixed(0.0), Vary::fixed(0.0), Vary::fixed(0.0))

@@ -16,10 +16,10 @@ use serde::{Deserialize, Serialize};
 pub struct OvercastDesc {
     /// Illuminance of the ground, kilolux: 5 to 25 under heavy cloud, 20 to 50 under bright cloud; default 20.
     #[serde(default = "bright_cloud")]
-    pub illuminance_klx: Vary<Positive>,
+    pub illuminance_klx: Vary<Positive<1000>>,
 }
 
-fn bright_cloud() -> Vary<Positive> {
+fn bright_cloud() -> Vary<Positive<1000>> {
     Vary::fixed(20.0)
 }
 

@@ -30,17 +30,17 @@ pub struct Pigments {
     /// Structure N: 1 is one compact layer, 1.2–1.7 a young leaf, 2.2 dry or thick tissue.
     pub n: Num<Structure>,
     /// Chlorophyll a + b, µg/cm²: 25–60 in a green leaf.
-    pub chlorophyll: Num<NonNegative>,
+    pub chlorophyll: Num<NonNegative<1000>>,
     /// Carotenoids, µg/cm²: about a quarter to a fifth of the chlorophyll.
-    pub carotenoid: Num<NonNegative>,
+    pub carotenoid: Num<NonNegative<1000>>,
     /// Anthocyanins, µg/cm²: below 2 in a green leaf, 5–12 in a red one.
-    pub anthocyanin: Num<NonNegative>,
+    pub anthocyanin: Num<NonNegative<1000>>,
     /// Brown pigment of dying tissue: 0 in a green leaf, 0.6–2.5 in straw.
-    pub brown: Num<NonNegative>,
+    pub brown: Num<NonNegative<100>>,
     /// Equivalent water thickness, cm: 0.01–0.035 in a leaf, 0.2 in a petiole.
-    pub water: Num<NonNegative>,
+    pub water: Num<NonNegative<10>>,
     /// Dry matter, g/cm²: 0.002–0.006.
-    pub dry_matter: Num<NonNegative>,
+    pub dry_matter: Num<NonNegative<10>>,
 }
 
 impl Default for Pigments {

@@ -1,6 +1,8 @@
 //! Pixel reconstruction filters.
 
 use furrow_base::math::{Vec2, vec2};
+use furrow_base::ron_file::{NonNegative, Num};
+use serde::Deserialize;
 
 /// Reconstruction filter of a pixel. It is importance-sampled (filter importance sampling), so pixels stay independent.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
@@ -8,7 +10,16 @@ pub enum Filter {
     /// The pixel's own square: a sensor with full fill factor and a perfect lens.
     Box,
     /// The square convolved with a Gaussian of this standard deviation in pixels: the point spread function of a lens.
-    Gaussian(f32),
+    Gaussian(
+        #[serde(deserialize_with = "blur")]
+        #[schemars(with = "Num<NonNegative<100>>")]
+        f32,
+    ),
+}
+
+/// Reads the standard deviation of a Gaussian filter.
+fn blur<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    Num::<NonNegative<100>>::deserialize(deserializer).map(Num::f32)
 }
 
 impl Filter {

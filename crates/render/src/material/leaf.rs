@@ -73,13 +73,13 @@ pub struct LeafDesc {
     #[schemars(extend("x-example" = "0.03"))]
     pub bloom: Num<Fraction>,
     /// Visible reflectance of the lower side relative to the upper side: 1.3–1.8 on most dicots.
-    pub back_paleness: Num<NonNegative>,
+    pub back_paleness: Num<NonNegative<100>>,
     /// Strength of the relief. 1 uses the height map as it is; without a height map, it derives a vein relief of 0.2 mm
     /// on a leaf of 100 mm from the image.
-    pub relief: Num<NonNegative>,
+    pub relief: Num<NonNegative<100>>,
     /// Height range from black to white of the height map next to the image (`NAME.height.png`), as a fraction of the
     /// image length.
-    pub relief_range: Num<NonNegative>,
+    pub relief_range: Num<NonNegative<100>>,
     /// Pigments and structure of the leaf.
     pub pigments: Pigments,
 }

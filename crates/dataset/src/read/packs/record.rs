@@ -60,12 +60,12 @@ impl PackRecord {
     /// Returns whether the archive can have these files at these positions: the native files of each image, in the
     /// order of the images, with the lengths in their checksums.
     fn is_consistent(&self) -> bool {
-        let mut end = 0;
+        let mut end = 0_u64;
         let mut files = 0;
         for image in &self.images {
             for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
                 let Some((offset, length)) = self.members.get(&entry_name(path)) else { return false };
-                if *length != image.files[path].bytes || *offset < end + BLOCK {
+                if *length != image.files[path].bytes || *offset < end.saturating_add(BLOCK) {
                     return false;
                 }
                 end = offset.saturating_add(*length);

@@ -57,7 +57,7 @@ impl Bearer<'_> {
         let of = |k: u64| stream.child(Purpose::Condition, k);
         let worn = if self.met.is_some() { 1.0 } else { lerp(YOUNG, 1.0, self.age) };
         let often = worn * self.share;
-        let on_leaf = |radii: &Vary<Positive>, mean: f32, k: u64| {
+        let on_leaf = |radii: &Vary<Positive<1000>>, mean: f32, k: u64| {
             let mut s = of(k);
             let n = s.poisson(f64::from(mean * often));
             (0..n).filter_map(|_| patch(self, radii, &mut s)).collect::<Vec<Patch>>()
@@ -161,7 +161,7 @@ fn there(bearer: &Bearer<'_>, p: Vec2) -> bool {
 }
 
 /// Draws a patch on the blade, off the midrib where there is room; `None` if 40 tries miss a very thin leaf.
-fn patch(bearer: &Bearer<'_>, radii: &Vary<Positive>, s: &mut Stream) -> Option<Patch> {
+fn patch(bearer: &Bearer<'_>, radii: &Vary<Positive<1000>>, s: &mut Stream) -> Option<Patch> {
     let radius = radii.draw32(s).min(0.2 * narrow(bearer));
     let half = 0.5 * bearer.image_mm;
     let mut last = None;
@@ -190,7 +190,7 @@ fn edge(bearer: &Bearer<'_>, s: &mut Stream) -> Option<(Vec2, f32)> {
 }
 
 /// Adds the mouthfuls of a bite, side by side along the margin.
-fn bite(bearer: &Bearer<'_>, radii: &Vary<Positive>, holes: &mut Vec<Patch>, s: &mut Stream) {
+fn bite(bearer: &Bearer<'_>, radii: &Vary<Positive<1000>>, holes: &mut Vec<Patch>, s: &mut Stream) {
     let Some((mut at, side)) = edge(bearer, s) else { return };
     for _ in 0..=s.index(4) {
         let radius = radii.draw32(s).min(0.22 * narrow(bearer));

@@ -57,16 +57,16 @@ pub struct ConditionDesc {
     /// proportionally fewer.
     pub holes: Vary<MarkCount>,
     /// Radius of these holes.
-    pub hole_mm: Vary<Positive>,
+    pub hole_mm: Vary<Positive<1000>>,
     /// Mean number of small holes eaten by flea beetles into a cotyledon of 1.5 cm² or more. True leaves of 4 cm² have
     /// a third of it, smaller leaves proportionally fewer. All holes together remove at most 12 % of a blade.
     pub shot_holes: Vary<MarkCount>,
     /// Radius of the small holes.
-    pub shot_hole_mm: Vary<Positive>,
+    pub shot_hole_mm: Vary<Positive<1000>>,
     /// Mean number of bites into a leaf's margin.
     pub bites: Vary<MarkCount>,
     /// Radius of one mouthful; a bite consists of one to four side by side.
-    pub bite_mm: Vary<Positive>,
+    pub bite_mm: Vary<Positive<1000>>,
     /// Mean number of tears from the margin towards the midrib.
     pub tears: Vary<MarkCount>,
     /// Yellowness of the tissue between the veins of the oldest leaf; 1 leaves 15 % of its chlorophyll.
@@ -74,11 +74,11 @@ pub struct ConditionDesc {
     /// Mean number of yellow blotches.
     pub blotches: Vary<MarkCount>,
     /// Radius of the blotches.
-    pub blotch_mm: Vary<Positive>,
+    pub blotch_mm: Vary<Positive<1000>>,
     /// Mean number of dead spots with a reddish rim.
     pub spots: Vary<MarkCount>,
     /// Radius of the spots.
-    pub spot_mm: Vary<Positive>,
+    pub spot_mm: Vary<Positive<1000>>,
     /// Fraction of the oldest leaves whose margin is dead from drought, salt or frost; for younger leaves it decreases
     /// with the square of their age. 0 for none.
     pub scorched: Vary<Fraction>,
@@ -86,7 +86,7 @@ pub struct ConditionDesc {
     /// Inside it is a yellow margin of twice the width.
     pub scorch: Vary<Fraction>,
     /// Anthocyanin of veins, stalks and stem in addition to the species file's pigments, µg/cm².
-    pub reddening: Vary<NonNegative>,
+    pub reddening: Vary<NonNegative<100>>,
     /// Fraction of a leaf at the soil that is covered by dust; 10 cm above the soil it is a third of this.
     pub dust: Vary<Fraction>,
     /// Number of splashed specks of soil per cm² of a leaf at the soil, 0.3–2 mm across. Rain throws few of them above
@@ -108,7 +108,7 @@ pub struct ConditionDesc {
     /// Relative standard deviation of bend and fold between leaves.
     pub bend_sd: Num<Fraction>,
     /// Standard deviation of the twist about the midrib between leaves, in addition to the species file's.
-    pub twist_sd_deg: Num<NonNegative>,
+    pub twist_sd_deg: Num<NonNegative<360>>,
 }
 
 impl Default for ConditionDesc {

@@ -2,7 +2,7 @@
 
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, Vec3};
-use furrow_base::ron_file::{Count, Finite, Fraction, NonNegative, Num, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of triangles of a sheet.
@@ -57,8 +57,8 @@ pub enum FlowerDesc {
         /// Diameter of the disc, as a fraction of the head's.
         disc: Num<Fraction>,
         /// Ratio of the disc's height to its radius; 1 is a hemisphere.
-        #[serde(default = "num::<NonNegative, 30>")]
-        dome: Num<NonNegative>,
+        #[serde(default = "num::<NonNegative<100>, 30>")]
+        dome: Num<NonNegative<100>>,
         /// Number of florets of the disc.
         florets: Num<PositiveCount>,
         /// Rings around the disc, bracts first.
@@ -87,16 +87,16 @@ pub enum FlowerDesc {
         #[serde(default = "num::<PositiveCount, 100>")]
         florets: Num<PositiveCount>,
         /// Width of the ear without its awns, as a fraction of its length.
-        width: Num<Positive>,
+        width: Num<Positive<100>>,
         /// Ratio of a spikelet's length to the ear's width.
-        #[serde(default = "num::<Positive, 120>")]
-        spikelet: Num<Positive>,
+        #[serde(default = "num::<Positive<100>, 120>")]
+        spikelet: Num<Positive<100>>,
         /// Angle between rachis and spikelet.
-        #[serde(default = "vary::<Finite, 20>")]
-        angle_deg: Vary<Finite>,
+        #[serde(default = "vary::<Signed<360>, 20>")]
+        angle_deg: Vary<Signed<360>>,
         /// Length of the awns, as a fraction of the ear's length; 0 for none.
-        #[serde(default = "vary::<NonNegative, 0>")]
-        awn: Vary<NonNegative>,
+        #[serde(default = "vary::<NonNegative<100>, 0>")]
+        awn: Vary<NonNegative<100>>,
         /// Material of spikelets and rachis.
         #[serde(default = "husk")]
         material: String,
@@ -107,15 +107,15 @@ pub enum FlowerDesc {
     /// Maize ear in its husks, with the silks at its tip.
     Cob {
         /// Diameter of the thickest part, as a fraction of the length.
-        width: Num<Positive>,
+        width: Num<Positive<100>>,
         /// Number of visible husk leaves.
         #[serde(default = "num::<PositiveCount, 600>")]
         husks: Num<PositiveCount>,
         /// Number of silks.
         silks: Num<Count>,
         /// Length of the silks beyond the husks, as a fraction of the ear's length.
-        #[serde(default = "vary_share::<NonNegative, 25>")]
-        silk: Vary<NonNegative>,
+        #[serde(default = "vary_share::<NonNegative<100>, 25>")]
+        silk: Vary<NonNegative<100>>,
         /// Material of the husks.
         #[serde(default = "husk")]
         material: String,
@@ -128,19 +128,19 @@ pub enum FlowerDesc {
         /// Number of branches below the central spike.
         branches: Vary<Count>,
         /// Length of the lowest branch, as a fraction of the tassel's.
-        branch: Num<Positive>,
+        branch: Num<Positive<100>>,
         /// Fraction of the rachis, from its base, that bears the branches.
         #[serde(default = "num::<Fraction, 40>")]
         zone: Num<Fraction>,
         /// Angle between rachis and branch at its base.
-        angle_deg: Vary<NonNegative>,
+        angle_deg: Vary<NonNegative<360>>,
         /// Downward bend of a branch under its weight.
-        #[serde(default = "vary::<Finite, 0>")]
-        bend_deg: Vary<Finite>,
+        #[serde(default = "vary::<Signed<3600>, 0>")]
+        bend_deg: Vary<Signed<3600>>,
         /// Number of spikelets per length of the tassel along the rachis or a branch.
         spikelets: Num<PositiveCount>,
         /// Length of a spikelet, as a fraction of the tassel's.
-        spikelet: Num<Positive>,
+        spikelet: Num<Positive<100>>,
         /// Material of the spikelets.
         #[serde(default = "husk")]
         material: String,
@@ -150,10 +150,10 @@ pub enum FlowerDesc {
         /// Outline.
         outline: Outline,
         /// Ratio of width to length.
-        aspect: Num<Positive>,
+        aspect: Num<Positive<100>>,
         /// Ratio of thickness to width.
-        #[serde(default = "num::<Positive, 100>")]
-        flat: Num<Positive>,
+        #[serde(default = "num::<Positive<100>, 100>")]
+        flat: Num<Positive<100>>,
         /// Depth of the notch at its tip, as a fraction of its length.
         #[serde(default = "num::<Fraction, 0>")]
         notch: Num<Fraction>,
@@ -170,11 +170,11 @@ pub enum FlowerDesc {
         #[serde(default = "obovoid")]
         outline: Outline,
         /// Ratio of width to length.
-        #[serde(default = "num::<Positive, 75>")]
-        aspect: Num<Positive>,
+        #[serde(default = "num::<Positive<100>, 75>")]
+        aspect: Num<Positive<100>>,
         /// Diameter of the disc, as a fraction of the capsule's width.
-        #[serde(default = "num::<Positive, 80>")]
-        disc: Num<Positive>,
+        #[serde(default = "num::<Positive<100>, 80>")]
+        disc: Num<Positive<100>>,
         /// Number of rays of the stigma, each ending in a lobe of the disc's margin.
         #[serde(default = "rays")]
         rays: Vary<PositiveCount>,
@@ -188,8 +188,8 @@ pub enum FlowerDesc {
     /// Berry with its calyx.
     Berry {
         /// Ratio of length to diameter.
-        #[serde(default = "num::<Positive, 100>")]
-        aspect: Num<Positive>,
+        #[serde(default = "num::<Positive<100>, 100>")]
+        aspect: Num<Positive<100>>,
         /// Number of sepals of the calyx.
         #[serde(default = "num_count::<5>")]
         sepals: Num<Count>,
@@ -258,11 +258,11 @@ pub struct RingDesc {
     #[schemars(extend("x-example" = "5"))]
     pub count: Vary<PositiveCount>,
     /// Length of a sheet, as a fraction of the distance from its base to the flower's outer radius.
-    #[serde(default = "num::<Positive, 100>")]
-    pub length: Num<Positive>,
+    #[serde(default = "num::<Positive<100>, 100>")]
+    pub length: Num<Positive<100>>,
     /// Ratio of width to length.
     #[schemars(extend("x-example" = "0.6"))]
-    pub aspect: Num<Positive>,
+    pub aspect: Num<Positive<100>>,
     /// Outline of a sheet.
     #[serde(default = "petal")]
     pub outline: Outline,
@@ -270,24 +270,24 @@ pub struct RingDesc {
     #[serde(default = "num::<Fraction, 0>")]
     pub notch: Num<Fraction>,
     /// Angle at the base above the plane perpendicular to the flower's axis, when open.
-    #[serde(default = "vary::<Finite, 15>")]
-    pub cup_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<360>, 15>")]
+    pub cup_deg: Vary<Signed<360>>,
     /// Backward bend from base to tip when open.
-    #[serde(default = "vary::<Finite, 10>")]
-    pub bend_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<3600>, 10>")]
+    pub bend_deg: Vary<Signed<3600>>,
     /// Height of its margins, as a fraction of its half-width; negative values bulge like the rays of a daisy.
-    #[serde(default = "num::<Finite, 15>")]
-    pub hollow: Num<Finite>,
+    #[serde(default = "num::<Signed<100>, 15>")]
+    pub hollow: Num<Signed<100>>,
     /// Arc over which the sheets are spread; 360 for a full ring. Smaller values are for flowers with bilateral
     /// symmetry such as pansies.
-    #[serde(default = "whole")]
-    pub arc_deg: Num<Positive>,
+    #[serde(default = "whole::<Positive<360>>")]
+    pub arc_deg: Num<Positive<360>>,
     /// Centre of that arc, measured from the flower's uppermost point.
-    #[serde(default = "num::<Finite, 0>")]
-    pub turn_deg: Num<Finite>,
+    #[serde(default = "num::<Signed<3600>, 0>")]
+    pub turn_deg: Num<Signed<3600>>,
     /// Ratio of its length in the bud to its length when open: petals grow, sepals do not.
-    #[serde(default = "num::<NonNegative, 60>")]
-    pub bud: Num<NonNegative>,
+    #[serde(default = "num::<NonNegative<100>, 60>")]
+    pub bud: Num<NonNegative<100>>,
     /// Material.
     #[schemars(extend("x-example" = "\"petal\""))]
     pub material: String,
@@ -297,7 +297,7 @@ fn petal() -> Outline {
     Outline::Power { a: 0.8, b: 0.45 }
 }
 
-fn whole() -> Num<Positive> {
+fn whole<B: Bound>() -> Num<B> {
     Num::new(360.0)
 }
 

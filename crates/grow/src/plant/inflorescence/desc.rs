@@ -1,6 +1,6 @@
 //! Flowering axes in a species file: scapes, flowering branches, the peduncles of heads and ears.
 
-use furrow_base::ron_file::{Bound, Finite, Fraction, NonNegative, Num, Positive, Vary};
+use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of flowering axes of a plant.
@@ -20,8 +20,12 @@ pub enum Seat {
     /// In the axils of these leaves, one axis each; in a grass, where the sheath ends.
     Axils {
         /// Number of the lowest leaf, counting from the cotyledons.
+        #[serde(deserialize_with = "leaf")]
+        #[schemars(with = "Num<PositiveCount>")]
         first: u32,
         /// Number of the highest leaf.
+        #[serde(deserialize_with = "leaf")]
+        #[schemars(with = "Num<PositiveCount>")]
         last: u32,
     },
     /// Along another flowering axis, which must precede this one in the list.
@@ -35,6 +39,11 @@ pub enum Seat {
     },
 }
 
+/// Reads the number of a leaf.
+fn leaf<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    Num::<PositiveCount>::deserialize(deserializer).map(|number| number.get() as u32)
+}
+
 /// Leaves along a flowering axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +53,7 @@ pub struct StemLeafDesc {
     pub kind: String,
     /// Number of leaves.
     #[schemars(extend("x-example" = "5"))]
-    pub count: Vary<NonNegative>,
+    pub count: Vary<NonNegative<10_000>>,
     /// Position of the lowest leaf, as a fraction of the axis's length.
     #[serde(default = "num::<Fraction, 0>")]
     pub from: Num<Fraction>,
@@ -53,28 +62,28 @@ pub struct StemLeafDesc {
     pub to: Num<Fraction>,
     /// Length of the lowest blade.
     #[schemars(extend("x-example" = "Uniform(18, 24)"))]
-    pub blade_mm: Vary<NonNegative>,
+    pub blade_mm: Vary<NonNegative<10_000>>,
     /// Width of the lowest blade.
     #[schemars(extend("x-example" = "Uniform(4, 6)"))]
-    pub width_mm: Vary<NonNegative>,
+    pub width_mm: Vary<NonNegative<10_000>>,
     /// Length of the lowest leaf's stalk.
-    #[serde(default = "vary::<NonNegative>")]
-    pub stalk_mm: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<10_000>>")]
+    pub stalk_mm: Vary<NonNegative<10_000>>,
     /// Ratio of the sizes of the highest leaf to those of the lowest.
-    #[serde(default = "num::<Positive, 1>")]
-    pub top: Num<Positive>,
+    #[serde(default = "num::<Positive<100>, 1>")]
+    pub top: Num<Positive<100>>,
     /// Angle between axis and stalk.
     #[schemars(extend("x-example" = "Uniform(35, 50)"))]
-    pub angle_deg: Vary<NonNegative>,
+    pub angle_deg: Vary<NonNegative<360>>,
     /// Angle between stalk and blade, positive outward and down.
-    #[serde(default = "vary::<Finite>")]
-    pub pitch_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<360>>")]
+    pub pitch_deg: Vary<Signed<360>>,
     /// Bend of a level blade under gravity, from base to tip.
-    #[serde(default = "vary::<Finite>")]
-    pub bend_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<3600>>")]
+    pub bend_deg: Vary<Signed<3600>>,
     /// Angle between each half and the blade's plane.
-    #[serde(default = "vary::<Finite>")]
-    pub fold_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<360>>")]
+    pub fold_deg: Vary<Signed<360>>,
 }
 
 /// Flowers along a flowering axis: one at its end, or many, in a spiral.
@@ -85,8 +94,8 @@ pub struct FlowersDesc {
     #[schemars(extend("x-example" = "\"daisy\""))]
     pub kind: String,
     /// Number of flowers.
-    #[serde(default = "one")]
-    pub count: Vary<NonNegative>,
+    #[serde(default = "one::<NonNegative<10_000>>")]
+    pub count: Vary<NonNegative<10_000>>,
     /// Position of the lowest flower, as a fraction of the axis's length.
     #[serde(default = "num::<Fraction, 1>")]
     pub from: Num<Fraction>,
@@ -95,19 +104,19 @@ pub struct FlowersDesc {
     pub to: Num<Fraction>,
     /// Diameter, or length of an ear, tassel or pod, of the lowest one.
     #[schemars(extend("x-example" = "Uniform(20, 30)"))]
-    pub size_mm: Vary<NonNegative>,
+    pub size_mm: Vary<NonNegative<10_000>>,
     /// Length of the lowest flower's stalk.
-    #[serde(default = "vary::<NonNegative>")]
-    pub stalk_mm: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<10_000>>")]
+    pub stalk_mm: Vary<NonNegative<10_000>>,
     /// Ratio of size and stalk of the highest flower to those of the lowest.
-    #[serde(default = "num::<Positive, 1>")]
-    pub top: Num<Positive>,
+    #[serde(default = "num::<Positive<100>, 1>")]
+    pub top: Num<Positive<100>>,
     /// Angle between axis and stalk.
-    #[serde(default = "vary::<NonNegative>")]
-    pub angle_deg: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<360>>")]
+    pub angle_deg: Vary<NonNegative<360>>,
     /// Nod of the flower towards the ground, relative to its stalk; negative values make it look up.
-    #[serde(default = "vary::<Finite>")]
-    pub nod_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<360>>")]
+    pub nod_deg: Vary<Signed<360>>,
     /// Opening: 0 is a bud, 1 open.
     #[serde(default = "open")]
     pub opening: Vary<Fraction>,
@@ -124,26 +133,26 @@ pub struct InflorescenceDesc {
     /// Place where it starts.
     pub at: Seat,
     /// Number of axes at each such place; for `On`, along each axis.
-    #[serde(default = "one")]
-    pub count: Vary<NonNegative>,
+    #[serde(default = "one::<NonNegative<10_000>>")]
+    pub count: Vary<NonNegative<10_000>>,
     /// Length.
     #[schemars(extend("x-example" = "Uniform(150, 300)"))]
-    pub length_mm: Vary<NonNegative>,
+    pub length_mm: Vary<NonNegative<10_000>>,
     /// Ratio of the length of the highest axis to that of the lowest, for `On`.
-    #[serde(default = "num::<Positive, 1>")]
-    pub top: Num<Positive>,
+    #[serde(default = "num::<Positive<100>, 1>")]
+    pub top: Num<Positive<100>>,
     /// Width at the base.
     #[schemars(extend("x-example" = "2"))]
-    pub width_mm: Vary<NonNegative>,
+    pub width_mm: Vary<NonNegative<10_000>>,
     /// Ratio of the width at the end to that at the base.
     #[serde(default = "half")]
-    pub taper: Num<Positive>,
+    pub taper: Num<Positive<100>>,
     /// Angle at the base between this axis and the stem or axis that bears it.
-    #[serde(default = "vary::<NonNegative>")]
-    pub angle_deg: Vary<NonNegative>,
+    #[serde(default = "vary::<NonNegative<360>>")]
+    pub angle_deg: Vary<NonNegative<360>>,
     /// Upward turn towards the light from base to tip, at most to the vertical; negative values make it arch down.
-    #[serde(default = "vary::<Finite>")]
-    pub bend_deg: Vary<Finite>,
+    #[serde(default = "vary::<Signed<3600>>")]
+    pub bend_deg: Vary<Signed<3600>>,
     /// Material; if empty, that of the stem.
     #[serde(default)]
     #[schemars(extend("x-example" = "\"stalk\""))]
@@ -158,7 +167,7 @@ pub struct InflorescenceDesc {
     pub flowers: Vec<FlowersDesc>,
 }
 
-fn one() -> Vary<NonNegative> {
+fn one<B: Bound>() -> Vary<B> {
     Vary::fixed(1.0)
 }
 
@@ -166,7 +175,7 @@ fn open() -> Vary<Fraction> {
     Vary::fixed(1.0)
 }
 
-fn half() -> Num<Positive> {
+fn half() -> Num<Positive<100>> {
     Num::new(0.5)
 }
 

@@ -23,7 +23,7 @@ pub enum ExposureDesc {
     Auto {
         /// Level of the mean.
         #[schemars(extend("x-example" = "Uniform(0.15, 0.21)"))]
-        level: Vary<Positive>,
+        level: Vary<Positive<1000>>,
     },
     /// The given percentile of the pixels is mapped to this level.
     Percentile {
@@ -32,18 +32,18 @@ pub enum ExposureDesc {
         percent: Vary<Percent>,
         /// Level of that percentile.
         #[schemars(extend("x-example" = "0.18"))]
-        level: Vary<Positive>,
+        level: Vary<Positive<1000>>,
     },
     /// Handheld incident light meter: a horizontal white card under the unobstructed light is mapped to this level,
     /// whatever the image shows.
     White {
         /// Level of the card.
-        level: Vary<Positive>,
+        level: Vary<Positive<1000>>,
     },
     /// Fixed shutter and gain: the level of the green (or NIR) signal per radiance.
     Fixed {
         /// Level per W·m⁻²·sr⁻¹·nm⁻¹.
-        gain: Vary<Positive>,
+        gain: Vary<Positive<1_000_000>>,
     },
 }
 

@@ -22,15 +22,15 @@ layered! {
         /// Whether noise is simulated; default true.
         pub on: bool = Given<bool>,
         /// Full-well capacity of a pixel, electrons; default 7000.
-        pub full_well: Num<Positive> = Given<Num<Positive>>,
+        pub full_well: Num<Positive<1_000_000_000>> = Given<Num<Positive<1_000_000_000>>>,
         /// Standard deviation of the read noise of a colour pixel, electrons; default 18.
-        pub read: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub read: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Standard deviation of the read noise of a NIR pixel, electrons; default 14.
-        pub read_nir: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub read_nir: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Dark current of a pixel, electrons per second, collected during the camera's exposure time; default 0.
-        pub dark_current: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub dark_current: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Dark signal non-uniformity: standard deviation of the pixels' offsets, electrons; default 0.
-        pub dsnu: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub dsnu: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Photo response non-uniformity: standard deviation of the pixels' responses, as a fraction; default 0.
         pub prnu: Num<Fraction> = Given<Num<Fraction>>,
         /// Number of the camera body; each number has its own fixed pattern; default 0.

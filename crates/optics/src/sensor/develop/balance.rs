@@ -28,13 +28,13 @@ pub enum WhiteBalanceDesc {
     Fixed {
         /// Gain of R.
         #[schemars(extend("x-example" = "1.1"))]
-        red: Vary<Positive>,
+        red: Vary<Positive<100>>,
         /// Gain of G.
         #[schemars(extend("x-example" = "1"))]
-        green: Vary<Positive>,
+        green: Vary<Positive<100>>,
         /// Gain of B.
         #[schemars(extend("x-example" = "1.4"))]
-        blue: Vary<Positive>,
+        blue: Vary<Positive<100>>,
     },
     /// No white balance: the sensor's raw channels, which are greenish.
     Raw,

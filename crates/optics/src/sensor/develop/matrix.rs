@@ -3,7 +3,7 @@
 //! It is applied after the white balance and before the tone curve, so white is (1, 1, 1) and is preserved if every row
 //! sums to 1.
 
-use furrow_base::ron_file::{Finite, NonNegative, Vary};
+use furrow_base::ron_file::{NonNegative, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -16,13 +16,13 @@ pub enum MatrixDesc {
     #[default]
     Off,
     /// Scales saturation by this factor: 0 is grey, 1 is unchanged. Luminance is preserved.
-    Saturation(Vary<NonNegative>),
+    Saturation(Vary<NonNegative<10>>),
     /// Weights of R, G, B in the new R, G and B. A row that sums to 1 preserves white.
     Rows(MatrixRow, MatrixRow, MatrixRow),
 }
 
 /// Weights of R, G, B.
-pub type MatrixRow = (Vary<Finite>, Vary<Finite>, Vary<Finite>);
+pub type MatrixRow = (Vary<Signed<100>>, Vary<Signed<100>>, Vary<Signed<100>>);
 
 /// Luminance weights of linear Rec. 709.
 const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];

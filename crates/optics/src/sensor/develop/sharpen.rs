@@ -15,9 +15,9 @@ layered! {
     #[schemars(default)]
     pub struct SharpenDesc, SharpenWritten = "SharpenDesc" {
         /// Factor on the added difference; default 0.
-        pub amount: Vary<NonNegative> = Given<Vary<NonNegative>>,
+        pub amount: Vary<NonNegative<100>> = Given<Vary<NonNegative<100>>>,
         /// Standard deviation of the blur, pixels; default 1.
-        pub radius_px: Vary<NonNegative> = Given<Vary<NonNegative>>,
+        pub radius_px: Vary<NonNegative<100>> = Given<Vary<NonNegative<100>>>,
     }
 }
 

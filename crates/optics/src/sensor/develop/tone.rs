@@ -15,7 +15,7 @@ pub enum Tone {
     /// `Film` with darker shadows and brighter highlights, as in phones.
     SCurve,
     /// The linear value to the power 1/γ, clipped at white; 2.2 is close to sRGB.
-    Gamma(Num<Positive>),
+    Gamma(Num<Positive<10>>),
     /// Proportional, clipped at white; for measurements.
     Linear,
 }

@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 pub struct ApertureDesc {
     /// Focal length divided by the pupil's diameter.
     #[schemars(extend("x-example" = "4"))]
-    pub f_number: Vary<Positive>,
+    pub f_number: Vary<Positive<1000>>,
     /// Distance of the plane in focus.
     #[schemars(extend("x-example" = "0.85"))]
-    pub focus_m: Vary<Positive>,
+    pub focus_m: Vary<Positive<1_000_000>>,
 }
 
 impl ApertureDesc {

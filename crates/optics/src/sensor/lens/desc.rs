@@ -8,7 +8,7 @@ use super::intrinsics::{IntrinsicsDesc, middle};
 use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
 use furrow_base::Result;
-use furrow_base::ron_file::{Finite, Num, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -40,28 +40,28 @@ macro_rules! cameras {
                 $(#[$named])*
                 $name {
                     $(#[$focal])*
-                    focal_mm: Vary<Positive>,
+                    focal_mm: Vary<Positive<10_000>>,
                     $(#[$height])*
-                    height_m: Vary<Positive>,
+                    height_m: Vary<Positive<1000>>,
                     /// Position on the ground, metres east and north; default the origin.
                     #[serde(default = "origin")]
-                    at_m: (Vary<Finite>, Vary<Finite>),
+                    at_m: (Vary<Signed<1000>>, Vary<Signed<1000>>),
                     /// Rotates the image's top clockwise from north; default 0.
-                    #[serde(default = "zero")]
-                    yaw_deg: Vary<Finite>,
+                    #[serde(default = "zero::<Signed<360>>")]
+                    yaw_deg: Vary<Signed<360>>,
                     /// Tilts the view towards the image's top; default 0.
-                    #[serde(default = "zero")]
-                    pitch_deg: Vary<Finite>,
+                    #[serde(default = "zero::<Signed<360>>")]
+                    pitch_deg: Vary<Signed<360>>,
                     /// Tilts the view towards the image's right; default 0.
-                    #[serde(default = "zero")]
-                    roll_deg: Vary<Finite>,
+                    #[serde(default = "zero::<Signed<360>>")]
+                    roll_deg: Vary<Signed<360>>,
                     /// Lens distortion; default none.
                     #[serde(default)]
                     distortion: DistortionDesc,
                     /// Aperture, with focus on the ground; default a pinhole, which is sharp everywhere.
                     #[serde(default, with = "bare", skip_serializing_if = "Option::is_none")]
-                    #[schemars(with = "Option<Vary<Positive>>", extend("x-example" = "4"))]
-                    f_number: Option<Vary<Positive>>,
+                    #[schemars(with = "Option<Vary<Positive<1000>>>", extend("x-example" = "4"))]
+                    f_number: Option<Vary<Positive<1000>>>,
                     $(#[$motion])*
                     #[serde(default, skip_serializing_if = "MotionDesc::is_default")]
                     motion: MotionDesc,
@@ -196,23 +196,23 @@ cameras! {
     }
 }
 
-fn jai_focal() -> Vary<Positive> {
+fn jai_focal() -> Vary<Positive<10_000>> {
     Vary::fixed(15.0)
 }
 
-fn phone_focal() -> Vary<Positive> {
+fn phone_focal() -> Vary<Positive<10_000>> {
     Vary::fixed(4.25)
 }
 
-fn vision_focal() -> Vary<Positive> {
+fn vision_focal() -> Vary<Positive<10_000>> {
     Vary::fixed(12.0)
 }
 
-fn robot_height() -> Vary<Positive> {
+fn robot_height() -> Vary<Positive<1000>> {
     Vary::fixed(0.85)
 }
 
-fn phone_height() -> Vary<Positive> {
+fn phone_height() -> Vary<Positive<1000>> {
     Vary::fixed(0.6)
 }
 
@@ -229,13 +229,13 @@ pub struct CameraModel {
 
 /// Fields of a named camera in a scene file.
 struct Named<'a> {
-    focal_mm: &'a Vary<Positive>,
-    height_m: &'a Vary<Positive>,
-    at_m: &'a (Vary<Finite>, Vary<Finite>),
+    focal_mm: &'a Vary<Positive<10_000>>,
+    height_m: &'a Vary<Positive<1000>>,
+    at_m: &'a (Vary<Signed<1000>>, Vary<Signed<1000>>),
     /// Yaw, pitch, roll.
-    turns_deg: [&'a Vary<Finite>; 3],
+    turns_deg: [&'a Vary<Signed<360>>; 3],
     distortion: &'a DistortionDesc,
-    f_number: Option<&'a Vary<Positive>>,
+    f_number: Option<&'a Vary<Positive<1000>>>,
     motion: &'a MotionDesc,
 }
 

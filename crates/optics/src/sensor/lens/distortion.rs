@@ -5,7 +5,7 @@
 //! y′ = y (1 + k1 r² + k2 r⁴ + k3 r⁶) + p1 (r² + 2y²) + 2 p2 x y.
 //! Source: Brown 1971, "Close-range camera calibration"; OpenCV, module calib3d.
 
-use furrow_base::ron_file::{Finite, Vary};
+use furrow_base::ron_file::{Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
 
@@ -109,15 +109,15 @@ impl Distortion {
 #[serde(deny_unknown_fields, default)]
 pub struct DistortionDesc {
     /// Radial, r².
-    pub k1: Vary<Finite>,
+    pub k1: Vary<Signed<1000>>,
     /// Radial, r⁴.
-    pub k2: Vary<Finite>,
+    pub k2: Vary<Signed<1000>>,
     /// Tangential, along y.
-    pub p1: Vary<Finite>,
+    pub p1: Vary<Signed<1000>>,
     /// Tangential, along x.
-    pub p2: Vary<Finite>,
+    pub p2: Vary<Signed<1000>>,
     /// Radial, r⁶.
-    pub k3: Vary<Finite>,
+    pub k3: Vary<Signed<1000>>,
 }
 
 impl Default for DistortionDesc {
@@ -135,7 +135,7 @@ impl Default for DistortionDesc {
 impl DistortionDesc {
     /// Samples the distortion.
     pub fn draw(&self, stream: &mut Stream) -> Distortion {
-        let mut draw = |of: &Vary<Finite>| of.draw(stream);
+        let mut draw = |of: &Vary<Signed<1000>>| of.draw(stream);
         Distortion {
             k1: draw(&self.k1),
             k2: draw(&self.k2),

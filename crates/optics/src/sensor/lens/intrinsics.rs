@@ -1,6 +1,6 @@
 //! Focal length and principal point of a camera, as written in a scene file.
 
-use furrow_base::ron_file::{Finite, Positive, Vary};
+use furrow_base::ron_file::{Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -14,32 +14,32 @@ pub enum IntrinsicsDesc {
     Pixels {
         /// Focal length along x.
         #[schemars(extend("x-example" = "500"))]
-        fx: Vary<Positive>,
+        fx: Vary<Positive<1_000_000>>,
         /// Focal length along y.
         #[schemars(extend("x-example" = "500"))]
-        fy: Vary<Positive>,
+        fy: Vary<Positive<1_000_000>>,
         /// Optical axis, from the left edge.
         #[schemars(extend("x-example" = "320"))]
-        cx: Vary<Finite>,
+        cx: Vary<Signed<1_000_000>>,
         /// Optical axis, from the top edge.
         #[schemars(extend("x-example" = "240"))]
-        cy: Vary<Finite>,
+        cy: Vary<Signed<1_000_000>>,
     },
     /// Derived from the lens and the sensor, with the optical axis in the image's middle.
     Millimetres {
         /// Focal length.
         #[schemars(extend("x-example" = "8"))]
-        focal_mm: Vary<Positive>,
+        focal_mm: Vary<Positive<10_000>>,
         /// Side of a square pixel, micrometres.
         #[schemars(extend("x-example" = "3.75"))]
-        pixel_um: Vary<Positive>,
+        pixel_um: Vary<Positive<1000>>,
     },
     /// Derived from the angle of view between the left and right edges, with square pixels and the optical axis in the
     /// image's middle.
     FieldOfView {
         /// Angle of view, degrees, below 180.
         #[schemars(extend("x-example" = "60"))]
-        horizontal_deg: Vary<Positive>,
+        horizontal_deg: Vary<Positive<180>>,
     },
 }
 

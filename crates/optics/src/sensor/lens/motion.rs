@@ -1,7 +1,7 @@
 //! Motion and shutter of a camera: description and sampled values.
 
 use furrow_base::math::{Vec3, vec3};
-use furrow_base::ron_file::{Finite, NonNegative, Vary};
+use furrow_base::ron_file::{NonNegative, Signed, Vary};
 use furrow_base::sampling::rng::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
@@ -16,18 +16,18 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct MotionDesc {
     /// Speed over the ground, m/s; default 0.
-    pub speed_m_s: Vary<Finite>,
+    pub speed_m_s: Vary<Signed<100>>,
     /// Heading, degrees clockwise from north; default 0. At yaw 0 that is the image's top.
-    pub heading_deg: Vary<Finite>,
+    pub heading_deg: Vary<Signed<360>>,
     /// Exposure time of a row; default that of the camera, 1 ms.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Vary<NonNegative>>")]
-    pub exposure_ms: Option<Vary<NonNegative>>,
+    #[schemars(with = "Option<Vary<NonNegative<10_000>>>")]
+    pub exposure_ms: Option<Vary<NonNegative<10_000>>>,
     /// Time from the first row's exposure to the last one's; default that of the camera, 0 unless it has a rolling
     /// shutter.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<Vary<NonNegative>>")]
-    pub readout_ms: Option<Vary<NonNegative>>,
+    #[schemars(with = "Option<Vary<NonNegative<10_000>>>")]
+    pub readout_ms: Option<Vary<NonNegative<10_000>>>,
 }
 
 impl Default for MotionDesc {
@@ -46,7 +46,7 @@ impl MotionDesc {
     pub fn draw(&self, readout_ms: f64, stream: &Stream) -> Motion {
         let mut stream = stream.child(Purpose::Motion, 0);
         let (speed, heading) = (self.speed_m_s.draw32(&mut stream), self.heading_deg.draw32(&mut stream).to_radians());
-        let mut seconds = |of: &Option<Vary<NonNegative>>, own: f64| {
+        let mut seconds = |of: &Option<Vary<NonNegative<10_000>>>, own: f64| {
             (of.as_ref().map_or(own, |ms| ms.draw(&mut stream)) * 1e-3) as f32
         };
         Motion {

@@ -7,7 +7,7 @@
 //! image's top, roll towards the image's right. Roll is applied first, then pitch, then yaw.
 
 use furrow_base::math::{Mat3, Vec3, vec3};
-use furrow_base::ron_file::{Finite, Positive, Vary};
+use furrow_base::ron_file::{Bound, Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -76,36 +76,36 @@ pub enum PoseDesc {
     Nadir {
         /// Height above the ground's mean level.
         #[schemars(extend("x-example" = "Normal(mean: 0.85, sd: 0.03)"))]
-        height_m: Vary<Positive>,
+        height_m: Vary<Positive<1000>>,
         /// Position on the ground, metres east and north; default the origin.
         #[serde(default = "origin")]
-        at_m: (Vary<Finite>, Vary<Finite>),
+        at_m: (Vary<Signed<1000>>, Vary<Signed<1000>>),
         /// Rotates the image's top clockwise from north; default 0.
-        #[serde(default = "zero")]
-        yaw_deg: Vary<Finite>,
+        #[serde(default = "zero::<Signed<360>>")]
+        yaw_deg: Vary<Signed<360>>,
         /// Tilts the view towards the image's top; default 0.
-        #[serde(default = "zero")]
-        pitch_deg: Vary<Finite>,
+        #[serde(default = "zero::<Signed<360>>")]
+        pitch_deg: Vary<Signed<360>>,
         /// Tilts the view towards the image's right; default 0.
-        #[serde(default = "zero")]
-        roll_deg: Vary<Finite>,
+        #[serde(default = "zero::<Signed<360>>")]
+        roll_deg: Vary<Signed<360>>,
     },
     /// Upright view from one point to another.
     LookAt {
         /// Position of the lens, metres.
         #[schemars(extend("x-example" = "(0, -1.5, 1)"))]
-        position_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
+        position_m: (Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Signed<1000>>),
         /// Point in the image's middle, metres.
         #[schemars(extend("x-example" = "(0, 0, 0)"))]
-        target_m: (Vary<Finite>, Vary<Finite>, Vary<Finite>),
+        target_m: (Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Signed<1000>>),
     },
 }
 
-pub(super) fn zero() -> Vary<Finite> {
+pub(super) fn zero<B: Bound>() -> Vary<B> {
     Vary::fixed(0.0)
 }
 
-pub(super) fn origin() -> (Vary<Finite>, Vary<Finite>) {
+pub(super) fn origin() -> (Vary<Signed<1000>>, Vary<Signed<1000>>) {
     (zero(), zero())
 }
 
@@ -117,7 +117,7 @@ impl PoseDesc {
                 Ok(nadir(height_m, at_m, [yaw_deg, pitch_deg, roll_deg], stream))
             }
             Self::LookAt { position_m, target_m } => {
-                let mut point = |of: &(Vary<Finite>, Vary<Finite>, Vary<Finite>)| {
+                let mut point = |of: &(Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Signed<1000>>)| {
                     vec3(of.0.draw32(stream), of.1.draw32(stream), of.2.draw32(stream))
                 };
                 let (position, target) = (point(position_m), point(target_m));
@@ -131,9 +131,9 @@ impl PoseDesc {
 
 /// Samples a pose that looks down.
 pub(super) fn nadir(
-    height_m: &Vary<Positive>,
-    at_m: &(Vary<Finite>, Vary<Finite>),
-    turns: [&Vary<Finite>; 3],
+    height_m: &Vary<Positive<1000>>,
+    at_m: &(Vary<Signed<1000>>, Vary<Signed<1000>>),
+    turns: [&Vary<Signed<360>>; 3],
     stream: &mut Stream,
 ) -> Pose {
     let position = vec3(at_m.0.draw32(stream), at_m.1.draw32(stream), height_m.draw32(stream));

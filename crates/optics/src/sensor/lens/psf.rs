@@ -5,7 +5,7 @@
 
 use crate::sensor::given::{Given, layered};
 use furrow_base::math::Spectrum;
-use furrow_base::ron_file::{Finite, NonNegative, Vary};
+use furrow_base::ron_file::{NonNegative, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -17,13 +17,13 @@ layered! {
     pub struct PsfDesc, PsfWritten = "PsfDesc" {
         /// Standard deviation of the blur of the colour image, in pixels of the camera's native resolution, so that an
         /// image of another size has the blur of the same lens; default 0.
-        pub color_px: Vary<NonNegative> = Given<Vary<NonNegative>>,
+        pub color_px: Vary<NonNegative<1000>> = Given<Vary<NonNegative<1000>>>,
         /// Standard deviation of the blur of the NIR image, in the same pixels; default 0.
-        pub nir_px: Vary<NonNegative> = Given<Vary<NonNegative>>,
+        pub nir_px: Vary<NonNegative<1000>> = Given<Vary<NonNegative<1000>>>,
         /// Outward shift of red in the corners, pixels; default 0.
-        pub red_shift_px: Vary<Finite> = Given<Vary<Finite>>,
+        pub red_shift_px: Vary<Signed<1000>> = Given<Vary<Signed<1000>>>,
         /// Outward shift of blue in the corners, pixels; default 0.
-        pub blue_shift_px: Vary<Finite> = Given<Vary<Finite>>,
+        pub blue_shift_px: Vary<Signed<1000>> = Given<Vary<Signed<1000>>>,
     }
 }
 

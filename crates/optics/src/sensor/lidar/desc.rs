@@ -3,7 +3,7 @@
 use super::{HALF_LIGHT_M_NS, Lidar, Returns};
 use crate::sensor::given::{Given, layered};
 use furrow_base::math::{Mat3, Vec3, vec3};
-use furrow_base::ron_file::{Elevation, Finite, NonNegative, Num, Positive, PositiveCount, Vary};
+use furrow_base::ron_file::{Elevation, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -12,8 +12,6 @@ use serde::{Deserialize, Serialize};
 const MOST_BEAMS: usize = 1024;
 /// Largest number of pulses in a turn.
 const MOST_PULSES: f64 = 1e7;
-/// Upper bounds of the beam's full divergence, milliradians, and its diameter at the exit, millimetres.
-const WIDEST: [f64; 2] = [100.0, 1000.0];
 
 layered! {
     /// Rotating LiDAR: a name, `Vlp16` or `Os164`, or a name with fields that override its values. Without a name the
@@ -49,43 +47,43 @@ layered! {
         /// Point where its beams cross, metres east, north and above the ground's mean level; default 1.2 above the
         /// origin.
         #[schemars(extend("x-example" = "(0, 0.4, 1.5)"))]
-        pub position_m: (Vary<Finite>, Vary<Finite>, Vary<Positive>) = Given<(Vary<Finite>, Vary<Finite>, Vary<Positive>)>,
+        pub position_m: (Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Positive<1000>>) = Given<(Vary<Signed<1000>>, Vary<Signed<1000>>, Vary<Positive<1000>>)>,
         /// Rotates its front clockwise from north; default 0.
-        pub yaw_deg: Vary<Finite> = Given<Vary<Finite>>,
+        pub yaw_deg: Vary<Signed<360>> = Given<Vary<Signed<360>>>,
         /// Raises its front, or lowers it if negative; default 0.
-        pub pitch_deg: Vary<Finite> = Given<Vary<Finite>>,
+        pub pitch_deg: Vary<Signed<360>> = Given<Vary<Signed<360>>>,
         /// Lowers its right side; default 0.
-        pub roll_deg: Vary<Finite> = Given<Vary<Finite>>,
+        pub roll_deg: Vary<Signed<360>> = Given<Vary<Signed<360>>>,
         /// Elevations of the beams; default 16 from -15° to 15°.
         #[schemars(extend("x-example" = "Fan(count: 32, from_deg: -30, to_deg: 10)"))]
         pub beams: BeamsDesc = Given<BeamsDesc>,
         /// Range of azimuths in which it emits pulses, degrees clockwise from its front, from -360 to 360; default a
         /// full turn from 0 to 360.
         #[schemars(extend("x-example" = "(-60, 60)"))]
-        pub azimuth_deg: (Num<Finite>, Num<Finite>) = Given<(Num<Finite>, Num<Finite>)>,
+        pub azimuth_deg: (Num<Signed<360>>, Num<Signed<360>>) = Given<(Num<Signed<360>>, Num<Signed<360>>)>,
         /// Rotation rate, turns per second; default 10.
-        pub rotation_hz: Num<Positive> = Given<Num<Positive>>,
+        pub rotation_hz: Num<Positive<1000>> = Given<Num<Positive<1000>>>,
         /// Pulse rate; default 18,084 per second for each beam.
         #[schemars(extend("x-example" = "StepDeg(0.2)"))]
         pub pulses: PulsesDesc = Given<PulsesDesc>,
         /// Full divergence of a beam between the directions of 1/e² of its intensity, milliradians, which is 1.7 times
         /// the full width at half maximum; default 3.
-        pub divergence_mrad: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub divergence_mrad: Num<NonNegative<100>> = Given<Num<NonNegative<100>>>,
         /// Diameter of a beam at the exit, also at 1/e², millimetres; default 12.7.
-        pub exit_mm: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub exit_mm: Num<NonNegative<1000>> = Given<Num<NonNegative<1000>>>,
         /// Standard deviation of a range, metres; default 0.01. Ranges measured below `min_m` or above `max_m` are
         /// dropped.
-        pub range_noise_m: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub range_noise_m: Num<NonNegative<10>> = Given<Num<NonNegative<10>>>,
         /// Shortest range, metres; default 1.
-        pub min_m: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub min_m: Num<NonNegative<1000>> = Given<Num<NonNegative<1000>>>,
         /// Longest range, metres; default 100.
-        pub max_m: Num<Positive> = Given<Num<Positive>>,
+        pub max_m: Num<Positive<10_000>> = Given<Num<Positive<10_000>>>,
         /// Detection threshold of intensity, with 1 for a white, matt wall at 1 m: reflectance divided by the square of
         /// the range at which it is just detected; default 0.00001, a reflectance of a tenth at 100 m.
-        pub min_intensity: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub min_intensity: Num<NonNegative<1000>> = Given<Num<NonNegative<1000>>>,
         /// Length of a pulse, nanoseconds. Echoes closer than half the distance that light travels in that time, 0.15 m
         /// per nanosecond, merge; default 6.67, which is 1 m.
-        pub pulse_ns: Num<NonNegative> = Given<Num<NonNegative>>,
+        pub pulse_ns: Num<NonNegative<10_000>> = Given<Num<NonNegative<10_000>>>,
         /// Which echoes of a pulse are reported; default `Strongest`.
         pub returns: Returns = Given<Returns>,
     }
@@ -117,10 +115,10 @@ pub enum BeamsDesc {
 pub enum PulsesDesc {
     /// All beams fire each time the head has turned by this many degrees.
     #[schemars(extend("x-example" = "(0.2)"))]
-    StepDeg(Num<Positive>),
+    StepDeg(Num<Positive<360>>),
     /// Total pulses per second of all beams; the angle between them follows from `rotation_hz`.
     #[schemars(extend("x-example" = "(300000)"))]
-    PerSecond(Num<Positive>),
+    PerSecond(Num<Positive<1_000_000_000>>),
 }
 
 impl BeamsDesc {
@@ -173,7 +171,7 @@ impl LidarDesc {
                 .help("list each elevation in `Angles` once; the first and the last of a `Fan` must differ"));
         }
         let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());
-        if !(to > from && to - from <= 360.0 && from >= -360.0 && to <= 360.0) {
+        if !(to > from && to - from <= 360.0) {
             let words = format!("azimuth_deg goes from {from} to {to}");
             return Err(Error::input(words)
                 .help("write a smaller and a larger angle from -360 to 360, at most 360 apart, such as (-60, 60)"));
@@ -189,14 +187,6 @@ impl LidarDesc {
             let words = format!("{:.0} pulses in a turn are too many", columns * elevations_deg.len() as f64);
             return Err(Error::input(words)
                 .help(format!("at most {MOST_PULSES:.0}: use fewer beams or a larger step in `pulses`")));
-        }
-        let width = [self.divergence_mrad.get(), self.exit_mm.get()];
-        if width[0] > WIDEST[0] || width[1] > WIDEST[1] {
-            let [mrad, mm] = width;
-            let words = format!("a beam of {mrad} mrad and {mm} mm at the exit is too wide");
-            let [mrad, mm] = WIDEST;
-            return Err(Error::input(words)
-                .help(format!("divergence_mrad goes up to {mrad}, exit_mm up to {mm}; typical values are 3 and 10")));
         }
         let (near, far) = (self.min_m.get(), self.max_m.get());
         if near >= far {
@@ -274,12 +264,12 @@ mod tests {
             ("(beams: Fan(count: 3, from_deg: 4, to_deg: 4))", "two of its beams have the elevation 4"),
             ("(beams: Fan(count: 5000, from_deg: 0, to_deg: 10))", "of 5000 beams"),
             ("(azimuth_deg: (60, -60))", "from 60 to -60"),
-            ("(azimuth_deg: (0, 400))", "from 0 to 400"),
-            ("(azimuth_deg: (3600, 3660))", "from 3600 to 3660"),
+            ("(azimuth_deg: (-200, 300))", "from -200 to 300"),
+            ("(azimuth_deg: (0, 400))", "between -360 and 360"),
             ("(pulses: StepDeg(0.0001))", "pulses in a turn are too many"),
             ("(pulses: PerSecond(1000000000))", "100000000 pulses"),
-            ("(divergence_mrad: 3000)", "a beam of 3000 mrad"),
-            ("(exit_mm: 2000)", "and 2000 mm at the exit"),
+            ("(divergence_mrad: 3000)", "between 0 and 100"),
+            ("(exit_mm: 2000)", "between 0 and 1000"),
             ("(range_noise_m: NaN)", "NaN"),
             ("(pulses: StepDeg(0))", "above 0"),
             ("(beams: Fan(count: 0, from_deg: 0, to_deg: 10))", "whole number from 1"),

@@ -50,9 +50,9 @@ fn vlp16() -> LidarDesc {
     let zero = || Vary::fixed(0.0);
     LidarDesc {
         position_m: (zero(), zero(), Vary::fixed(1.2)),
-        yaw_deg: zero(),
-        pitch_deg: zero(),
-        roll_deg: zero(),
+        yaw_deg: Vary::fixed(0.0),
+        pitch_deg: Vary::fixed(0.0),
+        roll_deg: Vary::fixed(0.0),
         beams: BeamsDesc::Fan { count: Num::new(16.0), from_deg: Num::new(-15.0), to_deg: Num::new(15.0) },
         azimuth_deg: (Num::new(0.0), Num::new(360.0)),
         rotation_hz: Num::new(10.0),

@@ -26,9 +26,9 @@ pub struct LeafRecipe {
     /// Height of the image, pixels.
     pub size: Num<PositiveCount>,
     /// Length of the blade in mm, which sets the scale of areoles and spots.
-    pub length_mm: Num<Positive>,
+    pub length_mm: Num<Positive<100_000>>,
     /// Width divided by length.
-    pub aspect: Num<Positive>,
+    pub aspect: Num<Positive<1000>>,
     /// Outline of the blade, the same as in the species file.
     pub outline: Outline,
     /// Teeth or lobes of the margin.
@@ -60,7 +60,7 @@ pub struct TissueVariation {
     /// Chlorophyll left in the midrib, in secondary veins and in finer veins.
     pub veins: (Num<Fraction>, Num<Fraction>, Num<Fraction>),
     /// Areoles, the cells between the finest veins: their size in mm and the paleness of their borders.
-    pub areoles: (Num<Positive>, Num<Fraction>),
+    pub areoles: (Num<Positive<1_000_000>>, Num<Fraction>),
     /// Mottling between veins.
     pub mottle: Num<Fraction>,
     /// Chlorophyll lost at the margin.
@@ -73,9 +73,9 @@ pub struct TissueVariation {
     /// Coverage by white meal (bladder hairs), densest at the base.
     pub meal: Num<Fraction>,
     /// Mean number of yellowish blotches.
-    pub blotches: Num<NonNegative>,
+    pub blotches: Num<NonNegative<1_000_000>>,
     /// Mean number of small brown spots.
-    pub spots: Num<NonNegative>,
+    pub spots: Num<NonNegative<1_000_000>>,
     /// Specks finer than an areole.
     pub speckle: Num<Fraction>,
     /// Darkness of a V-shaped mark across the middle that points to the tip, as in persicaria.
@@ -106,9 +106,9 @@ impl Default for TissueVariation {
 #[serde(deny_unknown_fields, rename = "Relief")]
 pub struct LeafRelief {
     /// Height represented by white; all heights must fit into it.
-    pub range_mm: Num<Positive>,
+    pub range_mm: Num<Positive<10_000>>,
     /// Depth of the furrow along the midrib; secondary veins have half, finer veins a fifth of it.
-    pub furrow_mm: Num<NonNegative>,
+    pub furrow_mm: Num<NonNegative<1000>>,
     /// Height of the blisters between veins.
-    pub blister_mm: Num<NonNegative>,
+    pub blister_mm: Num<NonNegative<1000>>,
 }

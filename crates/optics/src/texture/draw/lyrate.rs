@@ -17,15 +17,15 @@ pub struct Lyrate {
     /// Length of the terminal blade, relative to the leaf's length.
     pub terminal: Num<Fraction>,
     /// Exponents of that blade's outline at its base and tip, as in `Power(a, b)`.
-    pub outline: (Num<Positive>, Num<Positive>),
+    pub outline: (Num<Positive<100>>, Num<Positive<100>>),
     /// Pairs of lobes below the terminal blade; each lobe is omitted with a probability of 15 %.
-    pub pairs: Num<NonNegative>,
+    pub pairs: Num<NonNegative<100>>,
     /// Length of the uppermost lobes, relative to the half-width.
     pub lobe: Num<Fraction>,
     /// Width of the winged midrib, relative to the leaf's width.
     pub rachis: Num<Fraction>,
     /// Number of blunt, uneven teeth on each side of the blade, and their depth, relative to the half-width.
-    pub teeth: (Num<NonNegative>, Num<Fraction>),
+    pub teeth: (Num<NonNegative<100>>, Num<Fraction>),
     /// How pointed the lobes are and how much they lean towards the tip: 0, the default, is round and spreading, 1 a
     /// sharp point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -33,7 +33,7 @@ pub struct Lyrate {
     /// Number of small pointed teeth on each side of each lobe, at most eight, and their length, relative to the
     /// lobe's; default none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lobe_teeth: Option<(Num<NonNegative>, Num<Fraction>)>,
+    pub lobe_teeth: Option<(Num<NonNegative<100>>, Num<Fraction>)>,
 }
 
 /// Smallest length of the terminal blade, relative to the leaf's length.

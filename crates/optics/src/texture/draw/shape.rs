@@ -81,7 +81,7 @@ const SPINE: f32 = 0.0055;
 impl Shape {
     /// Creates a silhouette. `aspect` is width divided by length; `notch` is the depth of a notch in the tip, in leaf
     /// lengths.
-    pub(super) fn new(outline: Outline, aspect: Num<Positive>, margin: Margin, notch: f32, seed: u64) -> Self {
+    pub(super) fn new(outline: Outline, aspect: Num<Positive<1000>>, margin: Margin, notch: f32, seed: u64) -> Self {
         let aspect = aspect.f32();
         let mut shape = Self {
             outline,

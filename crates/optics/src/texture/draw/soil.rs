@@ -24,7 +24,7 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
     if !(10.0..=1e5).contains(&period) {
         return Err(Error::input(format!("ground of {period} × {period} mm: from 10 to 100000 mm are supported")));
     }
-    let check = |what: &str, low: Num<Positive>, high: Num<Positive>| {
+    let check = |what: &str, low: Num<Positive<1000>>, high: Num<Positive<1000>>| {
         let (low, high) = (low.get(), high.get());
         if low < high && high * 2.0 < period && low * 200.0 > high {
             return Ok(());

@@ -17,10 +17,10 @@ pub struct SoilRecipe {
     /// Width and height of the image, pixels.
     pub size: Num<PositiveCount>,
     /// Width and height of the ground, mm.
-    pub period_mm: Num<Positive>,
+    pub period_mm: Num<Positive<100_000>>,
     /// Height represented by white, mm.
     #[serde(default = "range")]
-    pub range_mm: Num<Positive>,
+    pub range_mm: Num<Positive<10_000>>,
     /// Mean reflectance of the dry soil in linear R, G, B, without stones.
     #[serde(default = "loam")]
     pub albedo: [Num<Fraction>; 3],
@@ -37,7 +37,7 @@ pub struct SoilRecipe {
     pub ground: Ground,
 }
 
-fn range() -> Num<Positive> {
+fn range() -> Num<Positive<10_000>> {
     Num::new(10.0)
 }
 
@@ -55,13 +55,13 @@ fn loam() -> [Num<Fraction>; 3] {
 #[serde(deny_unknown_fields, default)]
 pub struct Crumbs {
     /// Sum of the aggregates' areas divided by the ground's area; above 1 they overlap.
-    pub cover: Num<NonNegative>,
+    pub cover: Num<NonNegative<1_000_000>>,
     /// Smallest size, mm.
-    pub smallest_mm: Num<Positive>,
+    pub smallest_mm: Num<Positive<1000>>,
     /// Largest size, mm.
-    pub largest_mm: Num<Positive>,
+    pub largest_mm: Num<Positive<1000>>,
     /// Exponent of the size distribution.
-    pub power: Num<Positive>,
+    pub power: Num<Positive<1000>>,
 }
 
 impl Default for Crumbs {
@@ -76,11 +76,11 @@ impl Default for Crumbs {
 #[serde(deny_unknown_fields, default)]
 pub struct Litter {
     /// Pale mineral grains.
-    pub grains: Num<NonNegative>,
+    pub grains: Num<NonNegative<1_000_000>>,
     /// Dark and reddish-brown fragments of decayed plants.
-    pub humus: Num<NonNegative>,
+    pub humus: Num<NonNegative<1_000_000>>,
     /// Pale fibres and rootlets.
-    pub fibres: Num<NonNegative>,
+    pub fibres: Num<NonNegative<1_000_000>>,
 }
 
 impl Default for Litter {
@@ -98,19 +98,19 @@ pub enum Ground {
     /// Crust, slaked by rain and cracked by drying.
     Cracked {
         /// Mean width of the plates, mm.
-        plate_mm: Num<Positive>,
+        plate_mm: Num<Positive<1000>>,
         /// Width of the widest cracks, mm.
-        crack_mm: Num<Positive>,
+        crack_mm: Num<Positive<1000>>,
         /// Depth of the cracks, mm.
-        depth_mm: Num<Positive>,
+        depth_mm: Num<Positive<1000>>,
     },
     /// Crumbs with gravel.
     Stony {
         /// Fraction of the ground covered by stones.
         cover: Num<Fraction>,
         /// Smallest size, mm.
-        smallest_mm: Num<Positive>,
+        smallest_mm: Num<Positive<1000>>,
         /// Largest size, mm.
-        largest_mm: Num<Positive>,
+        largest_mm: Num<Positive<1000>>,
     },
 }

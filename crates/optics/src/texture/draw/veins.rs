@@ -19,7 +19,7 @@ pub enum Veins {
         /// Pairs of secondary veins; 0 leaves only the midrib.
         pairs: Num<Count>,
         /// Angle between a secondary vein and the midrib at its foot, degrees.
-        angle_deg: Num<NonNegative>,
+        angle_deg: Num<NonNegative<360>>,
         /// Half-width of the midrib at the base, relative to the leaf's width.
         midrib: Num<Fraction>,
         /// Number of target points for finer veins; 0 for none.
