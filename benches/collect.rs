@@ -6,6 +6,8 @@
 //! Sixteen images are rendered; the others are copies of them with other numbers and their own records and checksums. The table reports
 //! seconds, core seconds and peak memory of each process, as measured by the operating system.
 
+#![expect(clippy::cast_precision_loss, reason = "the numbers of a benchmark are small")]
+
 use furrow_dataset::read::checksum_record::ChecksumRecord;
 use furrow_dataset::read::native;
 use furrow_dataset::{File, Set};

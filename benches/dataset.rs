@@ -6,6 +6,8 @@
 //! share of the summed times of the images: images in progress at the same time have separate threads, so their times add up. Rows with
 //! denoising need `OIDN_DIR`.
 
+#![expect(clippy::cast_precision_loss, reason = "the numbers of a benchmark are small")]
+
 use furrow_dataset::make::timing_log::{ImageTiming, rows};
 use std::path::Path;
 use std::process::Command;

@@ -1,6 +1,8 @@
 //! Rays per second in the main scene: camera rays, scattered rays and shadow rays, for the whole image and for leaves alone, with
 //! leaf masks and with opaque leaves. `cargo bench --bench intersect`; the last lines report the cost of masks.
 
+#![expect(clippy::cast_precision_loss, reason = "the numbers of a benchmark are small")]
+
 use criterion::{BenchmarkId, Criterion, Throughput};
 use furrow_base::geometry::{Interaction, Intersect, Ray};
 use furrow_base::math::{Frame, Vec3};

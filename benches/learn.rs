@@ -5,6 +5,11 @@
 //! the same networks in PyTorch, alternating with this program.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "the numbers of a benchmark are small"
+)]
 
 use furrow_train::data::{Selection, Shape};
 use furrow_train::fit::{Callbacks, Hyperparameters, Plan};

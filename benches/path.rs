@@ -5,6 +5,11 @@
 //! the render time is Embree's share. The table has medians of [`RUNS`] runs, alternating render and replay.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "the numbers of a benchmark are small"
+)]
 
 use furrow_base::geometry::{Hit, Intersect, PACKET, Ray, Window};
 use furrow_base::sampling::Points;

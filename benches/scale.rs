@@ -9,6 +9,12 @@
 //! The exponents are least-squares slopes of the logarithms: 1 is linear, 0 constant.
 
 #![allow(clippy::print_stdout, reason = "the tables are the result")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "the numbers of a benchmark are small"
+)]
 
 use furrow_base::geometry::Window;
 use furrow_base::sampling::Points;

@@ -3,6 +3,15 @@
 //! They form a single test binary. 70 separate binaries would each link the whole library, libtorch and Embree, which
 //! takes minutes longer.
 
+#![expect(
+    clippy::cast_lossless,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "the numbers of tests are small"
+)]
+
 mod ablation;
 mod accel;
 #[cfg(feature = "train")]

@@ -4,6 +4,7 @@
 //! Mathematical Observations"; all weights 1.
 
 use super::raster_image::RasterImage;
+use furrow_base::math::{ToFloat, ToInt};
 use palette::color_difference::Ciede2000;
 use palette::white_point::D65;
 use palette::{IntoColor, Lab, LinSrgb, Srgb};
@@ -23,7 +24,7 @@ pub(super) fn lab([r, g, b]: [u8; 3]) -> [f32; 3] {
 
 /// Returns the linear values, 0 to 1, of the 256 codes of 8-bit sRGB.
 pub(super) fn linear() -> [f32; 256] {
-    std::array::from_fn(|code| Srgb::new(code as u8, 0, 0).into_linear::<f32>().red)
+    std::array::from_fn(|code| Srgb::new(code.to_u8(), 0, 0).into_linear::<f32>().red)
 }
 
 /// Returns the 8-bit sRGB code of a linear value.
@@ -34,6 +35,6 @@ pub(super) fn coded(value: f32) -> u8 {
 /// Returns ΔE₀₀ of each pixel, in CIELAB relative to sRGB white, D65. Both images must have the same size.
 pub(super) fn map(a: &RasterImage, b: &RasterImage) -> Vec<f32> {
     let lab = |[r, g, b]: [u8; 3]| -> Lab<D65, f64> { Srgb::new(r, g, b).into_format::<f64>().into_color() };
-    let differ = |(a, b): (&[u8; 3], &[u8; 3])| if a == b { 0.0 } else { lab(*a).difference(lab(*b)) as f32 };
+    let differ = |(a, b): (&[u8; 3], &[u8; 3])| if a == b { 0.0 } else { lab(*a).difference(lab(*b)).to_f32() };
     a.rgb.par_iter().zip(&b.rgb).map(differ).collect()
 }

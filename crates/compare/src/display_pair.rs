@@ -4,6 +4,7 @@ use super::figures::{Figures, Maps};
 use super::flip;
 use super::raster_image::RasterImage;
 use furrow_base::Result;
+use furrow_base::math::RoundTo;
 
 /// Largest total size of a page's images in bytes; encoded as text in the page they take a third more.
 const BYTES: usize = 6_500_000;
@@ -42,7 +43,7 @@ impl DisplayPair {
         figures: &Figures,
         shown: usize,
     ) -> Result<Self> {
-        let byte = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
+        let byte = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round_to::<u8>();
         let grays: [Vec<u8>; 3] = [
             maps.flip.iter().map(|v| byte(*v)).collect(),
             maps.ssim.iter().map(|v| byte(1.0 - v)).collect(),

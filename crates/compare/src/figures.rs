@@ -2,6 +2,7 @@
 
 use super::raster_image::RasterImage;
 use super::{color, flip, ssim};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
 use serde::Serialize;
@@ -161,7 +162,7 @@ pub fn maps(a: &RasterImage, b: &RasterImage, pixels_per_degree: f32) -> Result<
         || flip::map(a, b, pixels_per_degree),
         || {
             let luma = |of: &RasterImage| of.rgb.iter().map(|p| ssim::luma(*p)).collect::<Vec<f64>>();
-            (ssim::map(a.width as usize, a.height as usize, &luma(a), &luma(b)), color::map(a, b))
+            (ssim::map(a.width.to_usize(), a.height.to_usize(), &luma(a), &luma(b)), color::map(a, b))
         },
     );
     Ok(Maps { flip, ssim, ciede2000 })
@@ -172,7 +173,7 @@ pub(super) fn figures(a: &RasterImage, b: &RasterImage, labels: Option<&[u8]>, m
     if labels.is_some_and(|labels| labels.len() != a.rgb.len()) {
         return Err(Error::misuse("there must be a label for each pixel"));
     }
-    let width = a.width as usize;
+    let width = a.width.to_usize();
     let regions = if labels.is_some() { &Region::ALL[..] } else { &Region::ALL[..1] };
     let mut rows = Vec::new();
     let mut add = |band: Band, square: &dyn Fn(usize) -> f64, ssim: &[f32]| {
@@ -181,7 +182,7 @@ pub(super) fn figures(a: &RasterImage, b: &RasterImage, labels: Option<&[u8]>, m
             for pixel in (0..a.rgb.len()).filter(|k| labels.is_none_or(|labels| region.holds(labels[*k]))) {
                 sums.pixels += 1;
                 sums.square += square(pixel);
-                if ssim::is_whole(pixel % width, pixel / width, width, a.height as usize) {
+                if ssim::is_whole(pixel % width, pixel / width, width, a.height.to_usize()) {
                     sums.whole += 1;
                     sums.ssim += f64::from(ssim[pixel]);
                 }
@@ -197,7 +198,7 @@ pub(super) fn figures(a: &RasterImage, b: &RasterImage, labels: Option<&[u8]>, m
     add(Band::Rgb, &colors, &maps.ssim);
     if !a.nir.is_empty() && a.nir.len() == b.nir.len() {
         let gray = |of: &RasterImage| of.nir.iter().map(|v| f64::from(*v) / 255.0).collect::<Vec<f64>>();
-        let ssim = ssim::map(width, a.height as usize, &gray(a), &gray(b));
+        let ssim = ssim::map(width, a.height.to_usize(), &gray(a), &gray(b));
         add(Band::Nir, &|k| squared(a.nir[k], b.nir[k]), &ssim);
     }
     Ok(Figures { rows })
@@ -223,14 +224,14 @@ struct Sums {
 
 impl Sums {
     fn row(&self, band: Band, region: Region) -> Option<RegionFigures> {
-        let n = self.pixels as f64;
+        let n = self.pixels.to_f64();
         let colors = |sum: f64| (band == Band::Rgb).then_some(sum / n);
         (self.pixels > 0).then(|| RegionFigures {
             band,
             region,
             pixels: self.pixels,
             mse: self.square / n,
-            ssim: (self.whole > 0).then(|| self.ssim / self.whole as f64),
+            ssim: (self.whole > 0).then(|| self.ssim / self.whole.to_f64()),
             flip: colors(self.flip),
             ciede2000: colors(self.ciede2000),
         })

@@ -6,6 +6,7 @@ use super::figures::{Band, Region};
 use super::summary::Summary;
 use super::table::{MEASURES, cells, lead, mean_parts};
 use super::{flip, table};
+use furrow_base::math::ToInt;
 use furrow_report::{Number, Page, color, data_url, legend, list, numbers, section, whole};
 use maud::{Markup, html};
 
@@ -45,7 +46,7 @@ fn figures(of: &Comparison) -> Markup {
             all.push(Number { key: keys[k], value, shown, words: MEASURES[k].into() });
         }
     }
-    let pairs = of.pairs.len() as u64;
+    let pairs = of.pairs.len().to_u64();
     all.push(Number::count("pairs", pairs, if pairs == 1 { "pair" } else { "pairs" }));
     numbers(all)
 }

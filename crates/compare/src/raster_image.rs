@@ -1,5 +1,6 @@
 //! Images and labels as they are compared.
 
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::Map;
 use furrow_render::scene::tag::Class;
@@ -54,10 +55,10 @@ pub fn read_labels(path: &Path, size: (u32, u32)) -> Result<Vec<u8>> {
 
 /// Converts labels to classes. Returns an error that names the file if one is not a class.
 pub(super) fn known(path: &Path, numbers: Vec<u16>) -> Result<Vec<u8>> {
-    let is_known = |n: u16| n < Class::ALL.len() as u16 || n == u16::from(NONE);
+    let is_known = |n: u16| n < Class::ALL.len().to_u16() || n == u16::from(NONE);
     match numbers.iter().find(|n| !is_known(**n)) {
         Some(n) => Err(wrong(path, format!("no class has the number {n}"))),
-        None => Ok(numbers.into_iter().map(|n| n as u8).collect()),
+        None => Ok(numbers.into_iter().map(ToInt::to_u8).collect()),
     }
 }
 

@@ -5,6 +5,7 @@
 //! Quality Assessment: From Error Visibility to Structural Similarity". At the edge the image is mirrored; as in the
 //! authors' program, pixels whose window extends over the edge are excluded from means.
 
+use furrow_base::math::{ToFloat, ToInt};
 use rayon::prelude::*;
 
 /// Half-width of the window, pixels.
@@ -38,7 +39,7 @@ pub(super) fn map(width: usize, height: usize, a: &[f64], b: &[f64]) -> Vec<f32>
             })
             .collect();
         let similar = |x: usize| {
-            Moments::sum((0..TAPS).map(|k| columns[mirrored(x + k, width)].times(weights[k]))).similarity() as f32
+            Moments::sum((0..TAPS).map(|k| columns[mirrored(x + k, width)].times(weights[k]))).similarity().to_f32()
         };
         (0..width).map(similar).collect::<Vec<f32>>()
     };
@@ -47,7 +48,7 @@ pub(super) fn map(width: usize, height: usize, a: &[f64], b: &[f64]) -> Vec<f32>
 
 fn weights() -> [f64; TAPS] {
     let gauss: [f64; TAPS] = std::array::from_fn(|k| {
-        let d = k as f64 - REACH as f64;
+        let d = k.to_f64() - REACH.to_f64();
         (-0.5 * d * d / (SIGMA * SIGMA)).exp()
     });
     let sum: f64 = gauss.iter().sum();
@@ -56,7 +57,7 @@ fn weights() -> [f64; TAPS] {
 
 /// Returns the mirrored index for tap `k`, where `at` is the window's middle plus `k`; the edge pixel is repeated.
 fn mirrored(at: usize, size: usize) -> usize {
-    let around = (at as i64 - REACH as i64).rem_euclid(2 * size as i64) as usize;
+    let around = (at.to_i64() - REACH.to_i64()).rem_euclid(2 * size.to_i64()).to_usize();
     around.min(2 * size - 1 - around)
 }
 

@@ -1,6 +1,7 @@
 //! Many pairs: means over pairs with equal weight, and their confidence intervals.
 
 use super::figures::{Band, Compared, Region, RegionFigures, psnr_db};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::bootstrap::{self, Interval};
 
 /// Mean over pairs.
@@ -55,7 +56,7 @@ fn summary(pairs: &[Compared], band: Band, region: Region) -> Option<Summary> {
     let means = |drawn: &[usize]| -> Vec<Option<f64>> {
         let mean = |k: usize| {
             let known: Vec<f64> = drawn.iter().filter_map(|place| values[*place][k]).collect();
-            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+            (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len().to_f64())
         };
         (0..4).map(mean).collect()
     };
@@ -66,7 +67,7 @@ fn summary(pairs: &[Compared], band: Band, region: Region) -> Option<Summary> {
     Some(Summary {
         band,
         region,
-        pairs: rows.len() as u64,
+        pairs: rows.len().to_u64(),
         mse: mean(0)?,
         ssim: mean(1),
         flip: mean(2),

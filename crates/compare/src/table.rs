@@ -3,6 +3,7 @@
 use super::comparison::Comparison;
 use super::figures::{Band, Region, RegionFigures};
 use super::summary::{Mean, Summary};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_report::{Cell, Lines, Table, count, number};
 use serde::Serialize;
@@ -147,7 +148,7 @@ pub(super) fn each(of: &Comparison) -> Table {
 
 /// Returns a sentence that describes the comparison.
 pub(super) fn lead(of: &Comparison) -> String {
-    let pairs = count(of.pairs.len() as u64, "pair of images", "pairs of images");
+    let pairs = count(of.pairs.len().to_u64(), "pair of images", "pairs of images");
     let around = if of.pairs.len() > 1 { "; means over pairs, with 95 % bootstrap intervals" } else { "" };
     format!("{pairs}{around}. FLIP at {} pixels per degree.", number(f64::from(of.pixels_per_degree)))
 }

@@ -1,6 +1,13 @@
 //! Ray traces a sphere, instanced on a grid, to a portable graymap on standard output: `… --example spheres >
 //! spheres.pgm`.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "the numbers of an example are small"
+)]
+
 use furrow_embree::{Device, Error, Everything, Geometry, Ray, Scene};
 use std::io::Write;
 use std::sync::Arc;

@@ -3,6 +3,7 @@
 //! Days count from the emergence of the field's first crop. A scene file without days describes its field on one day; on another day, the
 //! same field is younger or older by the difference.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::ron_file::{Count, Factor, Num, Positive, Vary};
 use furrow_base::{Error, Result};
 use serde::de::Error as _;
@@ -57,7 +58,7 @@ impl DaysDesc {
     /// Returns the days in ascending order.
     pub fn list(&self) -> Result<Vec<u32>> {
         let Self { from, to, every, on, .. } = self;
-        let whole = |of: &Num<Count>| of.get() as u32;
+        let whole = |of: &Num<Count>| of.get().trunc_to::<u32>();
         if on.is_empty() {
             return spaced(whole(from), whole(to), whole(every));
         }
@@ -89,7 +90,7 @@ impl DaysDesc {
     /// Returns the degree of crusting on a day, as a fraction of the final share; it approaches 1.
     pub(super) fn crust(&self, day: u32) -> f32 {
         const SOWN_BEFORE: f32 = 10.0;
-        -(-(day as f32 + SOWN_BEFORE) / self.crust_days.f32()).exp_m1()
+        -(-(day.to_f32() + SOWN_BEFORE) / self.crust_days.f32()).exp_m1()
     }
 }
 
@@ -113,7 +114,7 @@ fn spaced(from: u32, to: u32, every: u32) -> Result<Vec<u32>> {
     if to > LATEST {
         return too_late(to);
     }
-    Ok((from..=to).step_by(every as usize).collect())
+    Ok((from..=to).step_by(every.to_usize()).collect())
 }
 
 fn ordered(days: Vec<u32>) -> Result<Vec<u32>> {

@@ -2,6 +2,7 @@
 
 use crate::days::DaysDesc;
 use crate::drive::{DriveDesc, MountedDesc};
+use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{self, Bound, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_grow::model::Up;
@@ -214,7 +215,7 @@ impl Growth {
     pub fn draw(&self, place: usize, stream: &mut Stream) -> Stage {
         match self {
             Self::AgeDays(days) => Stage::Age(days.draw32(stream)),
-            Self::Bbch(code) => Stage::Bbch(code.draw(stream) as u32),
+            Self::Bbch(code) => Stage::Bbch(code.draw(stream).trunc_to::<u32>()),
             Self::EmergesOn(_) => Stage::Age(0.0),
             Self::Either(of) => of[place].draw(place, stream),
         }

@@ -6,7 +6,7 @@
 //! The vibration is an Ornstein–Uhlenbeck process: normally distributed deflections from the path, with an autocorrelation of exp(−t / τ).
 //! Source: Uhlenbeck & Ornstein 1930, "On the theory of the Brownian motion"; the exact discretisation, Gillespie 1996.
 
-use furrow_base::math::{Mat3, Vec2, Vec3, vec2};
+use furrow_base::math::{Mat3, RoundTo, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_base::ron_file::{NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_base::{Error, Result};
@@ -203,7 +203,7 @@ pub(super) fn captures(
     let taken = |(frame, at): (usize, Moment)| {
         cameras.iter().map(move |(name, camera)| {
             let camera = if desc.is_some() { at.carry(camera) } else { *camera };
-            Capture { name: name.clone(), frame: frame as u32, time_s: at.time_s, camera, vehicle: at }
+            Capture { name: name.clone(), frame: frame.to_u32(), time_s: at.time_s, camera, vehicle: at }
         })
     };
     Ok(moments.into_iter().enumerate().flat_map(taken).collect())
@@ -225,7 +225,7 @@ impl Moment {
 
 /// Returns the vehicle's pose and velocity at each frame.
 fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &DriveInputs, stream: &mut Stream) -> Result<Vec<Moment>> {
-    let frames = desc.frames.get() as usize;
+    let frames = desc.frames.get().trunc_to::<usize>();
     let path = match &desc.path {
         PathDesc::Poses(file) => {
             if around.poses.len() < frames {
@@ -260,8 +260,8 @@ fn moments(desc: &DriveDesc, first: Option<&Pose>, around: &DriveInputs, stream:
     let rate = desc.rate_hz.get();
     let mut shake = Shake::start(&desc.shake, 1.0 / rate, stream);
     let moment = |frame: usize| {
-        let time_s = frame as f64 / rate;
-        let (place, ahead, speed) = path.at(time_s as f32);
+        let time_s = frame.to_f64() / rate;
+        let (place, ahead, speed) = path.at(time_s.to_f32());
         let [height, across, roll, pitch, yaw] = shake.next();
         let heading = Mat3::from_rotation_z(-(ahead.x.atan2(ahead.y) + yaw));
         let turn = heading * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(roll);
@@ -316,7 +316,7 @@ impl<'a> Shake<'a> {
         let ShakeDesc { height_mm, across_mm, roll_deg, pitch_deg, yaw_deg, correlation_s } = desc;
         let (metres, radians) = (|of: &Num<_>| of.f32() * 1e-3, |of: &Num<_>| of.f32().to_radians());
         let sd = [metres(height_mm), metres(across_mm), radians(roll_deg), radians(pitch_deg), radians(yaw_deg)];
-        let kept = (-step_s / correlation_s.get()).exp() as f32;
+        let kept = (-step_s / correlation_s.get()).exp().to_f32();
         Self { sd, now: [0.0; 5], kept, stream, begun: false }
     }
 
@@ -324,7 +324,7 @@ impl<'a> Shake<'a> {
         let kept = if std::mem::replace(&mut self.begun, true) { self.kept } else { 0.0 };
         let new = (1.0 - kept * kept).sqrt();
         for (now, sd) in self.now.iter_mut().zip(self.sd) {
-            *now = kept * *now + new * sd * self.stream.normal() as f32;
+            *now = kept * *now + new * sd * self.stream.normal().to_f32();
         }
         self.now
     }
@@ -335,7 +335,7 @@ fn flown(poses: &[(f64, Pose)], first: Pose) -> Vec<Moment> {
     let begin = poses.first().map_or(0.0, |(time, _)| *time);
     let velocity = |k: usize| {
         let ((t0, a), (t1, b)) = (poses[k.saturating_sub(1)], poses[(k + 1).min(poses.len() - 1)]);
-        if t1 > t0 { (b.position - a.position) / (t1 - t0) as f32 } else { Vec3::ZERO }
+        if t1 > t0 { (b.position - a.position) / (t1 - t0).to_f32() } else { Vec3::ZERO }
     };
     let moment = |(k, (time, pose)): (usize, &(f64, Pose))| {
         let turn = pose.axes * first.axes.transpose();

@@ -6,6 +6,7 @@
 
 use furrow_base::Error;
 use furrow_base::geometry::Cost;
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::Step;
 use procfs::{Current, Meminfo};
 use std::path::Path;
@@ -43,13 +44,13 @@ impl Estimate {
     pub fn check(&self, memory: u64) -> Result<(), (Vec<Step<'static>>, Error)> {
         let Cost { bytes, seconds, .. } = self.total();
         let largest = |of: fn(&Cost) -> f64| self.shares.iter().max_by(|a, b| of(&a.cost).total_cmp(&of(&b.cost)));
-        if bytes.is_nan() || bytes > memory as f64 {
+        if bytes.is_nan() || bytes > memory.to_f64() {
             let Some(share) = largest(|cost| cost.bytes) else { return Ok(()) };
             let words = format!(
                 "this field would take about {} of memory, {} of it for this; the limit is {}",
                 gib(bytes),
                 gib(share.cost.bytes),
-                gib(memory as f64)
+                gib(memory.to_f64())
             );
             let help = format!("{}; --memory sets the limit, in GiB", share.advice);
             return Err((share.at.clone(), Error::input(words).help(help)));
@@ -69,7 +70,7 @@ impl Estimate {
 
 /// Formats a number of bytes in GiB.
 pub fn gib(bytes: f64) -> String {
-    let gib = bytes / (1_u64 << 30) as f64;
+    let gib = bytes / (1_u64 << 30).to_f64();
     if gib < 1e4 { format!("{gib:.1} GiB") } else { format!("{gib:.0e} GiB") }
 }
 
@@ -104,7 +105,7 @@ mod tests {
     #[test]
     fn the_largest_part_is_named_with_the_limit() {
         let of = |shares| Estimate { shares };
-        let gib = (1_u64 << 30) as f64;
+        let gib = (1_u64 << 30).to_f64();
         let small = of(vec![share("soil", 3.0 * gib, 1.0), share("crops", 5.0 * gib, 7000.0)]);
         assert!(of(vec![]).check(0).is_ok());
         let (at, error) = small.check(7 << 30).unwrap_err();

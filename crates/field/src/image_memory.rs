@@ -2,6 +2,7 @@
 
 use super::estimate::{Share, usual_memory};
 use furrow_base::geometry::Cost;
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};
 use furrow_optics::texture::{Header, MemoryLimit, Need};
@@ -76,7 +77,7 @@ impl ImageMemory {
 
     /// Returns the memory left for further images.
     pub(super) fn allowance(&self) -> MemoryLimit {
-        let most = self.memory.unwrap_or_else(usual_memory) as f64;
+        let most = self.memory.unwrap_or_else(usual_memory).to_f64();
         MemoryLimit { most, taken: self.asked.iter().filter_map(|picture| self.needs.get(picture)).copied().sum() }
     }
 

@@ -54,7 +54,7 @@ impl LayerMaps for Layer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use furrow_base::math::vec2;
+    use furrow_base::math::{ToFloat, vec2};
     use furrow_optics::texture::{ColorSpace, Wrap};
 
     /// Rationale: a map with texels of one centimetre must not show single grains of half a millimetre, and its brightness must be their
@@ -73,7 +73,7 @@ mod tests {
                 .wrapped(Wrap::Repeat);
         let fine = Layer::new(albedo, height);
         let coarse = fine.coarser(0.02);
-        let places = || (0..100 * 100).map(|k| vec2((k % 100) as f32, (k / 100) as f32) * 0.01 + 0.003);
+        let places = || (0..100 * 100).map(|k| vec2((k % 100).to_f32(), (k / 100).to_f32()) * 0.01 + 0.003);
         let of = |layer: &Layer| {
             let mean = places().map(|p| layer.albedo(p)[1]).sum::<f32>() / 1e4;
             let spread = places().map(|p| (layer.albedo(p)[1] - mean).powi(2)).sum::<f32>() / 1e4;

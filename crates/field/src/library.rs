@@ -10,7 +10,7 @@ use super::species_text::SpeciesFile;
 use furrow_base::error::{Kind, Place};
 use furrow_base::geometry::{AlphaMask, Margin};
 use furrow_base::input::{self, Outside, Scope, shipped};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use furrow_base::ron_file::{Pick, RonFile, nearest};
 use furrow_base::{Error, Result};
 use furrow_grow::model::{Model, Up};
@@ -473,7 +473,7 @@ fn unlikely(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
             "{path} has no transparent pixels, so the blade is the whole rectangle; cut the leaf out"
         ));
     };
-    let share = mask.hanging().count() as f64 / mask.count().max(1) as f64;
+    let share = mask.hanging().count().to_f64() / mask.count().max(1).to_f64();
     (share < WHOLE).then(|| {
         format!(
             "{path}: {:.0} % of its opaque pixels are not connected to the leaf base in the middle of the lower edge; \

@@ -1,5 +1,6 @@
 //! Kinds of scene parts (soil, debris, organs, models): the finest label.
 
+use furrow_base::math::ToInt;
 use furrow_grow::plant::OrganKind;
 use furrow_grow::soil::DebrisKind;
 
@@ -80,7 +81,7 @@ impl PartKind {
 
 /// Returns the colour of the named model at index `place`: blues and purples that differ from one model to the next.
 fn of_name(place: u8) -> [u8; 3] {
-    let channel = |step: usize| (40 + (usize::from(place) * step) % 180) as u8;
+    let channel = |step: usize| (40 + (usize::from(place) * step) % 180).to_u8();
     [channel(53), channel(97), 230]
 }
 
@@ -116,7 +117,7 @@ mod tests {
         assert!(!numbers.contains(&0));
         // Named models come after them, and only they need a longer palette.
         assert!(numbers.iter().all(|number| *number < PartKind::Named(0).number()));
-        assert_eq!(PartKind::Named(PartKind::MOST_NAMED as u8 - 1).number(), 200);
+        assert_eq!(PartKind::Named(PartKind::MOST_NAMED.to_u8() - 1).number(), 200);
         assert_eq!([0, 2].map(|named| PartKind::palette(named).len()), [24, 103]);
         for (_, name, _, kind) in PartKind::NUMBERED {
             assert!(kind.organ().is_none_or(|organ| organ.name() == name), "{name}");

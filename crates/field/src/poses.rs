@@ -3,7 +3,7 @@
 //! Named columns are read by their names, in any order. Unknown names are an error, because numbers read in the wrong order would still
 //! be valid poses. Sources: the formats of TUM RGB-D (Sturm et al. 2012) and of EuRoC MAV (Burri et al. 2016).
 
-use furrow_base::math::{Mat3, Quat, vec3};
+use furrow_base::math::{Mat3, Quat, ToFloat, vec3};
 use furrow_base::{Error, Result, input};
 use furrow_optics::sensor::Pose;
 use std::borrow::Cow;
@@ -81,9 +81,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<(f64, Pose)>> {
         if all.last().is_some_and(|(before, _)| time - before < SHORTEST) {
             return Err(wrong("is not later than the one before"));
         }
-        let q = [qx, qy, qz, qw].map(|v| (v / norm) as f32);
+        let q = [qx, qy, qz, qw].map(|v| (v / norm).to_f32());
         let axes = Mat3::from_quat(Quat::from_array(q));
-        all.push((time, Pose { position: vec3(x as f32, y as f32, z as f32), axes }));
+        all.push((time, Pose { position: vec3(x.to_f32(), y.to_f32(), z.to_f32()), axes }));
     }
     Ok(all)
 }

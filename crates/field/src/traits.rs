@@ -5,7 +5,7 @@
 
 use super::Field;
 use furrow_base::geometry::{AlphaMask, Coverage};
-use furrow_base::math::{Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_grow::plant::{LeafAxis, OrganKind};
 use furrow_render::scene::Part;
 use rayon::prelude::*;
@@ -173,9 +173,9 @@ impl Canopy {
         let leaves = areas.iter().fold(0.0, |sum, area| sum + area);
         let known = (!unknown).then_some(leaves);
         let canopy = Self {
-            ground_m2: ground as f32,
-            leaf_area_m2: known.map(|leaves| leaves as f32),
-            lai: known.map(|leaves| (leaves / ground) as f32),
+            ground_m2: ground.to_f32(),
+            leaf_area_m2: known.map(ToFloat::to_f32),
+            lai: known.map(|leaves| (leaves / ground).to_f32()),
         };
         (ground > 0.0).then_some(canopy)
     }
@@ -184,7 +184,7 @@ impl Canopy {
 /// Returns the mask coverage of each triangle of a part.
 fn shown(part: &Part) -> Vec<TriangleCoverage> {
     let of = |corners: &[u32; 3]| match &part.mask {
-        Some(mask) => mask.share(corners.map(|k| part.mesh.uvs[k as usize])),
+        Some(mask) => mask.share(corners.map(|k| part.mesh.uvs[k.to_usize()])),
         None => (Coverage::Opaque, 1.0),
     };
     part.mesh.triangles.iter().map(of).collect()
@@ -222,11 +222,11 @@ fn measure(organs: &[&Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits
         }
         let ahead = axis.tip - axis.base;
         let leaf = LeafTraits {
-            area_m2: area as f32,
+            area_m2: area.to_f32(),
             length_m: axis.size.length,
             width_m: axis.size.width,
             petiole_m: axis.size.petiole,
-            inclination_deg: if area > 0.0 { (tilted / area).to_degrees() as f32 } else { 0.0 },
+            inclination_deg: if area > 0.0 { (tilted / area).to_degrees().to_f32() } else { 0.0 },
             azimuth_deg: ahead.x.atan2(ahead.y).to_degrees().rem_euclid(360.0),
             top_m: top - foot.z,
         };
@@ -235,7 +235,7 @@ fn measure(organs: &[&Organ<'_>], axes: &[LeafAxis], foot: Vec3) -> (PlantTraits
     }
     let corners = organs.iter().flat_map(|organ| organ.part.positions());
     let top = corners.fold(foot.z, |top, p| top.max(p.z));
-    let plant = PlantTraits { leaf_area_m2: total as f32, cover_m2: cover(organs) as f32, top_m: top - foot.z };
+    let plant = PlantTraits { leaf_area_m2: total.to_f32(), cover_m2: cover(organs).to_f32(), top_m: top - foot.z };
     (plant, leaves)
 }
 
@@ -252,8 +252,8 @@ fn cover(organs: &[&Organ<'_>]) -> f64 {
     let (lo, hi) = corners().fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
     let shared = organs.iter().any(|organ| organ.part.instance.is_some());
     let side = ((hi - lo).max_element() / CELLS[usize::from(shared)]).max(1e-5);
-    let columns = ((hi.x - lo.x) / side) as usize + 1;
-    let rows = ((hi.y - lo.y) / side) as usize + 1;
+    let columns = ((hi.x - lo.x) / side).trunc_to::<usize>() + 1;
+    let rows = ((hi.y - lo.y) / side).trunc_to::<usize>() + 1;
     let mut covered = vec![false; columns * rows];
     for Organ { part, shown, .. } in organs {
         for ((i, corners), (coverage, _)) in (0..).zip(&part.mesh.triangles).zip(*shown) {
@@ -261,13 +261,15 @@ fn cover(organs: &[&Organ<'_>]) -> f64 {
             let mask = match coverage {
                 Coverage::Transparent => continue,
                 Coverage::Opaque => None,
-                Coverage::Mixed => part.mask.as_deref().map(|mask| (mask, corners.map(|k| part.mesh.uvs[k as usize]))),
+                Coverage::Mixed => {
+                    part.mask.as_deref().map(|mask| (mask, corners.map(|k| part.mesh.uvs[k.to_usize()])))
+                }
             };
             let triangle = part.corners(i).map(|p| (p.truncate() - lo) / side);
             shade(&mut covered, (columns, rows), triangle, mask);
         }
     }
-    covered.iter().filter(|cell| **cell).count() as f64 * f64::from(side) * f64::from(side)
+    covered.iter().filter(|cell| **cell).count().to_f64() * f64::from(side) * f64::from(side)
 }
 
 /// Marks the unit cells whose centres are inside a triangle and where its mask is opaque.
@@ -282,16 +284,17 @@ fn shade(
         return;
     }
     let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-    let cells =
-        |lo: f32, hi: f32, most: usize| ((lo - 0.5).ceil().max(0.0) as usize)..((hi + 0.5).floor() as usize).min(most);
+    let cells = |lo: f32, hi: f32, most: usize| {
+        (lo - 0.5).ceil().max(0.0).trunc_to::<usize>()..(hi + 0.5).floor_to::<usize>().min(most)
+    };
     for row in cells(lo.y, hi.y, rows) {
-        let (west, east) = span([a, b, c], row as f32 + 0.5);
+        let (west, east) = span([a, b, c], row.to_f32() + 0.5);
         for column in cells(lo.x.max(west - 1.0), hi.x.min(east + 1.0), columns) {
             let cell = &mut covered[row * columns + column];
             if *cell {
                 continue;
             }
-            let p = vec2(column as f32 + 0.5, row as f32 + 0.5);
+            let p = vec2(column.to_f32() + 0.5, row.to_f32() + 0.5);
             let (u, v) = ((p - a).perp_dot(c - a) / double, (b - a).perp_dot(p - a) / double);
             let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
             let there =
@@ -351,7 +354,7 @@ mod tests {
         let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
         for i in 0..=rows {
             for j in 0..=columns {
-                let (t, x) = (i as f32 / rows as f32, j as f32 / columns as f32);
+                let (t, x) = (i.to_f32() / rows.to_f32(), j.to_f32() / columns.to_f32());
                 positions.push(place(0.1 * t) + vec3(0.04 * (x - 0.5), 0.0, 0.0));
                 uvs.push(vec2(x, 1.0 - t));
                 if i < rows && j < columns {
@@ -430,7 +433,7 @@ mod tests {
     /// that its outline crosses.
     #[test]
     fn what_a_mask_leaves_is_what_counts() {
-        let disc = AlphaMask::new(200, 500, |x, y| vec2(x as f32 - 99.5, (y as f32 - 249.5) * 0.4).length() < 80.0);
+        let disc = AlphaMask::new(200, 500, |x, y| vec2(x.to_f32() - 99.5, (y.to_f32() - 249.5) * 0.4).length() < 80.0);
         let (plant, leaf) = measured(&leaf(0.0, Some(disc)));
         // An ellipse with 0.8 of the width and 0.8 of the length.
         let expected = PI / 4.0 * 0.032 * 0.08;
@@ -442,7 +445,7 @@ mod tests {
     /// and the same area.
     #[test]
     fn an_instance_has_the_traits_of_its_leaf() {
-        let disc = AlphaMask::new(200, 500, |x, y| vec2(x as f32 - 99.5, (y as f32 - 249.5) * 0.4).length() < 80.0);
+        let disc = AlphaMask::new(200, 500, |x, y| vec2(x.to_f32() - 99.5, (y.to_f32() - 249.5) * 0.4).length() < 80.0);
         let own = leaf(0.8, Some(disc));
         let mut instance = Part { mesh: own.mesh.clone(), mask: own.mask.clone(), ..leaf(0.8, None) };
         let placement = Arc::new(Placement { rotation: Mat3::IDENTITY, scale: 1.0, offset: Vec3::ZERO });
@@ -465,7 +468,7 @@ mod tests {
             shade(&mut covered, (columns, rows), [a, b, d], None);
             let double = (b - a).perp_dot(d - a);
             for (k, cell) in covered.iter().enumerate() {
-                let p = vec2((k % columns) as f32 + 0.5, (k / columns) as f32 + 0.5);
+                let p = vec2((k % columns).to_f32() + 0.5, (k / columns).to_f32() + 0.5);
                 let (u, v) = ((p - a).perp_dot(d - a) / double, (b - a).perp_dot(p - a) / double);
                 proptest::prop_assert_eq!(*cell, double != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0, "{}", p);
             }

@@ -2,6 +2,7 @@
 //! the mean over random placements, for the camera and the densities drawn. Actual numbers vary more, above all if plants form patches.
 
 use super::SceneFile;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_report::number;
 
 /// Maximum number of fields that are sampled.
@@ -24,8 +25,8 @@ impl ExpectedPlants {
     /// Computes the distribution of these numbers of plants; `None` if there are none.
     fn of(mut plants: Vec<f64>) -> Option<Self> {
         plants.sort_by(f64::total_cmp);
-        let last = plants.len().checked_sub(1)? as f64;
-        let at = |share: f64| plants[(share * last).round() as usize];
+        let last = plants.len().checked_sub(1)?.to_f64();
+        let at = |share: f64| plants[(share * last).round_to::<usize>()];
         Some(Self { median: at(0.5), low: at(0.05), high: at(0.95) })
     }
 

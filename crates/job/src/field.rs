@@ -2,6 +2,7 @@
 
 use super::threads::Threads;
 use furrow_base::geometry::Window;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::Edit;
 use furrow_field::assemble::{Options, Stage};
@@ -75,7 +76,7 @@ impl Field {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
             self.options.progress.enter(Stage::Bvh);
-            let (scene, count) = (&self.grown.scene, self.threads.count() as u32);
+            let (scene, count) = (&self.grown.scene, self.threads.count().to_u32());
             let build = |before: Option<&PreviousBuild<'_>>| {
                 EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)
             };

@@ -9,7 +9,7 @@
 
 use furrow_base::Result;
 use furrow_base::geometry::{Interaction, Ray};
-use furrow_base::math::{Frame, Vec3, vec2};
+use furrow_base::math::{Frame, ToFloat, ToInt, Vec3, vec2};
 use furrow_optics::bsdf::Form;
 use furrow_output::Export;
 use furrow_output::mitsuba::{self, Crossing, Directions, Leveled, Pair};
@@ -100,11 +100,11 @@ fn directions(scene: &Scene, leveled: &Leveled) -> Result<Directions> {
 /// Returns the surface point hit by ray number `i` through the image.
 fn sight(world: &World<'_>, leveled: &Leveled, i: u32) -> Option<Sight> {
     let camera = &world.scene.camera;
-    let size = vec2(camera.width() as f32, camera.height() as f32);
-    let place = vec2((i as f32 + 0.5) / RAYS as f32, (i as f32 * GOLDEN).fract());
+    let size = vec2(camera.width().to_f32(), camera.height().to_f32());
+    let place = vec2((i.to_f32() + 0.5) / RAYS.to_f32(), (i.to_f32() * GOLDEN).fract());
     let (origin, direction) = camera.ray(place * size, [0.5; 2]);
     let (hit, at) = world.interact(&Ray::new(origin, direction), 0.0, camera.pixel_angle())?;
-    let material = &leveled.materials[leveled.of_parts[hit.part as usize] as usize];
+    let material = &leveled.materials[leveled.of_parts[hit.part.to_usize()].to_usize()];
     let (bsdf, frame) = material.scatter(&at, -direction);
     let (weight, leaf) = match bsdf.form() {
         Form::Rough { albedo, .. } => (albedo.mean(), false),
@@ -129,7 +129,7 @@ fn lit<T>(world: &World<'_>, sights: &[Sight], pair: impl Fn(&Sight, Vec3, f32) 
         for light in &world.scene.lights {
             for _ in 0..DRAWS {
                 drawn += 1;
-                let u = [(drawn as f32 * GOLDEN).fract(), ((drawn % DRAWS) as f32 + 0.5) / DRAWS as f32];
+                let u = [(drawn.to_f32() * GOLDEN).fract(), ((drawn % DRAWS).to_f32() + 0.5) / DRAWS.to_f32()];
                 let Some(light) = light.sample_li(sight.at, u) else { continue };
                 // A lamp is at a finite distance; the shadow ray ends just before it.
                 let reach = light.distance * (1.0 - 1e-5);
@@ -166,9 +166,9 @@ fn plane(scene: &Scene) -> Vec<Sight> {
 /// origin from straight above.
 fn seen(scene: &Scene) -> Vec<(Vec3, Vec3)> {
     let camera = &scene.camera;
-    let size = vec2(camera.width() as f32, camera.height() as f32);
+    let size = vec2(camera.width().to_f32(), camera.height().to_f32());
     let met = |i: u32| {
-        let place = vec2((i % GRID) as f32 + 0.5, (i / GRID) as f32 + 0.5) / GRID as f32;
+        let place = vec2((i % GRID).to_f32() + 0.5, (i / GRID).to_f32() + 0.5) / GRID.to_f32();
         let (origin, direction) = camera.ray(place * size, [0.5; 2]);
         let distance = -origin.z / direction.z;
         (direction.z < -1e-3 && distance > 0.0).then(|| (origin + direction * distance, -direction))

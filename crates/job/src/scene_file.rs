@@ -4,6 +4,7 @@ use super::field::Field;
 use super::threads::Threads;
 use furrow_base::Result;
 use furrow_base::input::Scope;
+use furrow_base::math::ToInt;
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::{BuildProgress, Options, Preview, Scanner, Source};
 use furrow_field::estimate::Estimate;
@@ -182,7 +183,7 @@ impl SceneFile {
 
     /// Returns the number of images per field, over all its days.
     pub fn captures(&self) -> u64 {
-        self.source.captures() * self.seen_days().len().max(1) as u64
+        self.source.captures() * self.seen_days().len().max(1).to_u64()
     }
 
     /// Returns the expected number of plants in view of field `index`.

@@ -192,6 +192,7 @@ impl<I, T> Drop for EndOnDrop<'_, I, T> {
 mod tests {
     use super::*;
     use furrow_base::error::Kind;
+    use furrow_base::math::ToInt;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::time::{Duration, Instant};
 
@@ -231,7 +232,7 @@ mod tests {
         let (taken, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let make = |item: &u64, _: &Threads, begun: &mut u64| {
             *begun += 1;
-            most.fetch_max(*item as usize - 10 - taken.load(Ordering::SeqCst), Ordering::SeqCst);
+            most.fetch_max(item.to_usize() - 10 - taken.load(Ordering::SeqCst), Ordering::SeqCst);
             std::thread::sleep(Duration::from_millis(item * 7 % 5));
             Ok(2 * item)
         };

@@ -10,6 +10,7 @@
 
 use super::{Export, write_atomically};
 use furrow_base::geometry::Hit;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_field::Field;
@@ -197,7 +198,7 @@ pub fn write(folder: &Path, field: &Field, density: f64) -> Result<Export> {
     let path = folder.join("points.ply");
     let file = cloud.file(env!("CARGO_PKG_VERSION"));
     write_atomically(&path, &file)?;
-    let amount = format!("{points} points, {of_soil} of them soil, {:.1} MB,", file.len() as f64 * 1e-6);
+    let amount = format!("{points} points, {of_soil} of them soil, {:.1} MB,", file.len().to_f64() * 1e-6);
     Ok(Export { paths: vec![path], warnings: Vec::new(), amount: Some(amount) })
 }
 
@@ -211,7 +212,7 @@ pub fn sample(field: &Field, density: f64) -> Result<Cloud> {
     }
     let mut cloud = Cloud::default();
     for k in 0..field.scene.parts.len() {
-        let mut stream = Stream::of(field.seed, field.index, Purpose::Cloud, k as u64);
+        let mut stream = Stream::of(field.seed, field.index, Purpose::Cloud, k.to_u64());
         on_part(field, k, density, &mut stream, &mut cloud);
     }
     Ok(cloud)
@@ -220,7 +221,7 @@ pub fn sample(field: &Field, density: f64) -> Result<Cloud> {
 /// Returns the cumulative area of a part's triangles, m².
 fn areas(part: &Part) -> Vec<f64> {
     let mut sum = 0.0;
-    let triangles = 0..part.mesh.triangles.len() as u32;
+    let triangles = 0..part.mesh.triangles.len().to_u32();
     let add = |i: u32| {
         let [a, b, c] = part.corners(i);
         sum += 0.5 * f64::from((b - a).cross(c - a).length());
@@ -234,15 +235,15 @@ fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &m
     let areas = areas(part);
     let Some(area) = areas.last().copied().filter(|area| *area > 0.0) else { return };
     let wanted = area * density;
-    let count = wanted.floor() as u64 + u64::from(stream.chance(wanted.fract()));
-    let material = &field.scene.materials[part.material as usize];
-    let apart = density.sqrt().recip() as f32;
+    let count = wanted.floor_to::<u64>() + u64::from(stream.chance(wanted.fract()));
+    let material = &field.scene.materials[part.material.to_usize()];
+    let apart = density.sqrt().recip().to_f32();
     let kind = [part.tag.class as u8, field.kinds[k].number()];
     for i in 0..count {
-        let share = (i as f64 + stream.uniform()) / count as f64;
+        let share = (i.to_f64() + stream.uniform()) / count.to_f64();
         let (root, along) = (stream.uniform32().sqrt(), stream.uniform32());
-        let triangle = areas.partition_point(|sum| *sum <= share * area).min(areas.len() - 1) as u32;
-        let hit = Hit { part: k as u32, triangle, u: 1.0 - root, v: root * along, t: 0.0 };
+        let triangle = areas.partition_point(|sum| *sum <= share * area).min(areas.len() - 1).to_u32();
+        let hit = Hit { part: k.to_u32(), triangle, u: 1.0 - root, v: root * along, t: 0.0 };
         let at = part.interaction(&hit, apart);
         if part.mask.as_ref().is_some_and(|mask| !mask.opaque_at(at.uv)) {
             continue;

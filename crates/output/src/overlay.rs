@@ -1,5 +1,6 @@
 //! Overlay of labels on the image, for inspection: classes are tinted, plants and leaves outlined.
 
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_render::render::LabelMap;
 use furrow_render::scene::tag::{Class, Tag};
 
@@ -8,7 +9,7 @@ const TINT: f32 = 0.35;
 
 /// Draws the labels over the image.
 pub(super) fn draw(rgb: &[[u8; 3]], labels: &LabelMap) -> Vec<[u8; 3]> {
-    let (w, h) = (labels.window.width() as usize, labels.window.height() as usize);
+    let (w, h) = (labels.window.width().to_usize(), labels.window.height().to_usize());
     let tag = |x: usize, y: usize| labels.tags[y * w + x];
     let mut out = rgb.to_vec();
     for y in 0..h {
@@ -25,7 +26,7 @@ pub(super) fn draw(rgb: &[[u8; 3]], labels: &LabelMap) -> Vec<[u8; 3]> {
                 let (color, tint) =
                     if other(|t| u32::from(t.leaf)) { ([255; 3], 0.6) } else { (here.class.color(), TINT) };
                 *pixel = std::array::from_fn(|i| {
-                    (f32::from(pixel[i]) * (1.0 - tint) + f32::from(color[i]) * tint).round() as u8
+                    (f32::from(pixel[i]) * (1.0 - tint) + f32::from(color[i]) * tint).round_to::<u8>()
                 });
             }
         }

@@ -1,6 +1,7 @@
 //! Reading of the user's photographs in common formats, and downscaling of images for HTML pages.
 
 use furrow_base::input;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_optics::texture::decoded_image::{self, CUT_SHORT, DecodedImage, is_cut_short, over_white};
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
@@ -100,7 +101,8 @@ pub fn shrunk(width: u32, height: u32, most: u32) -> (u32, u32) {
     if longest <= most {
         return (width, height);
     }
-    let scale = |n: u32| ((u64::from(n) * u64::from(most) + u64::from(longest) / 2) / u64::from(longest)).max(1) as u32;
+    let scale =
+        |n: u32| ((u64::from(n) * u64::from(most) + u64::from(longest) / 2) / u64::from(longest)).max(1).to_u32();
     (scale(width), scale(height))
 }
 
@@ -160,7 +162,7 @@ fn plausible_jpeg(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     let decoded: ImageResult<_> = JpegDecoder::new(Cursor::new(bytes)).map(|decoder| (decoder.dimensions(), decoder));
     let ((w, h), decoder) = decoded.map_err(|e| wrong(e.to_string()))?;
     // Checked before that much memory is allocated.
-    if u64::from(w) * u64::from(h) > PIXELS_A_BYTE.saturating_mul(bytes.len() as u64) {
+    if u64::from(w) * u64::from(h) > PIXELS_A_BYTE.saturating_mul(bytes.len().to_u64()) {
         return Err(wrong(format!(
             "its header declares {w} × {h} pixels, more than its {} bytes can hold",
             bytes.len()
@@ -177,7 +179,7 @@ mod tests {
     /// as written, and detected as truncated for any cut; a PNG is not a JPEG.
     #[test]
     fn a_jpeg_without_its_end_is_found() {
-        let rgb: Vec<[u8; 3]> = (0..64 * 48).map(|k| [k as u8, (k / 7) as u8, 90]).collect();
+        let rgb: Vec<[u8; 3]> = (0..64 * 48).map(|k| [(k % 256).to_u8(), (k / 7 % 256).to_u8(), 90]).collect();
         let whole = encode_jpeg(64, 48, &rgb, 90).unwrap();
         assert!(!is_cut_short(&whole) && !is_cut_short(b"\x89PNG\r\n"));
         for length in [whole.len() - 2, whole.len() / 2, 40, 3] {
@@ -209,7 +211,7 @@ mod tests {
     /// before decoding.
     #[test]
     fn a_jpeg_comes_back_or_is_refused() {
-        let gray: Vec<u8> = (0..40 * 24).map(|k| (k % 40 * 5) as u8).collect();
+        let gray: Vec<u8> = (0..40 * 24).map(|k| (k % 40 * 5).to_u8()).collect();
         let rgb: Vec<[u8; 3]> = gray.iter().map(|v| [*v, 200 - v, 90]).collect();
         let path = Path::new("a.jpg");
         let (color, plain) = (encode_jpeg(40, 24, &rgb, 100).unwrap(), encode_gray_jpeg(40, 24, &gray, 100).unwrap());

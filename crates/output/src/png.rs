@@ -1,6 +1,7 @@
 //! PNG reading and writing for labels and images, with the `png` crate; indexed and 16-bit images keep their bits.
 
 use furrow_base::input;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::MOST_PLANTS;
 use png::{BitDepth, ColorType};
@@ -69,7 +70,7 @@ pub fn encode(width: u32, height: u32, picture: &ImageData<'_>, text: &str) -> R
             most if u16::try_from(most).is_ok() => {
                 encoder.set_color(ColorType::Grayscale);
                 encoder.set_depth(BitDepth::Sixteen);
-                numbers.iter().flat_map(|n| (*n as u16).to_be_bytes()).collect()
+                numbers.iter().flat_map(|n| n.to_u16().to_be_bytes()).collect()
             }
             most if most <= MOST_PLANTS => {
                 encoder.set_color(ColorType::Rgb);
@@ -119,7 +120,7 @@ fn decode_kinds(path: &Path, bytes: &[u8], kinds: &[(BitDepth, ColorType)], what
     if !kinds.contains(&kind) {
         return Err(wrong(&format!("it is not {what}")));
     }
-    let size = plausible(reader.output_buffer_size(), (w, h), bytes.len() as u64).map_err(|what| wrong(&what))?;
+    let size = plausible(reader.output_buffer_size(), (w, h), bytes.len().to_u64()).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
     Ok((w, h, kind.1 == ColorType::Rgb, data))
@@ -140,7 +141,7 @@ const DEFLATED: u64 = 1100;
 /// Returns the size of an image's data. Fails if it is more than the file's bytes can hold, before that much memory is
 /// allocated.
 fn plausible(size: Option<usize>, (w, h): (u32, u32), bytes: u64) -> Result<usize, String> {
-    let holds = |size: &usize| *size as u64 <= DEFLATED.saturating_mul(bytes);
+    let holds = |size: &usize| size.to_u64() <= DEFLATED.saturating_mul(bytes);
     size.filter(holds)
         .ok_or_else(|| format!("its header declares {w} × {h} pixels, more than its {bytes} bytes can hold"))
 }
@@ -219,7 +220,7 @@ impl Map {
     /// Converts to colours: an index to its palette colour (black if it has none), a number to gray.
     pub fn colors(self) -> Vec<[u8; 3]> {
         match self {
-            Self::Numbers(numbers) => numbers.into_iter().map(|n| [n.min(255) as u8; 3]).collect(),
+            Self::Numbers(numbers) => numbers.into_iter().map(|n| [n.min(255).to_u8(); 3]).collect(),
             Self::Indexed(indices, palette) => {
                 indices.into_iter().map(|i| palette.get(usize::from(i)).copied().unwrap_or_default()).collect()
             }
@@ -248,7 +249,7 @@ fn map_of(path: &Path) -> Result<(u32, u32, Map)> {
     let size = plausible(reader.output_buffer_size(), (w, h), bytes).map_err(wrong)?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(unreadable)?;
-    let values = unpack(&data, w as usize * color.samples(), depth);
+    let values = unpack(&data, w.to_usize() * color.samples(), depth);
     let map = match color {
         ColorType::Indexed => Map::Indexed(values, palette),
         ColorType::Grayscale => Map::Numbers(values),
@@ -258,7 +259,7 @@ fn map_of(path: &Path) -> Result<(u32, u32, Map)> {
             if pixels.iter().all(|p| p[0] == p[1] && p[1] == p[2]) {
                 Map::Numbers(pixels.iter().map(|p| p[0]).collect())
             } else if depth == 8 {
-                Map::Colors(pixels.iter().map(|p| [p[0], p[1], p[2]].map(|v| v as u8)).collect())
+                Map::Colors(pixels.iter().map(|p| [p[0], p[1], p[2]].map(ToInt::to_u8)).collect())
             } else {
                 return Err(wrong("it has 16 bits per colour; colour masks must have 8".into()));
             }
@@ -286,7 +287,7 @@ mod tests {
     use super::*;
 
     fn of(numbers: &[u32]) -> Result<Vec<u8>> {
-        encode(numbers.len() as u32, 1, &ImageData::Numbers(numbers), "")
+        encode(numbers.len().to_u32(), 1, &ImageData::Numbers(numbers), "")
     }
 
     /// Rationale: datasets of fields with few plants keep their bytes. Expected: those of a 16-bit gray image up to the
@@ -294,8 +295,8 @@ mod tests {
     #[test]
     fn numbers_of_16_bits_are_gray() {
         for numbers in [vec![0], vec![0, 1, 65_535, 256]] {
-            let short: Vec<u16> = numbers.iter().map(|n| *n as u16).collect();
-            let gray = encode(short.len() as u32, 1, &ImageData::Gray16(&short), "").unwrap();
+            let short: Vec<u16> = numbers.iter().map(|n| n.to_u16()).collect();
+            let gray = encode(short.len().to_u32(), 1, &ImageData::Gray16(&short), "").unwrap();
             assert_eq!(of(&numbers).unwrap(), gray);
             assert_eq!(decode_numbers(Path::new("a.png"), &gray).unwrap().2, numbers);
         }

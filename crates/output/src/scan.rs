@@ -3,7 +3,7 @@
 use super::cloud::{Cloud, Column, Point, Value};
 use super::write_together;
 use furrow_base::Result;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec3};
 use furrow_field::Field;
 use furrow_optics::sensor::Lidar;
 use furrow_optics::texture::ColorSpace;
@@ -36,14 +36,14 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
     cloud.comment(&vector("velocity_m_s", lidar.velocity));
     let ids: BTreeMap<u32, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
     for echo in echoes {
-        let part = &field.scene.parts[echo.part as usize];
+        let part = &field.scene.parts[echo.part.to_usize()];
         let [r, g, b, nir] = echo.reflectance.to_array().map(|linear| ColorSpace::Srgb.encode(linear));
         let point = Point {
             at: echo.at().to_array(),
             normal: echo.normal.to_array(),
             rgb: [r, g, b],
             nir,
-            kind: [part.tag.class as u8, field.kinds[echo.part as usize].number()],
+            kind: [part.tag.class as u8, field.kinds[echo.part.to_usize()].number()],
             plant: part.tag.plant,
             leaf: part.tag.leaf,
         };

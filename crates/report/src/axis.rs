@@ -1,5 +1,7 @@
 //! Tick positions along an axis.
 
+use furrow_base::math::{RoundTo, ToFloat};
+
 /// Returns the smallest number ≥ `least` that is 1, 2 or 5 times a power of ten.
 pub(super) fn step(least: f64) -> f64 {
     let power = 10.0_f64.powf(least.max(1e-9).log10().floor());
@@ -8,10 +10,10 @@ pub(super) fn step(least: f64) -> f64 {
 
 /// Returns about `about` multiples of a round step in `from..=to`: at least two, unless `from` equals `to`.
 pub(super) fn ticks(from: f64, to: f64, about: usize) -> Vec<f64> {
-    let step = step((to - from) / about.max(1) as f64);
+    let step = step((to - from) / about.max(1).to_f64());
     // Tolerance of 0.0005 steps, because 0.3 counts as a multiple of 0.1 whatever its last bit.
-    let (first, last) = ((from / step - 5e-4).ceil() as i64, (to / step + 5e-4).floor() as i64);
-    (first..=last).map(|k| k as f64 * step).collect()
+    let (first, last) = ((from / step - 5e-4).ceil_to::<i64>(), (to / step + 5e-4).floor_to::<i64>());
+    (first..=last).map(|k| k.to_f64() * step).collect()
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@
 //! of the values. Source: Vallender 1974, "Calculation of the Wasserstein Distance between Probability Distributions on
 //! the Line".
 
+use furrow_base::math::{RoundTo, ToFloat};
+
 /// Assignment of values to bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bins {
@@ -36,7 +38,7 @@ pub(super) const DECIMALS: f64 = 5e-4;
 impl Bins {
     /// `count` bins of equal width from `from` to `to`.
     pub fn between(from: f64, to: f64, count: usize) -> Self {
-        Self::Linear { from, width: (to - from) / count as f64, count, slack: 0.0 }
+        Self::Linear { from, width: (to - from) / count.to_f64(), count, slack: 0.0 }
     }
 
     /// Number of bins.
@@ -52,21 +54,21 @@ impl Bins {
             Self::Linear { from, width, slack, .. } => (value - from) / width + slack,
             Self::Logarithmic { .. } => value.max(1.0).log2() * PER_DOUBLING + DECIMALS,
         };
-        (place.max(0.0) as usize).min(self.count() - 1)
+        place.max(0.0).trunc_to::<usize>().min(self.count() - 1)
     }
 
     /// Returns the start of bin number `place`. Place 0 is the bin that starts at 0, or at 1 for logarithmic bins.
     pub(super) fn edge(&self, place: i64) -> f64 {
         match self {
-            Self::Linear { width, .. } => place as f64 * width,
-            Self::Logarithmic { .. } => (place as f64 / PER_DOUBLING).exp2(),
+            Self::Linear { width, .. } => place.to_f64() * width,
+            Self::Logarithmic { .. } => (place.to_f64() / PER_DOUBLING).exp2(),
         }
     }
 
     /// Place of the first bin, in the numbering of [`edge`](Self::edge).
     pub(super) fn first(&self) -> i64 {
         match self {
-            Self::Linear { from, width, .. } => (from / width).round() as i64,
+            Self::Linear { from, width, .. } => (from / width).round_to::<i64>(),
             Self::Logarithmic { .. } => 0,
         }
     }
@@ -107,33 +109,33 @@ impl Histogram {
     /// Centre of a bin; the geometric mean of its ends for logarithmic bins.
     pub fn middle(&self, bin: usize) -> f64 {
         match self.bins {
-            Bins::Linear { from, width, .. } => from + (bin as f64 + 0.5) * width,
-            Bins::Logarithmic { .. } => ((bin as f64 + 0.5) / PER_DOUBLING).exp2(),
+            Bins::Linear { from, width, .. } => from + (bin.to_f64() + 0.5) * width,
+            Bins::Logarithmic { .. } => ((bin.to_f64() + 0.5) / PER_DOUBLING).exp2(),
         }
     }
 
     /// Mean of the values, up to the resolution of the bins; 0 if empty.
     pub fn mean(&self) -> f64 {
-        let sum: f64 = self.counts.iter().enumerate().map(|(bin, n)| self.middle(bin) * *n as f64).sum();
-        sum / self.total().max(1) as f64
+        let sum: f64 = self.counts.iter().enumerate().map(|(bin, n)| self.middle(bin) * n.to_f64()).sum();
+        sum / self.total().max(1).to_f64()
     }
 
     /// Standard deviation of the values, up to the resolution of the bins; 0 if empty.
     pub fn deviation(&self) -> f64 {
         let mean = self.mean();
-        let square = |(bin, n): (usize, &u64)| (self.middle(bin) - mean).powi(2) * *n as f64;
-        (self.counts.iter().enumerate().map(square).sum::<f64>() / self.total().max(1) as f64).sqrt()
+        let square = |(bin, n): (usize, &u64)| (self.middle(bin) - mean).powi(2) * n.to_f64();
+        (self.counts.iter().enumerate().map(square).sum::<f64>() / self.total().max(1).to_f64()).sqrt()
     }
 
     /// W₁ distance to another histogram with the same bins, in the unit of the values, or in bins if logarithmic.
     /// Neither may be empty.
     pub fn distance(&self, other: &Self) -> f64 {
-        let (all, others) = (self.total() as f64, other.total() as f64);
+        let (all, others) = (self.total().to_f64(), other.total().to_f64());
         let (mut sum, mut f, mut g) = (0.0, 0, 0);
         for (a, b) in self.counts.iter().zip(&other.counts) {
             f += a;
             g += b;
-            sum += (f as f64 / all - g as f64 / others).abs();
+            sum += (f.to_f64() / all - g.to_f64() / others).abs();
         }
         match self.bins {
             Bins::Linear { width, .. } => sum * width,

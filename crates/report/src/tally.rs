@@ -1,6 +1,7 @@
 //! Memory-efficient statistics of a stream of values: a histogram with exact mean and range.
 
 use super::histogram::{Bins, DECIMALS, Histogram};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 
 /// Minimum and maximum number of bars in a chart whose values spread over enough bins.
 const BARS: (f64, f64) = (10.0, 24.0);
@@ -34,12 +35,12 @@ impl Tally {
     /// For values from `from` to `to` with bins of `width`; both must be multiples of `width`. Values outside are
     /// counted in the first or last bin, but mean and range remain exact.
     pub fn linear(from: f64, to: f64, width: f64) -> Self {
-        Self::new(Bins::Linear { from, width, count: ((to - from) / width).round() as usize, slack: DECIMALS })
+        Self::new(Bins::Linear { from, width, count: ((to - from) / width).round_to::<usize>(), slack: DECIMALS })
     }
 
     /// For counts of objects, with one bin per count up to 262,143.
     pub fn whole() -> Self {
-        Self::linear(0.0, THINGS as f64, 1.0)
+        Self::linear(0.0, THINGS.to_f64(), 1.0)
     }
 
     /// For percentages; 100 is counted in the last bin.
@@ -75,7 +76,7 @@ impl Tally {
 
     /// Mean of the values; 0 if empty.
     pub fn mean(&self) -> f64 {
-        if self.n == 0 { 0.0 } else { self.sum / self.n as f64 }
+        if self.n == 0 { 0.0 } else { self.sum / self.n.to_f64() }
     }
 
     /// Minimum and maximum of the values.
@@ -98,13 +99,13 @@ impl Tally {
         let counts = &self.histogram.counts;
         let (first, last) = (counts.iter().position(|n| *n > 0)?, counts.iter().rposition(|n| *n > 0)?);
         let begin = self.histogram.bins.first();
-        Some((begin + first as i64, begin + last as i64))
+        Some((begin + first.to_i64(), begin + last.to_i64()))
     }
 
     /// Number of values in the bins at places `from..to`.
     fn between(&self, from: i64, to: i64) -> u64 {
         let begin = self.histogram.bins.first();
-        let index = |place: i64| (place - begin).clamp(0, self.histogram.counts.len() as i64) as usize;
+        let index = |place: i64| (place - begin).clamp(0, self.histogram.counts.len().to_i64()).to_usize();
         self.histogram.counts[index(from)..index(to)].iter().sum()
     }
 
@@ -116,8 +117,8 @@ impl Tally {
             return vec![Vec::new(); all.len()];
         };
         // Few values are shown with few bars. Source: Rice's rule, 2 n^(1/3).
-        let n = all.iter().map(|tally| tally.n).max().unwrap_or(0) as f64;
-        let most = (2.0 * n.cbrt()).clamp(BARS.0, BARS.1) as i64;
+        let n = all.iter().map(|tally| tally.n).max().unwrap_or(0).to_f64();
+        let most = (2.0 * n.cbrt()).clamp(BARS.0, BARS.1).trunc_to::<i64>();
         let factor = factors(all[0].is_logarithmic())
             .find(|f| last.div_euclid(*f) - first.div_euclid(*f) < most)
             .unwrap_or(i64::MAX);
@@ -154,11 +155,11 @@ mod tests {
                 tally.add(*value);
             }
             let bars = &Tally::bars(&[&tally])[0];
-            prop_assert!(bars.len() as f64 <= BARS.1);
-            prop_assert_eq!(bars.iter().map(|b| b.count).sum::<u64>(), values.len() as u64);
+            prop_assert!(bars.len().to_f64() <= BARS.1);
+            prop_assert_eq!(bars.iter().map(|b| b.count).sum::<u64>(), values.len().to_u64());
             for bar in bars {
                 let slack = 1e-3 * bar.to;
-                let held = |low: f64, high: f64| values.iter().map(|v| if log { v.max(1.0) } else { *v }).filter(|v| *v >= low && *v < high).count() as u64;
+                let held = |low: f64, high: f64| values.iter().map(|v| if log { v.max(1.0) } else { *v }).filter(|v| *v >= low && *v < high).count().to_u64();
                 prop_assert!(held(bar.from + slack, bar.to - slack) <= bar.count);
                 prop_assert!(bar.count <= held(bar.from - slack, bar.to + slack));
             }

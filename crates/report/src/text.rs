@@ -1,5 +1,7 @@
 //! Formatting of numbers for pages.
 
+use furrow_base::math::{RoundTo, ToInt};
+
 /// Formats a whole number with narrow spaces between groups of three digits.
 pub fn whole(n: u64) -> String {
     let digits = n.to_string();
@@ -18,12 +20,12 @@ pub fn whole(n: u64) -> String {
 pub fn number(x: f64) -> String {
     if x.abs() >= 999.5 {
         let sign = if x < 0.0 { "−" } else { "" };
-        return format!("{sign}{}", whole(x.abs().round() as u64));
+        return format!("{sign}{}", whole(x.abs().round_to::<u64>()));
     }
     if x == 0.0 || x.abs() < 5e-7 {
         return "0".into();
     }
-    let digits = (2 - x.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let digits = (2 - x.abs().log10().floor_to::<i32>()).clamp(0, 6).to_usize();
     let text = format!("{x:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     text.replace('-', "−")

@@ -3,23 +3,25 @@
 //! The scores are resized before the argmax, not the class map after it: region outlines then follow sub-pixel positions instead of the
 //! edges of the network's pixels.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
+
 /// Returns the class with the highest score at each pixel of an image of size `to` (width, height). `scores` are laid out as
 /// classes × height × width at the size `from`. Resampling is bilinear with samples at pixel centres (corners not aligned) and clamped
 /// at the border. Ties go to the lower class number.
 pub fn classes_at(scores: &[f32], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
-    let plane = from.0 as usize * from.1 as usize;
+    let plane = from.0.to_usize() * from.1.to_usize();
     let columns: Vec<LinearTap> = (0..to.0).map(|x| LinearTap::of(x, from.0, to.0)).collect();
-    let mut classes = Vec::with_capacity(to.0 as usize * to.1 as usize);
+    let mut classes = Vec::with_capacity(to.0.to_usize() * to.1.to_usize());
     for y in 0..to.1 {
         let row = LinearTap::of(y, from.1, to.1);
-        let (above, below) = (row.first * from.0 as usize, row.second * from.0 as usize);
+        let (above, below) = (row.first * from.0.to_usize(), row.second * from.0.to_usize());
         for column in &columns {
             let mut best = (0, f32::NEG_INFINITY);
             for (class, values) in scores.chunks_exact(plane).enumerate() {
                 let at = |row: usize| column.mix(values[row + column.first], values[row + column.second]);
                 let value = row.mix(at(above), at(below));
                 if value > best.1 {
-                    best = (class as u8, value);
+                    best = (class.to_u8(), value);
                 }
             }
             classes.push(best.0);
@@ -42,8 +44,8 @@ impl LinearTap {
         let place = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
         let place = place.clamp(0.0, f64::from(from - 1));
         let first = place.floor();
-        let second = (first as usize + 1).min(from as usize - 1);
-        Self { first: first as usize, second, share: (place - first) as f32 }
+        let second = (first.trunc_to::<usize>() + 1).min(from.to_usize() - 1);
+        Self { first: first.trunc_to::<usize>(), second, share: (place - first).to_f32() }
     }
 
     fn mix(&self, a: f32, b: f32) -> f32 {

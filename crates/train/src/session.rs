@@ -14,6 +14,7 @@ use super::net::{Parameter, fitting, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
 use super::weights::{self, Array};
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_dataset::model::split::Split;
 use furrow_output::remove_unfinished;
@@ -198,7 +199,7 @@ fn train_here(
         steps: outcome.steps,
         best_step: outcome.history.best().map(|pass| pass.step),
         ended: outcome.ended.into(),
-        images_per_second: (outcome.steps * plan.hyper.accumulate) as f64 * plan.hyper.batch as f64
+        images_per_second: (outcome.steps * plan.hyper.accumulate).to_f64() * plan.hyper.batch.to_f64()
             / outcome.seconds.max(1e-9),
         history: outcome.history,
         seconds: outcome.seconds,

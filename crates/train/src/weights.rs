@@ -1,6 +1,7 @@
 //! Weights as safetensors files, which any trainer reads. The header holds one entry of Furrow: a checksum over everything, and
 //! a text.
 
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_output::write_atomically;
 use half::{bf16, f16};
@@ -28,7 +29,7 @@ impl Array {
             Dtype::F32 => bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
             Dtype::F16 => bytes.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b).to_f32()).collect(),
             Dtype::BF16 => bytes.as_chunks().0.iter().map(|b| bf16::from_le_bytes(*b).to_f32()).collect(),
-            Dtype::F64 => bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b) as f32).collect(),
+            Dtype::F64 => bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b).to_f32()).collect(),
             _ => return None,
         };
         Some(Self { name, shape: view.shape().to_vec(), values })
@@ -184,7 +185,7 @@ mod tests {
     #[test]
     fn half_precision_takes_half_of_the_bytes_and_keeps_what_was_rounded() {
         let path = Path::new("w.safetensors");
-        let values: Vec<f32> = (0..4096).map(|i| (i as f32 * 0.731).sin() * 1.001_f32.powi(i - 2048)).collect();
+        let values: Vec<f32> = (0..4096).map(|i| (i.to_f32() * 0.731).sin() * 1.001_f32.powi(i - 2048)).collect();
         let fine = [Array { name: "a".into(), shape: vec![4096], values }];
         let coarse = fine.each_ref().map(Array::halved);
         for (a, b) in fine[0].values.iter().zip(&coarse[0].values) {

@@ -2,6 +2,7 @@
 
 use crate::dataset::progress::Progress;
 use crate::quality::threads;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_compare::{Comparison, Options, PIXELS_PER_DEGREE, Pairs, gap};
@@ -80,7 +81,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 fn sets(args: &Args, real: &Path, synthetic: &Path) -> Result<Vec<PathBuf>> {
     let progress = Progress::new(Instant::now(), args.quiet);
     let options = gap::Options { shown: args.show, pixel_mm: args.pixel_mm };
-    let start = |pictures: usize| progress.expect(pictures as u64);
+    let start = |pictures: usize| progress.expect(pictures.to_u64());
     let pool = render::pool(args.threads)?;
     let gap = pool.install(|| gap::Gap::of(real, synthetic, &options, &start, &|| progress.add()))?;
     progress.finish();
@@ -100,7 +101,7 @@ fn pairs(args: &Args, a: &Path, b: &Path) -> Result<Vec<PathBuf>> {
         furrow_cli::message!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
-    progress.expect(found.pairs.len() as u64);
+    progress.expect(found.pairs.len().to_u64());
     let options = Options { labels: args.labels.clone(), pixels_per_degree: args.ppd, shown: args.show };
     let pool = render::pool(args.threads)?;
     let comparison = pool.install(|| Comparison::of(found, &options, &|| progress.add()))?;

@@ -2,6 +2,7 @@
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use furrow_base::input::shipped;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_field::ablation::Edit;
@@ -39,7 +40,8 @@ pub(crate) struct MemoryArgs {
 /// Parses a size in GiB; returns bytes.
 fn bytes(text: &str) -> Result<u64, String> {
     let gib = text.parse().ok().filter(|gib: &f64| (0.1..=1e6).contains(gib));
-    gib.map(|gib| (gib * (1_u64 << 30) as f64) as u64).ok_or_else(|| "write GiB from 0.1 to 1000000, such as 24".into())
+    gib.map(|gib| (gib * (1_u64 << 30).to_f64()).trunc_to::<u64>())
+        .ok_or_else(|| "write GiB from 0.1 to 1000000, such as 24".into())
 }
 
 /// Parses a path of a scene file, or the name of a shipped one.
@@ -116,7 +118,7 @@ impl FieldArgs {
             let help = format!("frames 0 to {frames} of {}", names.join(", "));
             return Err(Error::misuse(words).help(help).in_file(self.path()));
         };
-        field.take(place as u64)?;
+        field.take(place.to_u64())?;
         Ok(field)
     }
 

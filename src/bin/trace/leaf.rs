@@ -1,6 +1,7 @@
 //! `trace leaf`: cuts a leaf out of a photograph, as a texture for a species file.
 
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_cli::cli;
 use furrow_optics::texture::{CutoutOptions, cut_out, doubts, draw};
 use furrow_output::{read_color_photo, write_atomically};
@@ -61,9 +62,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 fn aspect(leaf: &draw::GeneratedTexture) -> f32 {
     let (mut lo, mut hi) = ([u32::MAX; 2], [0; 2]);
     for (i, _) in leaf.rgba.chunks_exact(4).enumerate().filter(|(_, p)| p[3] > 127) {
-        let at = [i as u32 % leaf.width, i as u32 / leaf.width];
+        let at = [i.to_u32() % leaf.width, i.to_u32() / leaf.width];
         lo = [lo[0].min(at[0]), lo[1].min(at[1])];
         hi = [hi[0].max(at[0]), hi[1].max(at[1])];
     }
-    (hi[0].saturating_sub(lo[0]) + 1) as f32 / (hi[1].saturating_sub(lo[1]) + 1) as f32
+    (hi[0].saturating_sub(lo[0]) + 1).to_f32() / (hi[1].saturating_sub(lo[1]) + 1).to_f32()
 }

@@ -4,6 +4,7 @@ use crate::field::{MemoryArgs, scene_file};
 use crate::letters;
 use crate::quality::{samples, threads};
 use crate::render::plants;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
 use furrow_job::{Renderer, Request, SceneFile, Threads};
@@ -115,11 +116,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         grown.warnings.iter().for_each(&mut warn);
         thumbnails.push(Thumbnail {
             words: format!("index {index}"),
-            width: photograph.width as usize,
+            width: photograph.width.to_usize(),
             pixels: photograph.rgb.as_chunks::<3>().0.to_vec(),
         });
     }
-    let sheet = compose(&thumbnails, args.columns as usize)?;
+    let sheet = compose(&thumbnails, args.columns.to_usize())?;
     let Range { start, end } = args.indices;
     let text = format!(
         "program: furrow {}\nseed: {seed}\nindices: {start}..{end}\nspp: {}",
@@ -128,8 +129,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     );
     furrow_output::write_png(
         &out,
-        sheet.width as u32,
-        (sheet.pixels.len() / sheet.width) as u32,
+        sheet.width.to_u32(),
+        (sheet.pixels.len() / sheet.width).to_u32(),
         &ImageData::Rgb(&sheet.pixels),
         &text,
     )?;

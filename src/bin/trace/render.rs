@@ -5,6 +5,7 @@ use crate::growing::Line;
 use crate::quality::{QualityArgs, TechniqueArgs, threads};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use furrow_base::geometry::Window;
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -143,7 +144,7 @@ fn grown(path: &Path, field: &Field) -> String {
         path.display(),
         plants(field.grown().plants.len()),
         scene.parts.len(),
-        scene.triangles() as f64 / 1e6,
+        scene.triangles().to_f64() / 1e6,
         grow.as_secs_f64(),
         build.as_secs_f64()
     )
@@ -160,7 +161,7 @@ fn summary(image: &Image<'_>, quality: &Quality, samples: u64, taken: Duration, 
     let (_, mean, most) = image.film.samples();
     let error =
         if most > 1 { format!("{:.1} %", 100.0 * image.film.median_relative_error()) } else { "unknown".into() };
-    let samples = samples as f64 / 1e6;
+    let samples = samples.to_f64() / 1e6;
     format!(
         "{samples:.0} Msamples in {drawn:.1} s: {:.2} Msamples/s; {}median relative error {error}; {taken:.1} s in all; files in {}",
         samples / drawn,

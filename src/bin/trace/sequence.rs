@@ -4,6 +4,7 @@ use crate::dataset::cost_estimate::{self, DryRunArgs};
 use crate::dataset::order::{ContentArgs, RenderingArgs, begin, formats};
 use crate::dataset::render::{WorkArgs, generate};
 use crate::field::{MemoryArgs, SceneArgs};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::format;
@@ -51,7 +52,7 @@ const USUAL: [(&str, bool); 5] = [("colmap", true), ("flow", true), ("mots", fal
 
 /// Returns those of [`USUAL`] that would not be empty, for fields with `captures` images each on `days` days.
 fn usual_formats(captures: u64, days: usize, labels_only: bool) -> Vec<String> {
-    let a_day = captures / days.max(1) as u64;
+    let a_day = captures / days.max(1).to_u64();
     let tells = |(name, of_one_day): &(&str, bool)| {
         let images = if *of_one_day { a_day } else { captures };
         images > 1 && !(labels_only && format::named(name).is_some_and(format::Format::needs_photograph))

@@ -3,6 +3,7 @@
 use crate::dataset::order::{ContentArgs, RenderingArgs};
 use crate::dataset::render::WorkArgs;
 use crate::field::{MemoryArgs, SceneArgs};
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::deliver::stream::{ImageStream, Listener};
@@ -100,7 +101,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
 
 /// Formats a rate in images per hour.
 fn rate(images: u64, begin: Instant) -> String {
-    format!("{:.0} images per hour", 3600.0 * images as f64 / begin.elapsed().as_secs_f64().max(1e-9))
+    format!("{:.0} images per hour", 3600.0 * images.to_f64() / begin.elapsed().as_secs_f64().max(1e-9))
 }
 
 impl Args {

@@ -1,6 +1,7 @@
 //! Experiment file that trains a network on each of several datasets and compares them with the first one; written by
 //! `trace ablate`.
 
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_dataset::Set;
 use furrow_dataset::model::split::Split;
@@ -31,9 +32,9 @@ pub(crate) fn variants(sets: &[(Set, &str)], reals: &[String]) -> Result<String>
     let size = (rendering.width.max(LEAST), rendering.height.max(LEAST));
     let crop = (size.0 > CROP.0 && size.1 > CROP.1).then_some(CROP);
     let seen = crop.unwrap_or(size);
-    let trainings = (sets.len() * SEEDS.len()) as u64;
+    let trainings = (sets.len() * SEEDS.len()).to_u64();
     let pixels = f64::from(seen.0) * f64::from(seen.1) / (f64::from(CROP.0) * f64::from(CROP.1));
-    let hours = (trainings * STEPS * BATCH) as f64 * pixels / RATE / 3600.0;
+    let hours = (trainings * STEPS * BATCH).to_f64() * pixels / RATE / 3600.0;
     let name = |set: &Set| set.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let base = name(full);
     let mut text = format!(

@@ -2,6 +2,7 @@
 
 use crate::fit;
 use crate::machine::MachineArgs;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -66,7 +67,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         steps: args.steps,
         rate: args.rate,
         keep: args.keep,
-        most: args.most as usize,
+        most: args.most.to_usize(),
         seed: args.seed,
         precision: precision.map_err(Error::input)?.name(),
         threads: args.machine.threads(),

@@ -1,5 +1,6 @@
 //! `train report`: plots losses and validation scores of several runs together, on one page.
 
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_output::write_files;
@@ -84,11 +85,11 @@ fn charts(runs: &[Run]) -> Vec<Chart> {
             .collect(),
         logarithmic,
     };
-    let losses = |of: &History| of.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
-    let rates = |of: &History| of.losses.iter().map(|l| (l.step as f64, l.rate)).collect();
+    let losses = |of: &History| of.losses.iter().map(|l| (l.step.to_f64(), l.loss)).collect();
+    let rates = |of: &History| of.losses.iter().map(|l| (l.step.to_f64(), l.rate)).collect();
     let validation =
-        |of: &History| of.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
-    let scores = |of: &History| of.validation.iter().map(|pass| (pass.step as f64, 100.0 * pass.miou)).collect();
+        |of: &History| of.validation.iter().filter_map(|pass| Some((pass.step.to_f64(), pass.loss?))).collect();
+    let scores = |of: &History| of.validation.iter().map(|pass| (pass.step.to_f64(), 100.0 * pass.miou)).collect();
     // The axis is named after the loss if all runs have the same one.
     let one = runs.first().and_then(|first| first.loss).filter(|loss| runs.iter().all(|run| run.loss == Some(loss)));
     let loss = one.unwrap_or("loss");
@@ -111,7 +112,7 @@ fn table(runs: &[Run]) -> Table {
             Cell::text(name),
             Cell::text(if results.is_some() { "done" } else { "not done" }),
             Cell::Count(results.as_ref().map_or_else(|| history.last(), |results| results.steps)),
-            Cell::number(best.map(|pass| pass.step as f64), 0),
+            Cell::number(best.map(|pass| pass.step.to_f64()), 0),
             Cell::percent(best.map(|pass| pass.miou), 1),
             Cell::Shown(history.losses.last().map_or_else(|| "–".into(), |last| number(last.loss))),
             Cell::number(results.as_ref().map(|results| results.seconds / 60.0), 1),

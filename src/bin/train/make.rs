@@ -3,6 +3,7 @@
 use crate::machine::MachineArgs;
 use crate::predict::Job;
 use crate::{eval, fit, report};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -244,11 +245,11 @@ impl<'a> Make<'a> {
             count(images, "image", "images"),
             count(spp.into(), "sample per pixel", "samples per pixel"),
             minutes(cost.core_s),
-            number(cost.bytes as f64 / 1e6),
+            number(cost.bytes.to_f64() / 1e6),
             count(steps, "training step", "training steps"),
             minutes(training),
-            minutes((cost.core_s + training) / threads.count() as f64),
-            count(threads.count() as u64, "thread", "threads"),
+            minutes((cost.core_s + training) / threads.count().to_f64()),
+            count(threads.count().to_u64(), "thread", "threads"),
         ));
         Ok(())
     }
@@ -264,7 +265,7 @@ impl<'a> Make<'a> {
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let stop = self.signals.catch();
         let callbacks = Callbacks {
-            begin: &|total| bar.set_length(total as u64),
+            begin: &|total| bar.set_length(total.to_u64()),
             warn: &|words| bar.suspend(|| self.tell(&format!("warning: {words}"))),
             done: &|_| bar.inc(1),
             soon: stop,

@@ -2,6 +2,7 @@
 
 use crate::inference::InferenceArgs;
 use crate::machine::MachineArgs;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -114,7 +115,7 @@ impl Job<'_> {
     /// Predicts the images into `out` and shows the progress.
     fn predict(&self, trained: &Ensemble, pictures: &[InputImage], out: &Path) -> Result<Predictions> {
         let passes = predict::passes(&trained.card, pictures.len());
-        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes as u64) };
+        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes.to_u64()) };
         let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let how = Options {
@@ -122,14 +123,14 @@ impl Job<'_> {
             threads: self.machine.threads(),
             batch: self.batch,
             pixel_mm: self.pixel_mm,
-            done: &|done| bar.set_position(done as u64),
+            done: &|done| bar.set_position(done.to_u64()),
             stop: self.signals.catch(),
         };
         let predicted = predict::predict(trained, pictures, out, &self.machine.machine(), &how);
         bar.finish_and_clear();
         let predicted = predicted?;
         if !self.quiet && predicted.done > 0 {
-            let each = predicted.seconds / predicted.done as f64;
+            let each = predicted.seconds / predicted.done.to_f64();
             let pictures = if predicted.done == 1 { "image" } else { "images" };
             furrow_cli::message!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
         }

@@ -1,6 +1,7 @@
 //! Reports of evaluations and training runs: tables, figure and HTML page.
 
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 use furrow_dataset::model::classes::Classes;
 use furrow_output::{read_indexed, write_atomically, write_files};
 use furrow_report::chart::{Chart, Curve};
@@ -111,15 +112,15 @@ pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<C
         curves,
         logarithmic,
     };
-    let losses = history.losses.iter().map(|l| (l.step as f64, l.loss)).collect();
+    let losses = history.losses.iter().map(|l| (l.step.to_f64(), l.loss)).collect();
     let validation: Vec<(f64, f64)> =
-        history.validation.iter().filter_map(|pass| Some((pass.step as f64, pass.loss?))).collect();
+        history.validation.iter().filter_map(|pass| Some((pass.step.to_f64(), pass.loss?))).collect();
     let mut losses = vec![Curve { name: "training".into(), points: losses }];
     if !validation.is_empty() {
         losses.push(Curve { name: "validation".into(), points: validation });
     }
     let mut charts = vec![chart("Loss", loss, losses, true)];
-    let rates = history.losses.iter().map(|l| (l.step as f64, l.rate)).collect();
+    let rates = history.losses.iter().map(|l| (l.step.to_f64(), l.rate)).collect();
     charts.push(chart("Learning rate", "rate", vec![Curve { name: "decoder".into(), points: rates }], true));
     if !history.validation.is_empty() {
         let of = |name: &str, value: &dyn Fn(usize) -> Option<f64>| Curve {
@@ -128,7 +129,7 @@ pub(crate) fn curves(history: &History, loss: &str, classes: &[String]) -> Vec<C
                 .validation
                 .iter()
                 .enumerate()
-                .filter_map(|(i, l)| Some((l.step as f64, 100.0 * value(i)?)))
+                .filter_map(|(i, l)| Some((l.step.to_f64(), 100.0 * value(i)?)))
                 .collect(),
         };
         let mut all = vec![of("mean", &|i| Some(history.validation[i].miou))];

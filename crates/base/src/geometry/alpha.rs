@@ -6,7 +6,7 @@
 //! ray rate compared with fully opaque leaves; an alpha test on every triangle with a byte mask costs 30–55 %.
 
 use crate::geometry::Mesh;
-use crate::math::{Vec2, vec2};
+use crate::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 
 /// One-bit opacity mask over uv ∈ [0, 1]². Everything outside is transparent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,11 +51,11 @@ impl AlphaMask {
     /// Builds a mask by calling `opaque` for each texel (x, y).
     pub fn new(width: u32, height: u32, opaque: impl Fn(u32, u32) -> bool) -> Self {
         let (tiles_x, tiles_y) = (width.div_ceil(8), height.div_ceil(8));
-        let mut tiles = vec![0u64; (tiles_x * tiles_y) as usize];
+        let mut tiles = vec![0u64; (tiles_x * tiles_y).to_usize()];
         for y in 0..height {
             for x in 0..width {
                 if opaque(x, y) {
-                    tiles[((y >> 3) * tiles_x + (x >> 3)) as usize] |= 1 << ((y & 7) * 8 + (x & 7));
+                    tiles[((y >> 3) * tiles_x + (x >> 3)).to_usize()] |= 1 << ((y & 7) * 8 + (x & 7));
                 }
             }
         }
@@ -65,14 +65,14 @@ impl AlphaMask {
     /// Makes texels transparent inside the uv box `[lo, hi]`, where `gone` returns `true` for the uv of the texel
     /// centre.
     pub fn cut(&mut self, [lo, hi]: [Vec2; 2], gone: impl Fn(Vec2) -> bool) {
-        let size = vec2(self.width as f32, self.height as f32);
+        let size = vec2(self.width.to_f32(), self.height.to_f32());
         // One extra texel on each side covers the rounding of texel centres.
         let lo = (lo * size).floor() - 1.0;
         let hi = (hi * size).ceil() + 1.0;
-        for y in lo.y.max(0.0) as u32..hi.y.clamp(0.0, size.y) as u32 {
-            for x in lo.x.max(0.0) as u32..hi.x.clamp(0.0, size.x) as u32 {
-                if self.texel(x as i32, y as i32) && gone(vec2(x as f32 + 0.5, y as f32 + 0.5) / size) {
-                    self.tiles[((y >> 3) * self.tiles_x + (x >> 3)) as usize] &= !(1 << ((y & 7) * 8 + (x & 7)));
+        for y in lo.y.max(0.0).trunc_to::<u32>()..hi.y.clamp(0.0, size.y).trunc_to::<u32>() {
+            for x in lo.x.max(0.0).trunc_to::<u32>()..hi.x.clamp(0.0, size.x).trunc_to::<u32>() {
+                if self.texel(x.to_i32(), y.to_i32()) && gone(vec2(x.to_f32() + 0.5, y.to_f32() + 0.5) / size) {
+                    self.tiles[((y >> 3) * self.tiles_x + (x >> 3)).to_usize()] &= !(1 << ((y & 7) * 8 + (x & 7)));
                 }
             }
         }
@@ -83,11 +83,11 @@ impl AlphaMask {
     #[must_use]
     pub fn hanging(&self) -> Self {
         let middle = self.width / 2;
-        let Some(foot) = (0..self.height).rev().find(|y| self.texel(middle as i32, *y as i32)) else {
+        let Some(foot) = (0..self.height).rev().find(|y| self.texel(middle.to_i32(), y.to_i32())) else {
             return self.clone();
         };
-        let across = self.tiles_x as usize;
-        let place = |x: u32, y: u32| (y >> 3) as usize * across + (x >> 3) as usize;
+        let across = self.tiles_x.to_usize();
+        let place = |x: u32, y: u32| (y >> 3).to_usize() * across + (x >> 3).to_usize();
         let mut kept = vec![0u64; self.tiles.len()];
         let mut reached = kept.clone();
         let mut open = vec![place(middle, foot)];
@@ -125,27 +125,27 @@ impl AlphaMask {
     /// Returns `true` if texel (x, y) is opaque; `false` outside the mask.
     #[inline]
     pub fn texel(&self, x: i32, y: i32) -> bool {
-        if x < 0 || y < 0 || x >= self.width as i32 || y >= self.height as i32 {
+        if x < 0 || y < 0 || x >= self.width.to_i32() || y >= self.height.to_i32() {
             return false;
         }
-        let (x, y) = (x as u32, y as u32);
-        self.tiles[((y >> 3) * self.tiles_x + (x >> 3)) as usize] >> ((y & 7) * 8 + (x & 7)) & 1 == 1
+        let (x, y) = (x.to_u32(), y.to_u32());
+        self.tiles[((y >> 3) * self.tiles_x + (x >> 3)).to_usize()] >> ((y & 7) * 8 + (x & 7)) & 1 == 1
     }
 
     /// Returns `true` if the texel at `uv` is opaque (nearest-neighbour lookup).
     #[inline]
     pub fn opaque_at(&self, uv: Vec2) -> bool {
-        self.texel((uv.x * self.width as f32).floor() as i32, (uv.y * self.height as f32).floor() as i32)
+        self.texel((uv.x * self.width.to_f32()).floor_to::<i32>(), (uv.y * self.height.to_f32()).floor_to::<i32>())
     }
 
     /// Returns the bits of tile (x, y) in row order; 0 (transparent) outside the mask.
     #[inline]
     fn tile(&self, x: i32, y: i32) -> u64 {
-        let tiles_y = self.tiles.len() as u32 / self.tiles_x.max(1);
-        if x < 0 || y < 0 || x >= self.tiles_x as i32 || y >= tiles_y as i32 {
+        let tiles_y = self.tiles.len().to_u32() / self.tiles_x.max(1);
+        if x < 0 || y < 0 || x >= self.tiles_x.to_i32() || y >= tiles_y.to_i32() {
             return 0;
         }
-        self.tiles[(y as u32 * self.tiles_x + x as u32) as usize]
+        self.tiles[(y.to_u32() * self.tiles_x + x.to_u32()).to_usize()]
     }
 
     /// Returns the [`AlphaMask::coverage`] of a uv triangle and its opaque area fraction in 0..1. The fraction is exact
@@ -162,33 +162,34 @@ impl AlphaMask {
     }
 
     fn mixed_share(&self, uv: [Vec2; 3]) -> f64 {
-        let scale = vec2(self.width as f32, self.height as f32);
+        let scale = vec2(self.width.to_f32(), self.height.to_f32());
         let [a, b, c] = uv.map(|p| p * scale);
         let texels = 0.5 * (b - a).perp_dot(c - a).abs();
-        let n = (2.0 * texels).sqrt().ceil().clamp(2.0, MOST_STEPS) as u32;
+        let n = (2.0 * texels).sqrt().ceil().clamp(2.0, MOST_STEPS).trunc_to::<u32>();
         // Sample points: centroids of the n² congruent sub-triangles, first those with the triangle's own orientation,
         // then the reversed ones.
         let upright = (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j, 1.0 / 3.0)));
         let reversed = (1..n).flat_map(|i| (0..n - i).map(move |j| (i - 1, j, 2.0 / 3.0)));
         let opaque = upright.chain(reversed).filter(|(i, j, middle)| {
-            let (u, v) = ((*i as f32 + middle) / n as f32, (*j as f32 + middle) / n as f32);
+            let (u, v) = ((i.to_f32() + middle) / n.to_f32(), (j.to_f32() + middle) / n.to_f32());
             self.opaque_at(uv[0] * (1.0 - u - v) + uv[1] * u + uv[2] * v)
         });
-        opaque.count() as f64 / f64::from(n * n)
+        opaque.count().to_f64() / f64::from(n * n)
     }
 
     /// Classifies a uv triangle. Conservative: returns `Mixed` in doubt.
     pub fn coverage(&self, uv: [Vec2; 3]) -> Coverage {
-        let scale = vec2(self.width as f32, self.height as f32);
+        let scale = vec2(self.width.to_f32(), self.height.to_f32());
         let t = uv.map(|p| p * scale);
         // A margin of 0.01 texel covers the rounding of interpolated uvs.
         let lo = (t[0].min(t[1]).min(t[2]) - 0.01).floor();
         let hi = (t[0].max(t[1]).max(t[2]) + 0.01).floor();
-        let (lo, hi) = ([lo.x as i32, lo.y as i32], [hi.x as i32, hi.y as i32]);
+        let (lo, hi) =
+            ([lo.x.trunc_to::<i32>(), lo.y.trunc_to::<i32>()], [hi.x.trunc_to::<i32>(), hi.y.trunc_to::<i32>()]);
         let (mut any_opaque, mut any_transparent) = (false, false);
         for tile_y in lo[1].div_euclid(8)..=hi[1].div_euclid(8) {
             for tile_x in lo[0].div_euclid(8)..=hi[0].div_euclid(8) {
-                let corner = vec2(tile_x as f32, tile_y as f32) * 8.0;
+                let corner = vec2(tile_x.to_f32(), tile_y.to_f32()) * 8.0;
                 if !touches(&t, corner, 8.0) {
                     continue;
                 }
@@ -197,9 +198,9 @@ impl AlphaMask {
                     u64::MAX => any_opaque = true,
                     bits => {
                         for bit in 0..64u32 {
-                            let (x, y) = (tile_x * 8 + (bit & 7) as i32, tile_y * 8 + (bit >> 3) as i32);
+                            let (x, y) = (tile_x * 8 + (bit & 7).to_i32(), tile_y * 8 + (bit >> 3).to_i32());
                             let inside = x >= lo[0] && x <= hi[0] && y >= lo[1] && y <= hi[1];
-                            if inside && touches(&t, vec2(x as f32, y as f32), 1.0) {
+                            if inside && touches(&t, vec2(x.to_f32(), y.to_f32()), 1.0) {
                                 any_opaque |= bits >> bit & 1 == 1;
                                 any_transparent |= bits >> bit & 1 == 0;
                             }
@@ -245,13 +246,13 @@ pub struct Sorted {
 /// Classifies the triangles of a mesh by its mask. Without a mask all of them are opaque.
 pub fn sort(mesh: &Mesh, mask: Option<&AlphaMask>) -> Sorted {
     let Some(mask) = mask else {
-        return Sorted { opaque: (0..mesh.triangles.len() as u32).collect(), mixed: Vec::new() };
+        return Sorted { opaque: (0..mesh.triangles.len().to_u32()).collect(), mixed: Vec::new() };
     };
     let mut sorted = Sorted::default();
     for (i, t) in mesh.triangles.iter().enumerate() {
-        match mask.coverage(t.map(|k| mesh.uvs[k as usize])) {
-            Coverage::Opaque => sorted.opaque.push(i as u32),
-            Coverage::Mixed => sorted.mixed.push(i as u32),
+        match mask.coverage(t.map(|k| mesh.uvs[k.to_usize()])) {
+            Coverage::Opaque => sorted.opaque.push(i.to_u32()),
+            Coverage::Mixed => sorted.mixed.push(i.to_u32()),
             Coverage::Transparent => {}
         }
     }
@@ -264,7 +265,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn disc() -> AlphaMask {
-        AlphaMask::new(37, 53, |x, y| vec2(x as f32 + 0.5 - 18.0, y as f32 + 0.5 - 25.0).length() < 15.0)
+        AlphaMask::new(37, 53, |x, y| vec2(x.to_f32() + 0.5 - 18.0, y.to_f32() + 0.5 - 25.0).length() < 15.0)
     }
 
     proptest! {
@@ -294,19 +295,19 @@ mod tests {
         fn what_hangs_together_is_what_a_flood_reaches((w, h) in (1u32..40, 1u32..40), seed: u64, fill in 0.4f32..0.9) {
             let mut stream = crate::sampling::Stream::of(seed, 0, crate::sampling::Purpose::Test, 0);
             let texels: Vec<bool> = (0..w * h).map(|_| stream.uniform32() < fill).collect();
-            let mask = AlphaMask::new(w, h, |x, y| texels[(y * w + x) as usize]);
+            let mask = AlphaMask::new(w, h, |x, y| texels[(y * w + x).to_usize()]);
             let mut kept = vec![false; texels.len()];
-            let mut open: Vec<u32> = (0..h).rev().map(|y| y * w + w / 2).filter(|at| texels[*at as usize]).take(1).collect();
+            let mut open: Vec<u32> = (0..h).rev().map(|y| y * w + w / 2).filter(|at| texels[at.to_usize()]).take(1).collect();
             let foot = !open.is_empty();
             while let Some(at) = open.pop() {
-                if std::mem::replace(&mut kept[at as usize], true) {
+                if std::mem::replace(&mut kept[at.to_usize()], true) {
                     continue;
                 }
                 let (x, y) = (at % w, at / w);
                 let next = [(x > 0, at.wrapping_sub(1)), (x + 1 < w, at + 1), (y > 0, at.wrapping_sub(w)), (y + 1 < h, at + w)];
-                open.extend(next.iter().filter(|(there, at)| *there && texels[*at as usize]).map(|(_, at)| *at));
+                open.extend(next.iter().filter(|(there, at)| *there && texels[at.to_usize()]).map(|(_, at)| *at));
             }
-            let expected = if foot { AlphaMask::new(w, h, |x, y| kept[(y * w + x) as usize]) } else { mask.clone() };
+            let expected = if foot { AlphaMask::new(w, h, |x, y| kept[(y * w + x).to_usize()]) } else { mask.clone() };
             prop_assert_eq!(mask.hanging(), expected);
         }
 
@@ -316,8 +317,8 @@ mod tests {
             let gone = |uv: Vec2| uv.distance(vec2(x, y)) < r;
             let mut cut = disc();
             cut.cut([vec2(x - r, y - r), vec2(x + r, y + r)], gone);
-            let middle = |x: u32, y: u32| vec2(x as f32 + 0.5, y as f32 + 0.5) / vec2(37.0, 53.0);
-            prop_assert_eq!(cut, AlphaMask::new(37, 53, |x, y| disc().texel(x as i32, y as i32) && !gone(middle(x, y))));
+            let middle = |x: u32, y: u32| vec2(x.to_f32() + 0.5, y.to_f32() + 0.5) / vec2(37.0, 53.0);
+            prop_assert_eq!(cut, AlphaMask::new(37, 53, |x, y| disc().texel(x.to_i32(), y.to_i32()) && !gone(middle(x, y))));
         }
     }
 
@@ -330,7 +331,7 @@ mod tests {
         cut.cut([vec2(0.0, 0.4), vec2(1.0, 0.6)], |uv| (uv.y - 0.47).abs() < 0.04);
         let left = cut.hanging();
         assert!(left.count() < cut.count() && left.texel(18, 35) && !left.texel(18, 15));
-        assert!((left.count() as f32 / cut.count() as f32 - 0.5).abs() < 0.1);
+        assert!((left.count().to_f32() / cut.count().to_f32() - 0.5).abs() < 0.1);
     }
 
     #[test]

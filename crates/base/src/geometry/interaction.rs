@@ -1,7 +1,7 @@
 //! Surface interaction at a hit: position, normals, and texture parameterisation.
 
 use super::{Hit, Mesh, Placement, Ray};
-use crate::math::{Vec2, Vec3};
+use crate::math::{ToInt, Vec2, Vec3};
 
 /// Point on a surface hit by a ray.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,7 @@ impl Interaction {
     /// Computes the interaction for a hit on `mesh`; `footprint` in metres.
     #[inline]
     pub fn new(mesh: &Mesh, hit: &Hit, footprint: f32) -> Self {
-        let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let corners = mesh.triangles[hit.triangle.to_usize()].map(ToInt::to_usize);
         let [a, b, c] = corners.map(|i| mesh.positions[i]);
         let [na, nb, nc] = corners.map(|i| mesh.normals[i]);
         let [ta, tb, tc] = corners.map(|i| mesh.uvs[i]);

@@ -1,7 +1,7 @@
 //! Distance of a point of a mask from the edge of the mask.
 
 use super::AlphaMask;
-use crate::math::Vec2;
+use crate::math::{RoundTo, ToFloat, ToInt, Vec2};
 
 /// Number of grid rows on which a mask is sampled.
 const ROWS: u32 = 192;
@@ -22,11 +22,11 @@ impl Margin {
     /// Computes the distances for a mask. Everything outside the mask counts as transparent.
     pub fn of(mask: &AlphaMask) -> Self {
         let (w, h) = mask.size();
-        let step = (h as f32 / ROWS as f32).max(1.0);
-        let cells = |n: u32| ((n as f32 / step).round() as usize).max(1);
+        let step = (h.to_f32() / ROWS.to_f32()).max(1.0);
+        let cells = |n: u32| (n.to_f32() / step).round_to::<usize>().max(1);
         let (width, height) = (cells(w), cells(h));
-        let texel = |i: usize| ((i as f32 + 0.5) * step) as i32;
-        let far = (width + height) as f32;
+        let texel = |i: usize| ((i.to_f32() + 0.5) * step).trunc_to::<i32>();
+        let far = (width + height).to_f32();
         let mut d: Vec<f32> = (0..width * height)
             .map(|i| if mask.texel(texel(i % width), texel(i / width)) { far } else { 0.0 })
             .collect();
@@ -36,7 +36,7 @@ impl Margin {
         for k in (0..width * height).rev() {
             relax(&mut d, (width, height), k, -1);
         }
-        let distances = d.into_iter().map(|v| v / height as f32).collect();
+        let distances = d.into_iter().map(|v| v / height.to_f32()).collect();
         Self { width, height, distances }
     }
 
@@ -47,11 +47,11 @@ impl Margin {
 
     /// Distance at `uv`, in units of the mask height; 0 outside the mask. Bilinearly interpolated.
     pub fn at(&self, uv: Vec2) -> f32 {
-        let p = Vec2::new(uv.x * self.width as f32, uv.y * self.height as f32) - 0.5;
+        let p = Vec2::new(uv.x * self.width.to_f32(), uv.y * self.height.to_f32()) - 0.5;
         let (floor, part) = (p.floor(), p - p.floor());
         let at = |x: f32, y: f32| {
-            let inside = x >= 0.0 && y >= 0.0 && x < self.width as f32 && y < self.height as f32;
-            if inside { self.distances[y as usize * self.width + x as usize] } else { 0.0 }
+            let inside = x >= 0.0 && y >= 0.0 && x < self.width.to_f32() && y < self.height.to_f32();
+            if inside { self.distances[y.trunc_to::<usize>() * self.width + x.trunc_to::<usize>()] } else { 0.0 }
         };
         let row = |y: f32| at(floor.x, y) * (1.0 - part.x) + at(floor.x + 1.0, y) * part.x;
         row(floor.y) * (1.0 - part.y) + row(floor.y + 1.0) * part.y
@@ -74,11 +74,11 @@ fn relax(d: &mut [f32], (width, height): (usize, usize), k: usize, way: i64) {
     if d[k] == 0.0 {
         return;
     }
-    let (x, y) = ((k % width) as i64, (k / width) as i64);
+    let (x, y) = ((k % width).to_i64(), (k / width).to_i64());
     for (dx, dy, cost) in NEAR {
         let (nx, ny) = (x + way * dx, y + way * dy);
-        let inside = nx >= 0 && ny >= 0 && nx < width as i64 && ny < height as i64;
-        let there = if inside { d[ny as usize * width + nx as usize] } else { 0.0 };
+        let inside = nx >= 0 && ny >= 0 && nx < width.to_i64() && ny < height.to_i64();
+        let there = if inside { d[ny.to_usize() * width + nx.to_usize()] } else { 0.0 };
         d[k] = d[k].min(there + cost);
     }
 }
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_discs_margin_is_as_far_as_geometry_says() {
-        let mask = AlphaMask::new(400, 400, |x, y| (x as f32 - 199.5).hypot(y as f32 - 199.5) < 160.0);
+        let mask = AlphaMask::new(400, 400, |x, y| (x.to_f32() - 199.5).hypot(y.to_f32() - 199.5) < 160.0);
         let margin = Margin::of(&mask);
         for (x, y) in [(0.5, 0.5), (0.7, 0.5), (0.3, 0.35), (0.5, 0.85), (0.62, 0.6)] {
             let truth = 0.4 - (x - 0.5_f32).hypot(y - 0.5);

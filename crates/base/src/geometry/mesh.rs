@@ -1,6 +1,6 @@
 //! Indexed triangle meshes, and their validation.
 
-use crate::math::{Mat3, Vec2, Vec3};
+use crate::math::{Mat3, ToInt, Vec2, Vec3};
 
 /// Joints that influence a vertex, with weights that sum to one (linear blend skinning).
 pub type JointWeights = [(u16, f32); 4];
@@ -37,10 +37,10 @@ impl Mesh {
         self.normals.clear();
         self.normals.resize(self.positions.len(), Vec3::ZERO);
         for t in &self.triangles {
-            let [a, b, c] = t.map(|i| self.positions[i as usize]);
+            let [a, b, c] = t.map(|i| self.positions[i.to_usize()]);
             let n = (b - a).cross(c - a);
             for i in t {
-                self.normals[*i as usize] += n;
+                self.normals[i.to_usize()] += n;
             }
         }
         for n in &mut self.normals {
@@ -58,7 +58,7 @@ impl Mesh {
         if !self.weights.is_empty() && self.weights.len() != n {
             return Some(format!("{n} positions, {} weights", self.weights.len()));
         }
-        if let Some(t) = self.triangles.iter().find(|t| t.iter().any(|i| *i as usize >= n)) {
+        if let Some(t) = self.triangles.iter().find(|t| t.iter().any(|i| i.to_usize() >= n)) {
             return Some(format!("triangle {t:?} refers to vertices beyond {n}"));
         }
         if let Some(i) = self.positions.iter().position(|p| !p.is_finite()) {
@@ -73,12 +73,12 @@ impl Mesh {
     /// Vertex positions of triangle `i`.
     #[inline]
     pub fn corners(&self, i: u32) -> [Vec3; 3] {
-        self.triangles[i as usize].map(|k| self.positions[k as usize])
+        self.triangles[i.to_usize()].map(|k| self.positions[k.to_usize()])
     }
 
     /// Total surface area, m².
     pub fn area(&self) -> f32 {
-        (0..self.triangles.len() as u32)
+        (0..self.triangles.len().to_u32())
             .map(|i| {
                 let [a, b, c] = self.corners(i);
                 0.5 * (b - a).cross(c - a).length()
@@ -105,11 +105,11 @@ impl Mesh {
     /// Splits the mesh into connected components (triangles that share vertices), ordered by their first triangle.
     /// Unreferenced vertices are dropped.
     pub fn pieces(&self) -> Vec<Self> {
-        let mut of: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let mut of: Vec<u32> = (0..self.positions.len().to_u32()).collect();
         let root = |of: &mut Vec<u32>, mut i: u32| {
-            while of[i as usize] != i {
-                of[i as usize] = of[of[i as usize] as usize];
-                i = of[i as usize];
+            while of[i.to_usize()] != i {
+                of[i.to_usize()] = of[of[i.to_usize()].to_usize()];
+                i = of[i.to_usize()];
             }
             i
         };
@@ -117,23 +117,23 @@ impl Mesh {
             let roots = t.map(|i| root(&mut of, i));
             let least = roots.into_iter().min().unwrap_or(0);
             for r in roots {
-                of[r as usize] = least;
+                of[r.to_usize()] = least;
             }
         }
         let mut pieces: Vec<Self> = Vec::new();
         // Component of each union-find root, and index of each vertex within its component.
         let (mut piece, mut place) = (vec![u32::MAX; of.len()], vec![u32::MAX; of.len()]);
         for t in &self.triangles {
-            let root = root(&mut of, t[0]) as usize;
+            let root = root(&mut of, t[0]).to_usize();
             if piece[root] == u32::MAX {
-                piece[root] = pieces.len() as u32;
+                piece[root] = pieces.len().to_u32();
                 pieces.push(Self::default());
             }
-            let into = &mut pieces[piece[root] as usize];
+            let into = &mut pieces[piece[root].to_usize()];
             let corners = t.map(|i| {
-                let i = i as usize;
+                let i = i.to_usize();
                 if place[i] == u32::MAX {
-                    place[i] = into.positions.len() as u32;
+                    place[i] = into.positions.len().to_u32();
                     into.positions.push(self.positions[i]);
                     into.normals.push(self.normals[i]);
                     into.uvs.push(self.uvs[i]);
@@ -151,7 +151,7 @@ impl Mesh {
     pub fn image_size(&self) -> Option<Vec2> {
         let (mut sum, mut total) = (Vec2::ZERO, 0.0);
         for t in &self.triangles {
-            let [a, b, c] = t.map(|i| i as usize);
+            let [a, b, c] = t.map(ToInt::to_usize);
             let (e1, e2) = (self.positions[b] - self.positions[a], self.positions[c] - self.positions[a]);
             let (t1, t2) = (self.uvs[b] - self.uvs[a], self.uvs[c] - self.uvs[a]);
             let determinant = t1.perp_dot(t2);
@@ -168,12 +168,12 @@ impl Mesh {
 
     /// Appends the triangles of another mesh.
     pub fn append(&mut self, other: &Self) {
-        let base = self.positions.len() as u32;
+        let base = self.positions.len().to_u32();
         self.positions.extend_from_slice(&other.positions);
         self.normals.extend_from_slice(&other.normals);
         self.uvs.extend_from_slice(&other.uvs);
         if !(self.weights.is_empty() && other.weights.is_empty()) {
-            self.weights.resize(base as usize, FIRST_JOINT);
+            self.weights.resize(base.to_usize(), FIRST_JOINT);
             self.weights.extend_from_slice(&other.weights);
             self.weights.resize(self.positions.len(), FIRST_JOINT);
         }

@@ -6,7 +6,7 @@
 //! A leaf image shows the blade with its tip at the top, its base at the bottom and the midrib on the middle column.
 //! Length and width fill the image except for [`MARGIN`] on each side.
 
-use crate::math::{Vec2, vec2};
+use crate::math::{ToFloat, Vec2, vec2};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::ops::Range;
@@ -50,7 +50,7 @@ pub enum Outline {
 fn exponent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
     let x = f64::deserialize(deserializer)?;
     let out_of_range = || D::Error::custom(format!("{x:?} is out of range: it must be {EXPONENTS_IN_WORDS}"));
-    EXPONENTS.contains(&x).then_some(x as f32).ok_or_else(out_of_range)
+    EXPONENTS.contains(&x).then_some(x.to_f32()).ok_or_else(out_of_range)
 }
 
 impl Outline {
@@ -79,7 +79,8 @@ mod tests {
         {
             let o = Outline::Power { a, b };
             let n = 20_000;
-            let sum: f32 = (0..n).map(|i| 2.0 * o.half_width((i as f32 + 0.5) / n as f32)).sum::<f32>() / n as f32;
+            let sum: f32 =
+                (0..n).map(|i| 2.0 * o.half_width((i.to_f32() + 0.5) / n.to_f32())).sum::<f32>() / n.to_f32();
             assert!((sum - area).abs() < 2e-3, "{a} {b}: {sum}");
         }
     }
@@ -99,7 +100,7 @@ mod tests {
         }
         for (a, b) in [("0.001", "19.99"), ("19.99", "0.001"), ("0.001", "0.001"), ("19.99", "19.99")] {
             let outline: Outline = ron::from_str(&format!("Power(a: {a}, b: {b})")).unwrap();
-            let widths = (0..=100).map(|i| outline.half_width(i as f32 / 100.0));
+            let widths = (0..=100).map(|i| outline.half_width(i.to_f32() / 100.0));
             assert!(widths.into_iter().all(|w| (0.0..=0.5001).contains(&w)), "{a} {b}");
         }
     }

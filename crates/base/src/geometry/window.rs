@@ -1,5 +1,7 @@
 //! The rectangle of an image that is rendered.
 
+use crate::math::ToInt;
+
 /// Rectangle of pixels to render: columns `x0..x1`, rows `y0..y1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
@@ -31,8 +33,8 @@ impl Window {
 
     /// Returns the indices of the pixels of `part` in this window's row-major pixel list, row by row.
     pub fn places_of(&self, part: Self) -> impl Iterator<Item = usize> {
-        let (left, top, width) = (self.x0, self.y0, self.width() as usize);
+        let (left, top, width) = (self.x0, self.y0, self.width().to_usize());
         (part.y0..part.y1)
-            .flat_map(move |y| (part.x0..part.x1).map(move |x| (y - top) as usize * width + (x - left) as usize))
+            .flat_map(move |y| (part.x0..part.x1).map(move |x| (y - top).to_usize() * width + (x - left).to_usize()))
     }
 }

@@ -12,6 +12,7 @@ pub use guard::{caught, guarded};
 pub use scope::{Outside, Scope, tidy};
 pub use text::{read_text, utf8, wide};
 
+use crate::math::ToInt;
 use crate::{Error, Result};
 use std::fmt;
 use std::fs::{File, Metadata};
@@ -93,10 +94,10 @@ pub fn read(path: &Path, most: u64) -> std::result::Result<Vec<u8>, Refusal> {
     if len > most {
         return Err(Refusal::TooLarge(most));
     }
-    let mut bytes = Vec::with_capacity(len as usize);
+    let mut bytes = Vec::with_capacity(len.to_usize());
     // The file may grow while it is being read.
     file.take(most + 1).read_to_end(&mut bytes).map_err(Refusal::Io)?;
-    if bytes.len() as u64 > most { Err(Refusal::TooLarge(most)) } else { Ok(bytes) }
+    if bytes.len().to_u64() > most { Err(Refusal::TooLarge(most)) } else { Ok(bytes) }
 }
 
 /// Joins `folder` with a path that a file in it names for storage, as datasets and model cards do. The path must stay

@@ -12,6 +12,7 @@
 //! no reason.
 
 #![expect(
+    clippy::cast_lossless,
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_precision_loss,

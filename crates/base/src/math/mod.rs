@@ -31,10 +31,10 @@ pub fn direction(zenith: f32, azimuth: f32) -> Vec3 {
 /// Returns the (x, y) offsets of all pixels whose centres are within `reach` pixels of a pixel, nearest first, ties in
 /// row order. The pixel itself is not included.
 pub fn disc(reach: f32) -> Vec<(i64, i64)> {
-    let most = reach.ceil() as i64;
+    let most = reach.ceil_to::<i64>();
     let square = |(x, y): &(i64, i64)| x * x + y * y;
     let mut all: Vec<(i64, i64)> = (-most..=most).flat_map(|y| (-most..=most).map(move |x| (x, y))).collect();
-    all.retain(|step| square(step) > 0 && square(step) as f32 <= reach * reach);
+    all.retain(|step| square(step) > 0 && square(step).to_f32() <= reach * reach);
     all.sort_by_key(square);
     all
 }

@@ -77,13 +77,19 @@ bounds! {
     Elevation { const MIN: f64 = -90.0; const MAX: f64 = 90.0; const WORDS: &'static str = "between -90 and 90 degrees"; }
 }
 
+/// Returns the largest value that a bound is declared with. All are far below 2⁵³ and exact.
+#[expect(clippy::cast_precision_loss, reason = "`From` is not const")]
+const fn largest(max: u64) -> f64 {
+    max as f64
+}
+
 /// From `-MAX` to `MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Signed<const MAX: u64>;
 
 impl<const MAX: u64> Bound for Signed<MAX> {
-    const MIN: f64 = -(MAX as f64);
-    const MAX: f64 = MAX as f64;
+    const MIN: f64 = -largest(MAX);
+    const MAX: f64 = largest(MAX);
 }
 
 /// Above zero, at most `MAX`.
@@ -92,7 +98,7 @@ pub struct Positive<const MAX: u64>;
 
 impl<const MAX: u64> Bound for Positive<MAX> {
     const MIN: f64 = 0.0;
-    const MAX: f64 = MAX as f64;
+    const MAX: f64 = largest(MAX);
     const ABOVE_MIN: bool = true;
 }
 
@@ -102,7 +108,7 @@ pub struct NonNegative<const MAX: u64>;
 
 impl<const MAX: u64> Bound for NonNegative<MAX> {
     const MIN: f64 = 0.0;
-    const MAX: f64 = MAX as f64;
+    const MAX: f64 = largest(MAX);
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ impl<B: Bound> Num<B> {
     }
 
     /// Returns the value in single precision.
+    #[expect(clippy::cast_possible_truncation, reason = "traits have no constant functions yet")]
     pub const fn f32(self) -> f32 {
         self.0 as f32
     }

@@ -278,7 +278,7 @@ impl<'t> Fields<'t> {
 
 /// Start offset of a slice of `text`.
 fn offset_in(text: &str, part: &str) -> usize {
-    part.as_ptr() as usize - text.as_ptr() as usize
+    part.as_ptr().addr() - text.as_ptr().addr()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use super::fault::{Fault, from_raw, inside, parse_in, whole};
 use super::num::{DISTRIBUTIONS, Num, name_of, number};
 use super::place::Step;
 use super::suggest::choose;
+use crate::math::ToFloat;
 use crate::sampling::Stream;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 
@@ -129,7 +130,7 @@ impl<B: Bound> Vary<B> {
 
     /// Samples one value in single precision.
     pub fn draw32(&self, stream: &mut Stream) -> f32 {
-        self.draw(stream) as f32
+        self.draw(stream).to_f32()
     }
 
     /// Approximate range of the sampled values: the full range, or two standard deviations around the centre where the
@@ -432,6 +433,7 @@ impl<T: Serialize> Serialize for Pick<T> {
 mod tests {
     use super::super::bound::{Count, NonNegative};
     use super::*;
+    use crate::math::RoundTo;
     use crate::sampling::Purpose;
 
     fn stream() -> Stream {
@@ -517,7 +519,7 @@ mod tests {
         let mut seen = [0_u32; 8];
         let n = 60_000;
         for _ in 0..n {
-            seen[v.draw(&mut s) as usize] += 1;
+            seen[v.draw(&mut s).trunc_to::<usize>()] += 1;
             plain.uniform();
         }
         assert_eq!((seen[0], seen[7]), (0, 0));

@@ -4,6 +4,7 @@
 //! of 1000 resamples bound the interval. Source: Efron & Tibshirani 1993, "An Introduction to the Bootstrap", §13.3.
 
 use super::rng::{Purpose, Stream};
+use crate::math::{RoundTo, ToFloat, ToInt};
 use serde::{Deserialize, Serialize};
 
 /// Number of resamples.
@@ -44,7 +45,7 @@ pub fn intervals(
 }
 
 fn interval(mut values: Vec<f64>) -> Option<Interval> {
-    if 2 * (values.len() as u64) < RESAMPLES {
+    if 2 * values.len().to_u64() < RESAMPLES {
         return None;
     }
     values.sort_by(f64::total_cmp);
@@ -54,8 +55,8 @@ fn interval(mut values: Vec<f64>) -> Option<Interval> {
 
 /// Quantile of sorted values, linear between neighbours. Source: Hyndman & Fan 1996, type 7.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = share * (sorted.len() - 1) as f64;
-    let below = place.floor() as usize;
+    let place = share * (sorted.len() - 1).to_f64();
+    let below = place.floor_to::<usize>();
     let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+    sorted[below] + (place - below.to_f64()) * (sorted[above] - sorted[below])
 }

@@ -4,6 +4,8 @@
 //! neighbouring points, so a stratified sequence stays stratified. Sums are f64. Source: Pharr, Jakob & Humphreys,
 //! *Physically Based Rendering*, 4th edition, appendix A.4.
 
+use crate::math::{RoundTo, ToFloat, ToInt};
+
 /// Piecewise constant density on [0, 1).
 #[derive(Clone, Debug)]
 pub struct Distribution1D {
@@ -25,15 +27,15 @@ impl Distribution1D {
         if !(sum.is_finite() && sum > 0.0 && weights.iter().all(|&w| w >= 0.0)) || weights.len() > 1 << 16 {
             return None;
         }
-        let mean = sum / weights.len() as f64;
+        let mean = sum / weights.len().to_f64();
         let mut cdf = Vec::with_capacity(weights.len() + 1);
         cdf.push(0.0);
         let mut below = 0.0;
         for &w in weights {
             below += f64::from(w);
-            cdf.push((below / sum) as f32);
+            cdf.push((below / sum).to_f32());
         }
-        let density = weights.iter().map(|&w| (f64::from(w) / mean) as f32).collect();
+        let density = weights.iter().map(|&w| (f64::from(w) / mean).to_f32()).collect();
         let guide = guide(&cdf[1..]);
         Some(Self { density, cdf, guide, mean })
     }
@@ -102,7 +104,7 @@ impl Distribution2D {
         }
         // A row without weight is never sampled, so the content of its tables does not matter.
         let cells: Vec<_> = weights.chunks_exact(width).map(Distribution1D::new).collect();
-        let means: Vec<f32> = cells.iter().map(|c| c.as_ref().map_or(0.0, |c| c.integral() as f32)).collect();
+        let means: Vec<f32> = cells.iter().map(|c| c.as_ref().map_or(0.0, |c| c.integral().to_f32())).collect();
         let rows = Distribution1D::new(&means)?;
         let mut density = Vec::with_capacity(weights.len());
         let mut cdf = Vec::with_capacity(weights.len());
@@ -151,11 +153,11 @@ fn guide(ends: &[f32]) -> Vec<u16> {
     let mut cell = 0;
     let first = |k: usize| {
         // Slightly less than k / n, for a number below it that rounding moves into k.
-        let u = k as f32 / n as f32 * (1.0 - 4.0 * f32::EPSILON);
+        let u = k.to_f32() / n.to_f32() * (1.0 - 4.0 * f32::EPSILON);
         while cell + 1 < n && ends[cell] <= u {
             cell += 1;
         }
-        cell as u16
+        cell.to_u16()
     };
     (0..n).map(first).collect()
 }
@@ -217,7 +219,7 @@ const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
 /// rounding could move it into the neighbouring cell, which has another density.
 #[inline]
 fn place(cell: usize, within: f32, n: usize) -> f32 {
-    let mut x = ((cell as f32 + within) / n as f32).min(ONE_BELOW);
+    let mut x = ((cell.to_f32() + within) / n.to_f32()).min(ONE_BELOW);
     while cell_of(x, n) > cell {
         x = x.next_down();
     }
@@ -229,5 +231,5 @@ fn place(cell: usize, within: f32, n: usize) -> f32 {
 
 #[inline]
 fn cell_of(x: f32, n: usize) -> usize {
-    ((x * n as f32) as usize).min(n - 1)
+    (x * n.to_f32()).trunc_to::<usize>().min(n - 1)
 }

@@ -6,6 +6,7 @@
 //! Normal, Poisson and other distributions are implemented here: a new version of `rand_distr` could sample
 //! differently, and every pixel depends on the samples.
 
+use crate::math::{RoundTo, ToFloat};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -89,12 +90,12 @@ impl Stream {
 
     /// Uniform in [0, 1), 53 bits.
     pub fn uniform(&mut self) -> f64 {
-        (self.rng.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+        (self.rng.next_u64() >> 11).to_f64() * (1.0 / (1u64 << 53).to_f64())
     }
 
     /// Uniform in [0, 1), 24 bits.
     pub fn uniform32(&mut self) -> f32 {
-        (self.rng.next_u32() >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
+        (self.rng.next_u32() >> 8).to_f32() * (1.0 / (1u32 << 24).to_f32())
     }
 
     /// Uniform in [lo, hi).
@@ -121,7 +122,7 @@ impl Stream {
 
     /// Uniform in 0..n; 0 if n = 0.
     pub fn index(&mut self, n: usize) -> usize {
-        ((self.uniform() * n as f64) as usize).min(n.saturating_sub(1))
+        (self.uniform() * n.to_f64()).trunc_to::<usize>().min(n.saturating_sub(1))
     }
 
     /// Poisson with the given mean (≥ 0). Source: Knuth, TAOCP vol. 2, §3.4.1. A large mean is split into a sum of
@@ -163,13 +164,13 @@ mod tests {
         for mean in [0.3, 4.0, 60.0, 1200.0] {
             let mut s = Stream::of(1, 0, Purpose::Test, 0);
             let n = 4000;
-            let draws: Vec<f64> = (0..n).map(|_| s.poisson(mean) as f64).collect();
-            let m = draws.iter().sum::<f64>() / n as f64;
-            let var = draws.iter().map(|x| (x - m).powi(2)).sum::<f64>() / n as f64;
+            let draws: Vec<f64> = (0..n).map(|_| s.poisson(mean).to_f64()).collect();
+            let m = draws.iter().sum::<f64>() / f64::from(n);
+            let var = draws.iter().map(|x| (x - m).powi(2)).sum::<f64>() / f64::from(n);
             // Four standard errors; Var(s²) of a Poisson is (λ + 2λ²)/n.
-            assert!((m - mean).abs() < 4.0 * (mean / n as f64).sqrt(), "mean {m} for {mean}");
+            assert!((m - mean).abs() < 4.0 * (mean / f64::from(n)).sqrt(), "mean {m} for {mean}");
             assert!(
-                (var - mean).abs() < 4.0 * ((mean + 2.0 * mean * mean) / n as f64).sqrt(),
+                (var - mean).abs() < 4.0 * ((mean + 2.0 * mean * mean) / f64::from(n)).sqrt(),
                 "variance {var} for {mean}"
             );
         }

@@ -8,6 +8,7 @@
 
 use super::rng::mix;
 use super::sobol;
+use crate::math::{ToFloat, ToInt};
 
 /// Assignment of the sets of four dimensions.
 pub mod sets {
@@ -69,7 +70,7 @@ impl Sampler {
 
     /// Like [`Self::new`] with the given kind of points.
     pub fn of(points: Points, seed: u64, x: u32, y: u32, index: u32) -> Self {
-        Self { index, seed: mix(seed ^ (u64::from(y) << 32 | u64::from(x))) as u32, points }
+        Self { index, seed: mix(seed ^ (u64::from(y) << 32 | u64::from(x))).low_u32(), points }
     }
 
     /// Returns the four numbers in [0, 1) of dimension set `set`. Each set is stratified over the samples of a pixel
@@ -77,7 +78,7 @@ impl Sampler {
     #[inline]
     pub fn get4(&self, set: u32) -> [f32; 4] {
         match self.points {
-            Points::Sobol => sobol::point(self.index, mix(u64::from(self.seed) << 32 | u64::from(set)) as u32),
+            Points::Sobol => sobol::point(self.index, mix(u64::from(self.seed) << 32 | u64::from(set)).low_u32()),
             Points::Independent => self.independent4(set),
         }
     }
@@ -89,6 +90,6 @@ impl Sampler {
         let second = mix(first);
         // 24 bits each: the precision of a uniform f32 below one.
         [first >> 40, first >> 16 & 0xff_ffff, second >> 40, second >> 16 & 0xff_ffff]
-            .map(|bits| bits as f32 * (1.0 / (1 << 24) as f32))
+            .map(|bits| bits.to_f32() * (1.0 / (1 << 24).to_f32()))
     }
 }

@@ -5,6 +5,7 @@
 //! numbers: Joe & Kuo 2008, `new-joe-kuo-6`. The coordinates of a point are the XOR of one direction number for each
 //! bit of its index; the table here combines four bits into one entry.
 
+use crate::math::ToInt;
 use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev};
 
 /// Number of bits of a point index.
@@ -73,7 +74,7 @@ const fn table() -> [[[u32; 4]; 16]; BITS / 4] {
 pub(super) fn point(index: u32, seed: u32) -> [f32; 4] {
     // Shuffle the order of the points as well.
     let index = owen_scramble_rev(index.reverse_bits(), hash(seed ^ 0x79c6_8e4a)).reverse_bits();
-    let entry = |bits: usize| Int4::from(TABLE[bits][(index >> (4 * bits) & 15) as usize]);
+    let entry = |bits: usize| Int4::from(TABLE[bits][(index >> (4 * bits) & 15).to_usize()]);
     let sum = entry(0) ^ entry(1) ^ entry(2) ^ entry(3);
     let seed = Int4::from([seed.wrapping_mul(0x9c8f_2d3b); 4]);
     let scramble = seed ^ Int4::from([0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8]);

@@ -6,6 +6,7 @@ pub mod signal;
 use furrow_base::error::Kind;
 use furrow_base::geometry::Window;
 use furrow_base::input::shipped;
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 use std::fmt;
@@ -38,7 +39,7 @@ pub fn parse<C: clap::Parser>(kernels: fn() -> Result<String>) -> Result<C, Exit
         };
         match done {
             Err(lost) if !words.use_stderr() => fail(&lost),
-            _ => ExitCode::from(words.exit_code() as u8),
+            _ => ExitCode::from(words.exit_code().to_u8()),
         }
     })
 }

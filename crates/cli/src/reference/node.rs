@@ -1,5 +1,6 @@
 //! Reads a value's JSON schema: resolves references, and lists fields or variants.
 
+use furrow_base::math::ToInt;
 use serde_json::{Map, Value};
 
 /// Schema key with an example in RON, for fields where an example generated from the type would be poor.
@@ -63,7 +64,7 @@ pub(super) fn tuple(schema: &Object) -> Option<Vec<&Value>> {
     }
     let count = schema.get("minItems").filter(|n| schema.get("maxItems") == Some(n))?.as_u64()?;
     let item = schema.get("items")?;
-    Some(vec![item; count as usize])
+    Some(vec![item; count.to_usize()])
 }
 
 /// A field of a struct, or a variant.

@@ -1,6 +1,7 @@
 //! Formats default values as RON, from the JSON of a schema.
 
 use super::node::{Types, parts, tuple};
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::KIND;
 use serde_json::{Map, Value};
 
@@ -73,6 +74,6 @@ fn pairs(fields: &Map<String, Value>) -> String {
 
 /// Formats a number with the fewest digits; in single precision if the value is exactly a single-precision number.
 fn number(x: f64) -> String {
-    let single = x as f32;
+    let single = x.to_f32();
     if f64::from(single) == x { single.to_string() } else { x.to_string() }
 }

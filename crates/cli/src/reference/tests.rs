@@ -54,7 +54,7 @@ fn unbounded(schema: &serde_json::Value, path: &str, found: &mut Vec<String>) {
                 kind.is_some_and(|of| is_number(of) || of.as_array().is_some_and(|of| of.iter().any(is_number)));
             let has = |names: [&str; 2]| names.iter().any(|name| fields.contains_key(*name));
             let bounded = has(["minimum", "exclusiveMinimum"]) && has(["maximum", "exclusiveMaximum"]);
-            if number && !bounded && !path.ends_with(".seed") {
+            if number && !bounded && path.rsplit('.').next() != Some("seed") {
                 found.push(path.to_owned());
             }
             for (name, inner) in fields.iter().filter(|(name, _)| *name != "default" && !name.starts_with("x-")) {

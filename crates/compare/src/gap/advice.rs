@@ -7,6 +7,7 @@
 use super::feature::{Feature, Pool};
 use super::sets::Gap;
 use crate::Region;
+use furrow_base::math::ToFloat;
 use furrow_report::number;
 use serde::Serialize;
 
@@ -309,7 +310,7 @@ fn about(feature: Feature, real: &Pool, made: &Pool, distance: f64) -> Option<Ad
     let unit = if let Feature::Color(_) = feature { ["L*", "a*", "b*"][channel] } else { feature.unit() };
     let keys = vec![feature.key()];
     // The distance of a colour is the mean over its channels.
-    let moved = difference.abs() / differences.len() as f64;
+    let moved = difference.abs() / differences.len().to_f64();
     if moved > MEAN * distance || matches!(made, Pool::Power(_)) {
         let by = number(difference.abs());
         let words = format!("{}, by {by}{}{unit}", side.words, if unit.is_empty() { "" } else { " " });
@@ -333,7 +334,7 @@ fn differences(real: &Pool, made: &Pool) -> Vec<f64> {
     let all: Vec<f64> = made.means().iter().zip(real.means()).map(|(made, real)| made - real).collect();
     match made {
         Pool::Power(_) => {
-            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len().max(1) as f64;
+            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len().max(1).to_f64();
             let (coarse, fine) = all.split_at(all.len() / 2);
             vec![mean(fine) - mean(coarse)]
         }

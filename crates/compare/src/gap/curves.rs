@@ -2,6 +2,7 @@
 
 use super::feature::Pool;
 use super::frequency::{decibels, frequencies};
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_report::chart::{Chart, Curve};
 use furrow_report::{Histogram, number};
 use maud::Markup;
@@ -52,9 +53,9 @@ fn chart(title: &str, upwards: &str, [real, synthetic]: [Points; 2]) -> Chart {
 /// Returns the fraction of values per merged bin, over the range that contains nearly all values of both histograms.
 fn density(a: &Histogram, b: &Histogram) -> [Points; 2] {
     let inside = |h: &Histogram| {
-        let (mut sum, total) = (0.0, h.total().max(1) as f64);
+        let (mut sum, total) = (0.0, h.total().max(1).to_f64());
         let share = |n: &u64| {
-            sum += *n as f64 / total;
+            sum += n.to_f64() / total;
             sum
         };
         let sums: Vec<f64> = h.counts.iter().map(share).collect();
@@ -64,16 +65,16 @@ fn density(a: &Histogram, b: &Histogram) -> [Points; 2] {
     };
     let ((a0, a1), (b0, b1)) = (inside(a), inside(b));
     let (first, last) = (a0.min(b0), a1.max(b1));
-    let joined = (((last - first) as f64 / DRAWN).ceil() as usize).max(1);
+    let joined = ((last - first).to_f64() / DRAWN).ceil_to::<usize>().max(1);
     let curve = |h: &Histogram| -> Points {
-        let total = h.total().max(1) as f64;
+        let total = h.total().max(1).to_f64();
         // Midpoint of the merged bins.
         let middle = |k: usize| {
             let begin = first + k * joined;
             f64::midpoint(h.middle(begin), h.middle(begin + joined - 1))
         };
         let bins = h.counts[first..=last].chunks(joined).enumerate();
-        bins.map(|(k, bins)| (middle(k), bins.iter().sum::<u64>() as f64 / total)).collect()
+        bins.map(|(k, bins)| (middle(k), bins.iter().sum::<u64>().to_f64() / total)).collect()
     };
     [curve(a), curve(b)]
 }
@@ -85,8 +86,8 @@ fn cumulative(a: &[f64], b: &[f64]) -> [Points; 2] {
     let curve = |values: &[f64]| -> Points {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let n = sorted.len() as f64;
-        let stair = |(k, x): (usize, f64)| [(x, k as f64 / n), (x, (k + 1) as f64 / n)];
+        let n = sorted.len().to_f64();
+        let stair = |(k, x): (usize, f64)| [(x, k.to_f64() / n), (x, (k + 1).to_f64() / n)];
         let stairs = sorted.into_iter().enumerate().flat_map(stair);
         [(ends.0, 0.0)].into_iter().chain(stairs).chain([(ends.1, 1.0)]).collect()
     };

@@ -3,6 +3,7 @@
 use super::frequency::decibels;
 use super::wasserstein;
 use crate::Region;
+use furrow_base::math::ToFloat;
 use furrow_report::Histogram;
 use std::collections::BTreeMap;
 
@@ -176,12 +177,12 @@ impl Pool {
     pub fn distance(&self, other: &Self) -> f64 {
         match (self, other) {
             (Self::Counts(a), Self::Counts(b)) => {
-                a.iter().zip(b).map(|(a, b)| a.distance(b)).sum::<f64>() / a.len() as f64
+                a.iter().zip(b).map(|(a, b)| a.distance(b)).sum::<f64>() / a.len().to_f64()
             }
             (Self::Values(a), Self::Values(b)) => wasserstein::distance(a, b),
             (Self::Power(a), Self::Power(b)) => {
                 let squares = a.iter().zip(b).map(|(a, b)| (decibels(*a) - decibels(*b)).powi(2));
-                (squares.sum::<f64>() / a.len() as f64).sqrt()
+                (squares.sum::<f64>() / a.len().to_f64()).sqrt()
             }
             _ => unreachable!("pools of one feature are of one kind"),
         }
@@ -194,7 +195,7 @@ impl Pool {
             Self::Values(values) => {
                 let mean = self.means()[0];
                 let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-                vec![(squares / values.len() as f64).sqrt()]
+                vec![(squares / values.len().to_f64()).sqrt()]
             }
             Self::Power(power) => vec![0.0; power.len()],
         }
@@ -204,7 +205,7 @@ impl Pool {
     pub fn means(&self) -> Vec<f64> {
         match self {
             Self::Counts(channels) => channels.iter().map(Histogram::mean).collect(),
-            Self::Values(values) => vec![values.iter().sum::<f64>() / values.len() as f64],
+            Self::Values(values) => vec![values.iter().sum::<f64>() / values.len().to_f64()],
             Self::Power(power) => power.iter().map(|p| decibels(*p)).collect(),
         }
     }

@@ -4,6 +4,7 @@ use super::feature::{Feature, Sample, Samples};
 use super::{frequency, noise, outline, regions};
 use crate::color::{lab, linear};
 use crate::{RasterImage, Region};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_report::{Bins, Histogram};
 
 /// Range and number of bins of L*, of a* and b*, of NDVI, of gradients in dB, of log₁₀ of areas.
@@ -27,7 +28,7 @@ const BLACK: f64 = 0.5 / 255.0 / 12.92;
 /// Measures an image, and its classes if it has labels, one per pixel. Spectra use tiles of `tile` pixels, which must
 /// fit into the image.
 pub(super) fn measure(picture: &RasterImage, labels: Option<&[u8]>, tile: Option<usize>) -> Samples {
-    let size = (picture.width as usize, picture.height as usize);
+    let size = (picture.width.to_usize(), picture.height.to_usize());
     let mut samples = Samples::new();
     let colors: Vec<[f32; 3]> = picture.rgb.iter().map(|rgb| lab(*rgb)).collect();
     for region in [Region::All, Region::Soil, Region::Crop, Region::Weed] {
@@ -75,11 +76,11 @@ fn light(samples: &mut Samples, picture: &RasterImage, (width, height): (usize, 
     let linear = linear();
     let weigh = |[r, g, b]: [f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
     let mut luminance: Vec<f32> = picture.rgb.iter().map(|c| weigh(c.map(|c| linear[usize::from(c)]))).collect();
-    let mean = luminance.iter().map(|y| f64::from(*y)).sum::<f64>() / luminance.len().max(1) as f64;
+    let mean = luminance.iter().map(|y| f64::from(*y)).sum::<f64>() / luminance.len().max(1).to_f64();
     let mean = mean.max(BLACK);
     samples.insert(Feature::Exposure, Sample::Value(mean.log2()));
     for y in &mut luminance {
-        *y = (f64::from(*y) / mean) as f32;
+        *y = (f64::from(*y) / mean).to_f32();
     }
 
     let mut gradients = empty(GRADIENT);
@@ -108,7 +109,7 @@ fn light(samples: &mut Samples, picture: &RasterImage, (width, height): (usize, 
 fn plants(samples: &mut Samples, region: Region, colors: &[[f32; 3]], labels: &[u8], width: usize) {
     let mask: Vec<bool> = labels.iter().map(|label| region.holds(*label)).collect();
     let pixels = mask.iter().filter(|inside| **inside).count();
-    samples.insert(Feature::Cover(region), Sample::Value(100.0 * pixels as f64 / mask.len().max(1) as f64));
+    samples.insert(Feature::Cover(region), Sample::Value(100.0 * pixels.to_f64() / mask.len().max(1).to_f64()));
     if region == Region::Vegetation {
         if let Some(margin) = outline::margin(colors, &mask, width) {
             samples.insert(Feature::Outline, Sample::Value(margin));
@@ -116,12 +117,12 @@ fn plants(samples: &mut Samples, region: Region, colors: &[[f32; 3]], labels: &[
         return;
     }
     let areas: Vec<u64> = regions::blobs(&mask, width).into_iter().filter(|area| *area >= SPECK).collect();
-    let density = 1e6 * areas.len() as f64 / mask.len().max(1) as f64;
+    let density = 1e6 * areas.len().to_f64() / mask.len().max(1).to_f64();
     samples.insert(Feature::BlobCount(region), Sample::Value(density));
     if !areas.is_empty() {
         let mut sizes = empty(AREA);
         for area in areas {
-            sizes.add((area as f64).log10());
+            sizes.add(area.to_f64().log10());
         }
         samples.insert(Feature::BlobSize(region), Sample::Counts(vec![sizes]));
     }
@@ -142,7 +143,7 @@ fn mean(colors: &[[f32; 3]], places: impl Iterator<Item = usize>) -> Option<[f64
         sum.iter_mut().zip(colors[k]).for_each(|(sum, value)| *sum += f64::from(value));
         n += 1;
     }
-    (n >= FEWEST).then(|| sum.map(|sum| sum / n as f64))
+    (n >= FEWEST).then(|| sum.map(|sum| sum / n.to_f64()))
 }
 
 #[cfg(test)]
@@ -205,11 +206,11 @@ mod tests {
     #[test]
     fn exposure_is_not_structure() {
         let linear = linear();
-        let code = |y: f32| linear.iter().position(|v| *v >= y).unwrap_or(255) as u8;
+        let code = |y: f32| linear.iter().position(|v| *v >= y).unwrap_or(255).to_u8();
         let picture = |scale: f32| {
             let mut stream = Stream::of(1, 0, Purpose::Test, 3);
-            let wave = |k: u32| ((k % 64) as f32 * 0.4).sin() * ((k / 64) as f32 * 0.7).cos();
-            let mut y = |k: u32| 0.4 + 0.2 * wave(k) + 0.05 * stream.normal() as f32;
+            let wave = |k: u32| ((k % 64).to_f32() * 0.4).sin() * ((k / 64).to_f32() * 0.7).cos();
+            let mut y = |k: u32| 0.4 + 0.2 * wave(k) + 0.05 * stream.normal().to_f32();
             let rgb = (0..64 * 64).map(|k| [code(scale * y(k)); 3]).collect();
             measure(&RasterImage { width: 64, height: 64, rgb, nir: Vec::new() }, None, Some(64))
         };

@@ -6,6 +6,8 @@
 //! so that edges do not count. Pixel-sized texture is included, because a single image cannot distinguish it from
 //! noise.
 
+use furrow_base::math::{RoundTo, ToFloat};
+
 /// Side of a block, and of its cells, whose means determine how flat the block is, pixels.
 const BLOCK: (usize, usize) = (16, 4);
 /// Fraction of the blocks that are used as flat.
@@ -30,12 +32,12 @@ pub(super) fn level(values: &[f32], (width, height): (usize, usize)) -> Option<f
         })
         .collect();
     rough.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.2, a.1).cmp(&(b.2, b.1))));
-    rough.truncate(((rough.len() as f64 * FLAT).ceil() as usize).max(1));
-    let mut answers = vec![0_u64; (16.0 * 255.0) as usize + 2];
+    rough.truncate((rough.len().to_f64() * FLAT).ceil_to::<usize>().max(1));
+    let mut answers = vec![0_u64; (16.0 * 255.0).trunc_to::<usize>() + 2];
     for (_, left, top) in &rough {
         for (x, y) in (*top..top + BLOCK.0).flat_map(|y| (*left..left + BLOCK.0).map(move |x| (x, y))) {
             let row = |y: usize| at(x - 1, y) - 2.0 * at(x, y) + at(x + 1, y);
-            answers[(row(y - 1) - 2.0 * row(y) + row(y + 1)).abs().round() as usize] += 1;
+            answers[(row(y - 1) - 2.0 * row(y) + row(y + 1)).abs().round_to::<usize>()] += 1;
         }
     }
     Some(median(&answers)? / (6.0 * MEDIAN))
@@ -44,12 +46,12 @@ pub(super) fn level(values: &[f32], (width, height): (usize, usize)) -> Option<f
 /// Returns the median of rounded values, given their counts. Values are assumed uniform within a rounding interval; 0
 /// if most are 0, `None` if there are none.
 fn median(counts: &[u64]) -> Option<f64> {
-    let half = 0.5 * counts.iter().sum::<u64>() as f64;
+    let half = 0.5 * counts.iter().sum::<u64>().to_f64();
     let mut below = 0.0;
     for (value, n) in counts.iter().enumerate() {
-        let n = *n as f64;
+        let n = n.to_f64();
         if n > 0.0 && below + n >= half {
-            return Some(if value == 0 { 0.0 } else { value as f64 - 0.5 + (half - below) / n });
+            return Some(if value == 0 { 0.0 } else { value.to_f64() - 0.5 + (half - below) / n });
         }
         below += n;
     }
@@ -63,12 +65,12 @@ fn means(at: &impl Fn(usize, usize) -> f32, left: usize, top: usize) -> (f32, f3
     let (mut sum, mut squares) = (0.0, 0.0);
     for k in 0..cells {
         let (x0, y0) = (left + k % (side / cell) * cell, top + k / (side / cell) * cell);
-        let mean = (0..cell * cell).map(|p| at(x0 + p % cell, y0 + p / cell)).sum::<f32>() / (cell * cell) as f32;
+        let mean = (0..cell * cell).map(|p| at(x0 + p % cell, y0 + p / cell)).sum::<f32>() / (cell * cell).to_f32();
         sum += mean;
         squares += mean * mean;
     }
-    let mean = sum / cells as f32;
-    (mean, (squares / cells as f32 - mean * mean).max(0.0))
+    let mean = sum / cells.to_f32();
+    (mean, (squares / cells.to_f32() - mean * mean).max(0.0))
 }
 
 #[cfg(test)]
@@ -85,9 +87,9 @@ mod tests {
             let image = |number: u64| -> Vec<f32> {
                 let mut stream = Stream::of(5, number, Purpose::Test, 2);
                 let at = |k: usize| {
-                    let (x, y) = ((k % width) as f32, (k / width) as f32);
+                    let (x, y) = ((k % width).to_f32(), (k / width).to_f32());
                     let scene = if x > 200.0 { 140.0 } else { 70.0 + 0.1 * y };
-                    (scene + sigma * stream.normal() as f32).round()
+                    (scene + sigma * stream.normal().to_f32()).round()
                 };
                 (0..width * height).map(at).collect()
             };

@@ -5,7 +5,7 @@
 //! none.
 
 use super::regions;
-use furrow_base::math::disc;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, disc};
 
 /// Distance in pixels from the outline, on both sides, that is evaluated.
 const REACH: usize = 10;
@@ -22,14 +22,14 @@ pub(super) fn margin(colors: &[[f32; 3]], mask: &[bool], width: usize) -> Option
     let mut sums = [[0.0f64; 3]; 2 * REACH];
     let mut counts = [0u64; 2 * REACH];
     for (at, distance) in distances(mask, width) {
-        let level = (distance + REACH as f32).floor() as usize;
+        let level = (distance + REACH.to_f32()).floor_to::<usize>();
         sums[level].iter_mut().zip(colors[at]).for_each(|(sum, value)| *sum += f64::from(value));
         counts[level] += 1;
     }
     let mean = |levels: std::ops::Range<usize>| {
         let n: u64 = counts[levels.clone()].iter().sum();
         let sum = |c: usize| sums[levels.clone()].iter().map(|sum| sum[c]).sum::<f64>();
-        (n >= FEWEST).then(|| [0, 1, 2].map(|c| sum(c) / n as f64))
+        (n >= FEWEST).then(|| [0, 1, 2].map(|c| sum(c) / n.to_f64()))
     };
     let (soil, plant) = (mean(0..REACH - BEYOND)?, mean(REACH + BEYOND..2 * REACH)?);
     let axis = [0, 1, 2].map(|c| plant[c] - soil[c]);
@@ -45,7 +45,7 @@ pub(super) fn margin(colors: &[[f32; 3]], mask: &[bool], width: usize) -> Option
     // Selects the crossing that is closest to the outline.
     let crossing = |level: usize| {
         let (low, high) = (share(level)?, share(level + 1)?);
-        let place = level as f64 + 0.5 + (0.5 - low) / (high - low) - REACH as f64;
+        let place = level.to_f64() + 0.5 + (0.5 - low) / (high - low) - REACH.to_f64();
         (low < 0.5 && high >= 0.5).then_some(place)
     };
     (0..2 * REACH - 1).filter_map(crossing).min_by(|a, b| a.abs().total_cmp(&b.abs()))
@@ -53,21 +53,21 @@ pub(super) fn margin(colors: &[[f32; 3]], mask: &[bool], width: usize) -> Option
 
 /// Returns the pixels near the outline with the distance of their centres from it: positive inside, at most [`REACH`].
 fn distances(mask: &[bool], width: usize) -> Vec<(usize, f32)> {
-    let steps = disc(REACH as f32 + 0.5);
+    let steps = disc(REACH.to_f32() + 0.5);
     let height = mask.len() / width.max(1);
     let inverse: Vec<bool> = mask.iter().map(|inside| !inside).collect();
     let (near_plants, near_soil) = (regions::near(mask, width, REACH), regions::near(&inverse, width, REACH));
     let of = |at: usize| {
-        let (x, y) = ((at % width) as i64, (at / width) as i64);
+        let (x, y) = ((at % width).to_i64(), (at / width).to_i64());
         let other = |(dx, dy): &&(i64, i64)| {
             let (x, y) = (x + dx, y + dy);
-            (0..width as i64).contains(&x)
-                && (0..height as i64).contains(&y)
-                && mask[y as usize * width + x as usize] != mask[at]
+            (0..width.to_i64()).contains(&x)
+                && (0..height.to_i64()).contains(&y)
+                && mask[y.to_usize() * width + x.to_usize()] != mask[at]
         };
         let (dx, dy) = steps.iter().find(other)?;
-        let distance = ((dx * dx + dy * dy) as f32).sqrt() - 0.5;
-        (distance < REACH as f32).then_some((at, if mask[at] { distance } else { -distance }))
+        let distance = (dx * dx + dy * dy).to_f32().sqrt() - 0.5;
+        (distance < REACH.to_f32()).then_some((at, if mask[at] { distance } else { -distance }))
     };
     (0..mask.len()).filter(|at| if mask[*at] { near_soil[*at] } else { near_plants[*at] }).filter_map(of).collect()
 }
@@ -80,7 +80,7 @@ mod tests {
 
     /// Returns a blurred green disc of radius 40 on brown, and a mask with another radius.
     fn drawn(radius: f32) -> (Vec<[f32; 3]>, Vec<bool>) {
-        let from_centre = |k: usize| ((k % WIDTH) as f32 - 79.5).hypot((k / WIDTH) as f32 - 74.5);
+        let from_centre = |k: usize| ((k % WIDTH).to_f32() - 79.5).hypot((k / WIDTH).to_f32() - 74.5);
         let share = |k| 1.0 / (1.0 + ((from_centre(k) - 40.0) / 0.7).exp());
         let color = |k| {
             let s = share(k);

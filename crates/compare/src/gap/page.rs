@@ -6,6 +6,7 @@ use super::sets::{Distance, Gap, Set};
 use super::table::{ORDER, cells, named, verdict};
 use super::window::Window;
 use crate::Region;
+use furrow_base::math::ToInt;
 use furrow_report::{Number, Page, chart, count, data_url, legend, list, numbers, section};
 use maud::{Markup, html};
 
@@ -25,7 +26,7 @@ pub(super) fn html(of: &Gap) -> String {
         (section("Not compared", list(&of.warnings)))
     };
     let (real, synthetic) = (&of.real, &of.synthetic);
-    let images = |set: &Set| count(set.photos.len() as u64, "image", "images");
+    let images = |set: &Set| count(set.photos.len().to_u64(), "image", "images");
     let lead = html! {
         b { (synthetic.name) } ", " (images(synthetic)) ", against the real " b { (real.name) } ", " (images(real)) ". " (verdict(of))
     };
@@ -48,13 +49,13 @@ fn reading() -> Markup {
 }
 
 fn figures(of: &Gap) -> Markup {
-    let compared = of.distances.iter().filter(|distance| distance.ratio().is_some()).count() as u64;
-    let large = of.distances.iter().filter(|distance| distance.is_large()).count() as u64;
+    let compared = of.distances.iter().filter(|distance| distance.ratio().is_some()).count().to_u64();
+    let large = of.distances.iter().filter(|distance| distance.is_large()).count().to_u64();
     numbers([
         Number::count("large", large, "distances above 2 × halves"),
         Number::count("compared", compared, "distances with halves"),
-        Number::count("real", of.real.photos.len() as u64, "real images"),
-        Number::count("synthetic", of.synthetic.photos.len() as u64, "synthetic images"),
+        Number::count("real", of.real.photos.len().to_u64(), "real images"),
+        Number::count("synthetic", of.synthetic.photos.len().to_u64(), "synthetic images"),
     ])
 }
 

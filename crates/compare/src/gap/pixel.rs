@@ -5,6 +5,7 @@
 
 use crate::RasterImage;
 use crate::color::{coded, linear};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 
 /// Pixel sizes whose ratio is smaller are considered equal.
 const ALIKE: f64 = 1.02;
@@ -28,7 +29,7 @@ impl PixelSizes {
 
 /// Returns width and height of an image downscaled by `factor`.
 pub(super) fn coarser_size((width, height): (u32, u32), factor: f64) -> (u32, u32) {
-    let side = |side: u32| ((f64::from(side) / factor).round() as u32).max(1);
+    let side = |side: u32| (f64::from(side) / factor).round_to::<u32>().max(1);
     (side(width), side(height))
 }
 
@@ -45,7 +46,7 @@ pub(super) fn coarsen(picture: RasterImage, labels: Option<Vec<u8>>, factor: f64
     for (row, column) in rows.iter().flat_map(|row| columns.iter().map(move |column| (row, column))) {
         let (mut light, mut votes) = ([0.0_f32; 4], [0.0_f32; 4]);
         for ((y, down), (x, across)) in row.iter().flat_map(|y| column.iter().map(move |x| (*y, *x))) {
-            let (place, share) = ((y * picture.width + x) as usize, down * across);
+            let (place, share) = ((y * picture.width + x).to_usize(), down * across);
             let near = picture.nir.get(place).copied().unwrap_or(0);
             let [r, g, b] = picture.rgb[place];
             for (sum, code) in light.iter_mut().zip([r, g, b, near]) {
@@ -61,7 +62,7 @@ pub(super) fn coarsen(picture: RasterImage, labels: Option<Vec<u8>>, factor: f64
             coarse.nir.push(near);
         }
         let most = (0..votes.len()).rev().max_by(|a, b| votes[*a].total_cmp(&votes[*b])).unwrap_or(0);
-        classes.push(if most == usize::from(NONE) { u8::MAX } else { most as u8 });
+        classes.push(if most == usize::from(NONE) { u8::MAX } else { most.to_u8() });
     }
     (coarse, labels.map(|_| classes))
 }
@@ -75,9 +76,9 @@ fn parts(from: u32, to: u32) -> Vec<Vec<(u32, f32)>> {
     let length = f64::from(from) / f64::from(to);
     let part = |k: u32| {
         let (begin, end) = (f64::from(k) * length, f64::from(k + 1) * length);
-        let pixels = (begin as u32)..(end.ceil() as u32).min(from);
+        let pixels = begin.trunc_to::<u32>()..end.ceil_to::<u32>().min(from);
         let share = |x: u32| (f64::from(x + 1).min(end) - f64::from(x).max(begin)) / length;
-        pixels.map(|x| (x, share(x) as f32)).filter(|(_, share)| *share > 0.0).collect()
+        pixels.map(|x| (x, share(x).to_f32())).filter(|(_, share)| *share > 0.0).collect()
     };
     (0..to).map(part).collect()
 }
@@ -93,15 +94,15 @@ mod tests {
     fn light_is_averaged_and_labels_are_voted() {
         for (from, to) in [(7, 3), (640, 213), (5, 5), (9, 1)] {
             let parts = parts(from, to);
-            assert_eq!(parts.len(), to as usize);
-            let mut filled = vec![0.0; from as usize];
+            assert_eq!(parts.len(), to.to_usize());
+            let mut filled = vec![0.0; from.to_usize()];
             for part in &parts {
                 assert!((part.iter().map(|(_, share)| share).sum::<f32>() - 1.0).abs() < 1e-5);
                 for (x, share) in part {
-                    filled[*x as usize] += share;
+                    filled[x.to_usize()] += share;
                 }
             }
-            let each = to as f32 / from as f32;
+            let each = to.to_f32() / from.to_f32();
             assert!(filled.iter().all(|share| (share - each).abs() < 1e-5), "{filled:?}");
         }
         let rgb = vec![[0; 3], [255; 3], [10, 20, 30], [10, 20, 30], [255; 3], [0; 3], [10, 20, 30], [10, 20, 30]];

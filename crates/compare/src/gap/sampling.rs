@@ -3,6 +3,8 @@
 //! A relative error ε of a linear value Y changes its sRGB code c = 255 (1.055 Y^(1/2.4) − 0.055) by ε dc/d ln Y = ε (c
 //! + 14) / 2.4. This is an upper bound: samples are stratified, and blur and compression reduce noise.
 
+use furrow_base::math::RoundTo;
+
 /// Sampling noise above this fraction of the real set's noise is reported. At this fraction it adds an eighth to the
 /// noise of an image that has both.
 const LARGE: f64 = 0.5;
@@ -24,7 +26,7 @@ pub(super) fn warning(spp: f64, levels: f64, real: f64) -> Option<String> {
     let real = real.max(ROUNDING);
     (levels > LARGE * real).then(|| {
         let enough = spp * (levels / (SMALL * real)).powi(2);
-        let power = (enough.log2().ceil().min(31.0) as u32).max(1);
+        let power = enough.log2().ceil().min(31.0).trunc_to::<u32>().max(1);
         format!(
             "--synthetic has up to {levels:.1} levels of sampling noise at {spp:.0} samples per pixel, --real has {real:.1} of total noise: \
              render with --spp {} before relying on noise, gradients and spectra",

@@ -4,6 +4,7 @@ use super::advice::{Advice, FieldChange};
 use super::feature::Pool;
 use super::frequency;
 use super::sets::{Distance, Gap, Set};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_report::{Cell, Lines, Table, count, number};
 use serde::Serialize;
@@ -165,7 +166,7 @@ fn tenths(value: f64) -> String {
 
 /// Returns a sentence that lists the large distances.
 pub(super) fn verdict(of: &Gap) -> String {
-    let compared = of.distances.iter().filter(|distance| distance.ratio().is_some()).count() as u64;
+    let compared = of.distances.iter().filter(|distance| distance.ratio().is_some()).count().to_u64();
     let mut large: Vec<&Distance> = of.distances.iter().filter(|distance| distance.is_large()).collect();
     large.sort_by(|a, b| b.ratio().unwrap_or(0.0).total_cmp(&a.ratio().unwrap_or(0.0)));
     let names: Vec<String> = large.iter().map(|distance| distance.feature.name()).collect();

@@ -1,5 +1,7 @@
 //! Wasserstein distance of two sets of single values, and the median.
 
+use furrow_base::math::ToFloat;
+
 /// Returns W₁ of two sets of values (see [`Histogram`](furrow_report::Histogram)) in any order; neither may be empty.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     let sorted = |values: &[f64]| {
@@ -16,7 +18,7 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
             (Some(x), None) | (None, Some(x)) => *x,
             (None, None) => break,
         };
-        sum += (i as f64 / a.len() as f64 - j as f64 / b.len() as f64).abs() * (next - at);
+        sum += (i.to_f64() / a.len().to_f64() - j.to_f64() / b.len().to_f64()).abs() * (next - at);
         at = next;
         while a.get(i) == Some(&at) {
             i += 1;

@@ -2,6 +2,7 @@
 
 use crate::{RasterImage, Region};
 use furrow_base::Result;
+use furrow_base::math::ToInt;
 
 /// Largest size of the part in pixels; as wide as half a page.
 const PART: (u32, u32) = (552, 414);
@@ -30,9 +31,9 @@ impl Window {
     pub(super) fn take(name: &str, picture: &RasterImage, labels: Option<&[u8]>) -> Result<Self> {
         let size = (PART.0.min(picture.width), PART.1.min(picture.height));
         let (left, top) = place(picture.size(), size, labels);
-        let start = |y: u32| (y * picture.width + left) as usize;
+        let start = |y: u32| (y * picture.width + left).to_usize();
         let part: Vec<[u8; 3]> =
-            (top..top + size.1).flat_map(|y| &picture.rgb[start(y)..][..size.0 as usize]).copied().collect();
+            (top..top + size.1).flat_map(|y| &picture.rgb[start(y)..][..size.0.to_usize()]).copied().collect();
         let most = picture.width.max(picture.height).div_ceil(SMALLER);
         let (width, height, small) = furrow_output::shrink(picture.width, picture.height, &picture.rgb, most);
         Ok(Self {
@@ -52,7 +53,7 @@ fn place(whole: (u32, u32), part: (u32, u32), labels: Option<&[u8]>) -> (u32, u3
     places.sort_by_key(|(x, y)| (x.abs_diff(2) + y.abs_diff(2), *y, *x));
     let corners = places.into_iter().map(|(x, y)| (room.0 * x / 4, room.1 * y / 4));
     let plants = |(left, top): (u32, u32)| {
-        let row = |y: u32| &labels.unwrap_or_default()[(y * whole.0 + left) as usize..][..part.0 as usize];
+        let row = |y: u32| &labels.unwrap_or_default()[(y * whole.0 + left).to_usize()..][..part.0.to_usize()];
         (top..top + part.1).flat_map(row).filter(|label| Region::Vegetation.holds(**label)).count()
     };
     let mut best = (room.0 / 2, room.1 / 2);

@@ -5,6 +5,7 @@
 //! show the same field. The files always differ, since label maps contain the name of the kernels that made them.
 
 use crate::model::sample::Sample;
+use furrow_base::math::ToFloat;
 use std::fmt;
 
 /// The difference of two images.
@@ -41,7 +42,7 @@ impl Difference {
         let values = |s: &Sample| s.rgb.as_flattened().iter().chain(&s.nir).copied().collect::<Vec<u8>>();
         let (a, b) = (values(a), values(b));
         let apart: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
-        Self { labels: other as f64 / pixels.max(1) as f64, color: apart as f64 / a.len().max(1) as f64 }
+        Self { labels: other.to_f64() / pixels.max(1).to_f64(), color: apart.to_f64() / a.len().max(1).to_f64() }
     }
 
     /// Returns the larger value of each measure.
@@ -68,9 +69,10 @@ mod tests {
     use super::*;
     use crate::model::record::Record;
     use crate::model::split::Split;
+    use furrow_base::math::ToInt;
 
     fn sample(width: u32, height: u32) -> Sample {
-        let n = (width * height) as usize;
+        let n = (width * height).to_usize();
         Sample {
             record: Record {
                 index: 0,

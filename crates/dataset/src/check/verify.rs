@@ -17,6 +17,7 @@ use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::set::{Set, in_parallel};
 use crate::{File, format};
+use furrow_base::math::ToInt;
 use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, Threads};
@@ -220,7 +221,7 @@ fn shared_between_splits(set: &Set, looked: &[ImageCheck]) -> Vec<String> {
     let mut places: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
     for (index, looked) in looked.iter().enumerate() {
         if let Some(hash) = &looked.photograph {
-            places.entry(hash).or_default().insert(set.recipe.split_of(index as u64));
+            places.entry(hash).or_default().insert(set.recipe.split_of(index.to_u64()));
         }
     }
     let twice = places.values().filter(|splits| splits.len() > 1).count();
@@ -244,7 +245,7 @@ fn made_differently(set: &Set) -> Result<Vec<String>> {
 fn drawn(count: u64, again: u64) -> Vec<u64> {
     let mut all: Vec<u64> = (0..count).collect();
     all.sort_by_key(|k| mix(*k));
-    all.truncate(again.min(count) as usize);
+    all.truncate(again.min(count).to_usize());
     all.sort_unstable();
     all
 }

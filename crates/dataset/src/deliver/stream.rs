@@ -14,6 +14,7 @@ use crate::read::archive::append;
 use crate::read::native;
 use crate::read::set::Set;
 use furrow_base::error::Place;
+use furrow_base::math::ToInt;
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
@@ -123,7 +124,7 @@ impl ImageStream {
             0 => threads.min(fitting(scene, first, work.memory)),
             given => given,
         };
-        let at_once = at_once.min((self.indices.end - self.indices.start) as usize).max(1);
+        let at_once = at_once.min((self.indices.end - self.indices.start).to_usize()).max(1);
         Threads::divided(threads, at_once)
     }
 

@@ -15,6 +15,7 @@
 //! Source: Cordts et al. 2016, "The Cityscapes Dataset", and cityscapesScripts 2.3.0 (its evaluation supports street
 //! scenes only: this is the layout, not the benchmark).
 
+use furrow_base::math::ToInt;
 use super::{Format, SetWriter, image_file};
 use furrow_base::Result;
 use crate::File;
@@ -44,7 +45,7 @@ impl Format for Writer {
         let numbers = numbers(&of_set, record);
         // A pixel can have another class than its plant if there are classes of organs.
         let instance = |(class, plant): (&u8, &u32)| match numbers.get(plant) {
-            Some((of, k)) if of == class => u16::from(*class) * MOST as u16 + k,
+            Some((of, k)) if of == class => u16::from(*class) * MOST.to_u16() + k,
             _ => u16::from(*class),
         };
         let instances: Vec<u16> = classes.iter().zip(&sample.plants).map(instance).collect();

@@ -23,6 +23,7 @@
 //!
 //! Source: COCO data format, <https://cocodataset.org/#format-data>; cocoapi issue 332 on id 0.
 
+use furrow_base::math::ToInt;
 use super::videos::Videos;
 use super::{Format, SetWriter, image_file};
 use crate::format::labels::Labels;
@@ -112,12 +113,12 @@ fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
 
 /// Returns the category of a class: its index among the classes that plants can have, from 1.
 pub(super) fn category(labels: &Labels<'_>, class: u8) -> u32 {
-    labels.of_plants().iter().take_while(|of| **of != class).count() as u32 + 1
+    labels.of_plants().iter().take_while(|of| **of != class).count().to_u32() + 1
 }
 
 /// Returns the category of leaves, the number after those of plants.
 pub(super) fn leaf_category(labels: &Labels<'_>) -> u32 {
-    labels.of_plants().len() as u32 + 1
+    labels.of_plants().len().to_u32() + 1
 }
 
 /// Returns the categories of plants.
@@ -192,7 +193,7 @@ fn annotations<'a>(
         Err(e) => vec![Err(e)],
     };
     let numbered = |(i, annotation): (usize, Result<Annotation>)| {
-        annotation.map(|annotation| Annotation { id: i as u64 + 1, ..annotation })
+        annotation.map(|annotation| Annotation { id: i.to_u64() + 1, ..annotation })
     };
     set.records(split).flat_map(of_image).enumerate().map(numbered)
 }

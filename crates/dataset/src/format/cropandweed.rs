@@ -19,6 +19,7 @@
 //! Source: Steininger et al. 2023, "The CropAndWeed Dataset", and its repository, `cnw/utilities/datasets.py`,
 //! `cnw/map_dataset.py`.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use super::conditions::ConditionsSummary;
 use super::{Format, SetWriter, image_file};
 use crate::format::labels;
@@ -137,7 +138,7 @@ fn name(index: u64) -> String {
 /// Returns left, top, right, bottom, label, stem x, stem y (−1 without a stem) of a plant; `None` if it is not visible.
 fn row(plant: &Plant, label: u8) -> Option<[i64; 7]> {
     let [x, y, w, h] = plant.seen.bounds?.0.map(i64::from);
-    let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor() as i64, p.y.floor() as i64));
+    let (stem_x, stem_y) = plant.stem.map_or((-1, -1), |p| (p.x.floor_to::<i64>(), p.y.floor_to::<i64>()));
     Some([x, y, x + w, y + h, i64::from(label), stem_x, stem_y])
 }
 
@@ -154,7 +155,7 @@ impl Labels {
         let label = |eppo: &str| LABELS.iter().find(|(code, _)| *code == eppo).map(|(_, label)| *label);
         let of_species = |species: &furrow_field::record::SpeciesRecord| match label(&species.eppo) {
             Some(label) => Ok(label),
-            None => own.next().map(|n| n as u8).ok_or_else(too_many),
+            None => own.next().map(ToInt::to_u8).ok_or_else(too_many),
         };
         recipe.species.iter().map(of_species).collect::<Result<_>>().map(Self)
     }
@@ -162,7 +163,7 @@ impl Labels {
     fn of_plant(&self, plant: &Plant) -> u8 {
         let Some(label) = usize::from(plant.kind).checked_sub(1).and_then(|i| self.0.get(i)) else { return VEGETATION };
         let Some(grown) = plant.grown.as_ref().filter(|g| STAGED.contains(&g.eppo.as_str())) else { return *label };
-        label + STAGES.iter().filter(|(least, _)| grown.bbch >= *least).count() as u8
+        label + STAGES.iter().filter(|(least, _)| grown.bbch >= *least).count().to_u8()
     }
 
     /// Returns the descriptions of all labels.
@@ -204,7 +205,7 @@ impl Params {
 
     fn of(record: &Record) -> Self {
         let brief = ConditionsSummary::of(record);
-        let step = |value: f64, bounds: [f64; 2]| bounds.iter().filter(|bound| value >= **bound).count() as u8;
+        let step = |value: f64, bounds: [f64; 2]| bounds.iter().filter(|bound| value >= **bound).count().to_u8();
         Self([
             ("moisture", brief.moisture().map(|m| step(m, [1.0 / 3.0, 2.0 / 3.0]))),
             ("soil", brief.clods_per_m2().map(|n| step(n, [10_000.0, 12_000.0]))),
@@ -230,7 +231,7 @@ fn visible(record: &Record) -> Option<f64> {
         seen += u64::from(plant.seen.pixels);
         all += u64::from(plant.seen.unoccluded?);
     }
-    Some(if all == 0 { 1.0 } else { seen as f64 / all as f64 })
+    Some(if all == 0 { 1.0 } else { seen.to_f64() / all.to_f64() })
 }
 
 #[cfg(test)]

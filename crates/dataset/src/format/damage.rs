@@ -9,6 +9,7 @@
 //!
 //! All are 0 without damage, and outside leaves.
 
+use furrow_base::math::RoundTo;
 use super::{Format, image_file};
 use furrow_base::Result;
 use crate::File;
@@ -37,7 +38,7 @@ impl Format for Writer {
         let record = &sample.record;
         let damage = &sample.rendered(FOLDER)?.damage;
         let map = |(map, share): (&str, Share)| {
-            let values: Vec<u8> = damage.iter().map(|at| (share(at).clamp(0.0, 1.0) * 255.0).round() as u8).collect();
+            let values: Vec<u8> = damage.iter().map(|at| (share(at).clamp(0.0, 1.0) * 255.0).round_to::<u8>()).collect();
             let path = format!("{FOLDER}/{}/{map}/{}.png", record.split.name(), record.name);
             image_file::file(sample, path, &ImageData::Gray(&values))
         };

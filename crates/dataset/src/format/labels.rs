@@ -6,6 +6,7 @@ use crate::model::recipe::Recipe;
 use crate::model::record::{Leaf, Plant, Record};
 use crate::model::sample::Sample;
 use crate::read::set::Set;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use serde::Serialize;
 use std::borrow::Cow;
@@ -92,7 +93,7 @@ impl LeftOut {
                 }
                 all.plants += u64::from(!labels.labelling.lists(&plant.seen));
                 let leaves = plant.leaves.iter().filter(|leaf| leaf.seen.pixels > 0);
-                all.leaves += leaves.filter(|leaf| !labels.labelling.lists(&leaf.seen)).count() as u64;
+                all.leaves += leaves.filter(|leaf| !labels.labelling.lists(&leaf.seen)).count().to_u64();
             }
         }
         Ok(Some(all))

@@ -18,6 +18,7 @@
 //! Kak 1982, "Digital Picture Processing"; cuts, Dijkstra's shortest path with zero cost for pixels of the mask.
 
 use crate::model::rle::Box2;
+use furrow_base::math::{ToFloat, ToInt};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -76,16 +77,16 @@ fn plus(a: Pixel, b: Pixel) -> Pixel {
 impl Mask {
     /// Returns the mask of the pixels in `bounds` for which `inside(x, y)` holds.
     pub(super) fn new(bounds: Box2, inside: impl Fn(u32, u32) -> bool) -> Self {
-        let [x0, y0, w, h] = bounds.0.map(|n| n as i32);
+        let [x0, y0, w, h] = bounds.0.map(ToInt::to_i32);
         let mut mask = Self {
             origin: (x0 - 1, y0 - 1),
             width: w + 2,
             height: h + 2,
-            inside: vec![false; (w as usize + 2) * (h as usize + 2)],
+            inside: vec![false; (w.to_usize() + 2) * (h.to_usize() + 2)],
         };
         for y in bounds.rows() {
             for x in bounds.columns() {
-                let at = mask.at((x as i32 - mask.origin.0, y as i32 - mask.origin.1));
+                let at = mask.at((x.to_i32() - mask.origin.0, y.to_i32() - mask.origin.1));
                 mask.inside[at] = inside(x, y);
             }
         }
@@ -93,7 +94,7 @@ impl Mask {
     }
 
     fn at(&self, (x, y): Pixel) -> usize {
-        (y * self.width + x) as usize
+        (y * self.width + x).to_usize()
     }
 
     /// Returns whether a pixel is in the box, without the margin.
@@ -203,7 +204,7 @@ impl Mask {
         let painted = self.paint(&local);
         let both = painted.iter().zip(&self.inside).filter(|(a, b)| **a && **b).count();
         let any = painted.iter().zip(&self.inside).filter(|(a, b)| **a || **b).count();
-        if any == 0 { 1.0 } else { both as f64 / any as f64 }
+        if any == 0 { 1.0 } else { both.to_f64() / any.to_f64() }
     }
 
     /// Returns the pixels of the polygon's edges, which run along rows, columns and diagonals, and those that it
@@ -341,8 +342,8 @@ mod tests {
 
     /// Returns the mask of a drawing; `#` is inside.
     fn mask(rows: &[&str]) -> Mask {
-        let bounds = Box2([3, 5, rows[0].len() as u32, rows.len() as u32]);
-        Mask::new(bounds, |x, y| rows[y as usize - 5].as_bytes()[x as usize - 3] == b'#')
+        let bounds = Box2([3, 5, rows[0].len().to_u32(), rows.len().to_u32()]);
+        Mask::new(bounds, |x, y| rows[y.to_usize() - 5].as_bytes()[x.to_usize() - 3] == b'#')
     }
 
     fn parts(mask: &Mask) -> usize {
@@ -424,13 +425,13 @@ mod tests {
             let mut bits = seed;
             let inside: Vec<bool> = (0..width * height).map(|_| {
                 bits = bits.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                ((bits >> 40) as f64 / (1_u64 << 24) as f64) < share
+                ((bits >> 40).to_f64() / (1_u64 << 24).to_f64()) < share
             }).collect();
-            let mask = Mask::new(Box2([0, 0, width, height]), |x, y| inside[(y * width + x) as usize]);
+            let mask = Mask::new(Box2([0, 0, width, height]), |x, y| inside[(y * width + x).to_usize()]);
             let polygon = mask.polygon();
             prop_assert_eq!(polygon.is_empty(), !inside.contains(&true));
             // Cuts and holes have no area.
-            prop_assert_eq!(area(&polygon) as usize, inside.iter().filter(|inside| **inside).count());
+            prop_assert_eq!(area(&polygon).to_usize(), inside.iter().filter(|inside| **inside).count());
             let painted = mask.paint(&polygon.iter().map(|c| plus(c.pixel, (1, 1))).collect::<Vec<_>>());
             // OpenCV paints edges between truncated corners, which must run along rows, columns and diagonals.
             let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));

@@ -14,6 +14,7 @@
 //!
 //! Source: COCO data format, panoptic segmentation, <https://cocodataset.org/#format-data>; panopticapi's `rgb2id`.
 
+use furrow_base::math::ToInt;
 use super::videos::Videos;
 use super::{Format, SetWriter, coco, image_file};
 use crate::format::labels::Labels;
@@ -85,12 +86,12 @@ fn category(labels: &Labels<'_>, class: u8) -> u32 {
         return coco::category(labels, class);
     }
     let others = (0..class).filter(|other| !things.contains(other)).count();
-    coco::leaf_category(labels) + 1 + others as u32
+    coco::leaf_category(labels) + 1 + others.to_u32()
 }
 
 fn categories(labels: &Labels<'_>) -> Value {
     let things = labels.of_plants();
-    let others = (0..labels.classes().len() as u8).filter(|class| !things.contains(class));
+    let others = (0..labels.classes().len().to_u8()).filter(|class| !things.contains(class));
     let colors = labels.colors();
     let category = |class: u8| {
         let thing = things.contains(&class);
@@ -114,7 +115,7 @@ fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
     let things = labels.of_plants();
     let most = sample.plants.iter().copied().max().unwrap_or(0);
     let stuff = STUFF.max(most + 1);
-    let last = (0..labels.classes().len() as u8).map(|class| stuff + category(labels, class)).max();
+    let last = (0..labels.classes().len().to_u8()).map(|class| stuff + category(labels, class)).max();
     if last.is_some_and(|last| last > MOST_PLANTS) {
         let words = format!("image {} has a plant with the number {most}; segments of COCO panoptic have 24 bits", sample.record.name);
         return Err(Error::input(words).help(format!("sow fewer plants, or omit --format {FOLDER}")));
@@ -131,7 +132,7 @@ fn segments(labels: &Labels<'_>, sample: &Sample) -> Result<(Vec<u32>, Value)> {
             Some(of_plant) => (*of_plant, *plant),
             None => (*class, stuff + category(labels, *class)),
         };
-        let (x, y) = (i as u32 % width, i as u32 / width);
+        let (x, y) = (i.to_u32() % width, i.to_u32() / width);
         let (_, area, bounds) = found.entry(id).or_insert((class, 0, Box2::of(x, y)));
         *area += 1;
         bounds.add(x, y);

@@ -18,6 +18,7 @@
 //! Source: Weyler et al. 2024, "PhenoBench", and its loader and evaluation, version 0.1.0. The loader's
 //! `make_unique_ids` changes a copy and so has no effect: numbers are unique without it.
 
+use furrow_base::math::RoundTo;
 use super::{Format, image_file};
 use crate::model::recipe::{Recipe, Rendering};
 use crate::model::record::{Plant, Seen};
@@ -127,5 +128,5 @@ fn semantics(class: u8, plant: Option<&Plant>) -> u16 {
 }
 
 fn visibility(seen: &Seen) -> u8 {
-    (seen.inside_fraction() * 255.0).round() as u8
+    (seen.inside_fraction() * 255.0).round_to::<u8>()
 }

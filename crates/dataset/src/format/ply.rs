@@ -14,6 +14,7 @@
 //!
 //! Source: Turk 1994, "The PLY Polygon File Format".
 
+use furrow_base::math::ToInt;
 use super::{Format, parts};
 use crate::model::optional_maps::OptionalMap;
 use crate::model::recipe::Recipe;
@@ -36,7 +37,7 @@ impl Format for Writer {
         let axis = camera.pose().axes.z_axis;
         let mut cloud = Cloud::default();
         for (i, depth) in rendered.labels.depth.iter().enumerate().filter(|(_, depth)| depth.is_finite()) {
-            let (origin, direction) = camera.centre_ray(i as u32 % width, i as u32 / width);
+            let (origin, direction) = camera.centre_ray(i.to_u32() % width, i.to_u32() / width);
             // Depth is along the optical axis.
             let at = origin + direction * (depth / direction.dot(axis));
             cloud.add(&Point {

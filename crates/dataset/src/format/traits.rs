@@ -8,6 +8,7 @@
 //! Cells of unknown values (models, imported images) are empty. The first row names the columns; the first columns
 //! identify the image of a row (`index/origin.rs`).
 
+use furrow_base::math::ToFloat;
 use super::{Format, SetWriter};
 use crate::index::leaves;
 use crate::index::origin::Origin;
@@ -182,7 +183,7 @@ impl<'a> LeafRow<'a> {
             id: leaf.id,
             species,
             area_m2: traits.map(|traits| traits.area_m2),
-            visible_area_m2: traits.map(|traits| traits.area_m2 * leaf.seen.shown_fraction() as f32),
+            visible_area_m2: traits.map(|traits| traits.area_m2 * leaf.seen.shown_fraction().to_f32()),
             length_m: traits.map(|traits| traits.length_m),
             width_m: traits.map(|traits| traits.width_m),
             petiole_m: traits.map(|traits| traits.petiole_m),

@@ -11,6 +11,7 @@
 use crate::model::record::CaptureRecord;
 use crate::model::split::Split;
 use crate::read::set::Set;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
 
@@ -51,11 +52,11 @@ impl Videos {
                 capture.field, capture.camera
             ))
         })?;
-        Ok(self.number(capture.field, place as u64))
+        Ok(self.number(capture.field, place.to_u64()))
     }
 
     fn number(&self, field: u64, camera: u64) -> u64 {
-        field.saturating_mul(self.cameras.len() as u64).saturating_add(camera + 1)
+        field.saturating_mul(self.cameras.len().to_u64()).saturating_add(camera + 1)
     }
 
     /// Returns the entries of a split, field by field.

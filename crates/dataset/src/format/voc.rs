@@ -8,6 +8,7 @@
 //! Source: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 2012 Development Kit", 2012, sections 4 and
 //! 5; colours are those of its `VOClabelcolormap`.
 
+use furrow_base::math::ToInt;
 use super::{Format, SetWriter, image_file};
 use crate::format::labels::Labels;
 use crate::model::photo::Photo;
@@ -46,7 +47,7 @@ impl Format for Writer {
         let mut numbers = BTreeMap::new();
         for (plant, class) in labels.plants(&sample.record) {
             let Some(Box2([x, y, w, h])) = plant.seen.bounds else { continue };
-            numbers.insert(plant.number, (numbers.len() + 1).min(MOST + 1) as u8);
+            numbers.insert(plant.number, (numbers.len() + 1).min(MOST + 1).to_u8());
             let class = labels.classes().get(usize::from(class)).map(|class| class.name.as_str()).unwrap_or_default();
             let truncated = u8::from(plant.seen.inside_fraction() < TRUNCATED);
             let difficult = u8::from(plant.seen.shown_fraction() < DIFFICULT);

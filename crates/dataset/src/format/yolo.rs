@@ -11,6 +11,7 @@
 //! Source: Ultralytics documentation, "Instance Segmentation Datasets Overview"; ultralytics 8.4.190; supervision
 //! 0.31.2.
 
+use furrow_base::math::{ToFloat, ToInt};
 use super::outline::{Corner, Mask};
 use super::{Format, SetWriter, boxes};
 use crate::format::labels::Labels;
@@ -90,7 +91,7 @@ fn losses(set: &Set, split: Split, name: &str) -> Result<Vec<Loss>> {
 
 fn mask(sample: &Sample, plant: &Plant) -> Option<Mask> {
     let width = sample.record.width;
-    plant.seen.bounds.map(|bounds| Mask::new(bounds, |x, y| sample.plants[(y * width + x) as usize] == plant.number))
+    plant.seen.bounds.map(|bounds| Mask::new(bounds, |x, y| sample.plants[(y * width + x).to_usize()] == plant.number))
 }
 
 /// Running statistics of the losses of all plants.
@@ -118,7 +119,7 @@ impl Sum {
     }
 
     fn to_json(&self) -> serde_json::Value {
-        let mean = (self.plants > 0).then(|| self.iou / self.plants as f64);
+        let mean = (self.plants > 0).then(|| self.iou / self.plants.to_f64());
         serde_json::json!({ "plants": self.plants, "exact": self.exact, "mean_iou": mean, "worst": self.worst })
     }
 }

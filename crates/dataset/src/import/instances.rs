@@ -7,6 +7,7 @@
 
 use furrow_base::Result;
 use furrow_base::error::Error;
+use furrow_base::math::ToInt;
 use furrow_render::scene::tag::{Class, MOST_PLANTS};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -64,7 +65,7 @@ pub(super) fn instances(path: &Path, semantics: &[u8], plants: &[u32], leaves: &
     let notes = [
         (lost[0], "pixels of plants are soil or unlabelled and were removed from the plants"),
         (lost[1], "pixels of leaves are on no plant and were removed from the leaves"),
-        (shared.count() as u64, "numbers are used for a crop plant and a weed; each becomes two plants"),
+        (shared.count().to_u64(), "numbers are used for a crop plant and a weed; each becomes two plants"),
     ];
     all.warnings.extend(notes.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")));
     Ok(all)

@@ -4,6 +4,7 @@ use super::classes::{Colors, Names};
 use super::files::{length, listed, photograph, same_size, unread};
 use super::{Labelled, Source, SourceImage};
 use crate::model::sample::IGNORE;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::Map;
 use std::collections::BTreeMap;
@@ -217,8 +218,8 @@ impl Masks {
             None if self.folders.ignore_others => Ok(IGNORE),
             None => Err(Error::input(format!(
                 "pixel {},{} has {}, for which no class was given",
-                place as u32 % width,
-                place as u32 / width,
+                place.to_u32() % width,
+                place.to_u32() / width,
                 words(*pixel)
             ))
             .help(format!("add it to {option}, or give --others ignore"))

@@ -33,6 +33,7 @@ use crate::read::checksum_record::{ChecksumRecord, write_files};
 use crate::read::native;
 use crate::read::set::Set;
 use furrow_base::Result;
+use furrow_base::math::ToInt;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -117,7 +118,7 @@ pub fn import(
     let there = AtomicUsize::new(0);
     // If there are several errors, returns that of the first image, whatever the number of threads.
     let each = |what: &(dyn Fn(u64) -> Result<()> + Sync)| {
-        let fault = (0..source.images().len() as u64).into_par_iter().find_map_first(|index| {
+        let fault = (0..source.images().len().to_u64()).into_par_iter().find_map_first(|index| {
             if stop.load(Ordering::Relaxed) {
                 return Some(generate::interrupted(folder, there.load(Ordering::Relaxed), source.images().len()));
             }
@@ -129,7 +130,7 @@ pub fn import(
         refuse_full(folder)?;
         // Reads all images before writing, so that an error in any of them leaves no partial dataset in the way of the
         // corrected command.
-        each(&|index| source.read(index as usize).map(drop))?;
+        each(&|index| source.read(index.to_usize()).map(drop))?;
     }
     let set = begin(folder, source, order)?;
     each(&|index| {
@@ -155,7 +156,7 @@ fn begin(folder: &Path, source: &dyn Source, order: &ImportSettings) -> Result<S
             source_sha256: hex::encode(Sha256::digest(source.words())),
             nir: Some(source.has_nir()),
         },
-        count: images.len() as u64,
+        count: images.len().to_u64(),
         split,
         formats: Vec::new(),
         labelling: Labelling::default(),
@@ -172,7 +173,7 @@ fn bring(set: &Set, source: &dyn Source, index: u64) -> Result<()> {
     let files = match task(set, index)? {
         Task::Done => return Ok(()),
         Task::Formats | Task::All => {
-            let sample = sample(recipe, &source.images()[index as usize], index, source.read(index as usize)?);
+            let sample = sample(recipe, &source.images()[index.to_usize()], index, source.read(index.to_usize())?);
             invariants::check(recipe, &sample)?;
             let mut files = native::files(recipe, &sample, "")?;
             files.extend(generate::formatted(set, &sample)?);

@@ -10,6 +10,7 @@ use super::instances::instances;
 use super::{Labelled, Source, SourceImage};
 use crate::model::sample::IGNORE;
 use crate::model::split::Split;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::Map;
 use std::fmt::Write;
@@ -122,13 +123,13 @@ impl Source for PhenoBench {
 /// Returns the class of a PhenoBench number.
 fn class(path: &Path, width: u32, place: usize, number: u32) -> Result<u8> {
     match number {
-        0..=2 => Ok(number as u8),
-        3 | 4 => Ok(number as u8 - 2),
+        0..=2 => Ok(number.to_u8()),
+        3 | 4 => Ok(number.to_u8() - 2),
         255 => Ok(IGNORE),
         other => Err(Error::input(format!(
             "pixel {},{} has the number {other}; PhenoBench has 0 to 4 and 255",
-            place as u32 % width,
-            place as u32 / width
+            place.to_u32() % width,
+            place.to_u32() / width
         ))
         .in_file(path)),
     }

@@ -5,6 +5,7 @@ use super::table::{Row, Table};
 use crate::model::record::{Leaf, Plant, Record, Seen};
 use crate::read::set::{Set, SetWriter};
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 use furrow_render::scene::tag::Class;
 
 /// Writes the table of a dataset whose images are complete to `path`.
@@ -49,7 +50,7 @@ fn row(origin: &Origin<'_>, plant: &Plant, leaf: &Leaf) -> Row {
         ("species", aged.map(|grown| grown.eppo.as_str()).into()),
         ("name", grown.map(|grown| grown.species.as_str()).into()),
         ("area_m2", traits.map(|traits| traits.area_m2).into()),
-        ("visible_area_m2", traits.map(|traits| traits.area_m2 * seen.shown_fraction() as f32).into()),
+        ("visible_area_m2", traits.map(|traits| traits.area_m2 * seen.shown_fraction().to_f32()).into()),
         ("length_m", traits.map(|traits| traits.length_m).into()),
         ("width_m", traits.map(|traits| traits.width_m).into()),
         ("petiole_m", traits.map(|traits| traits.petiole_m).into()),

@@ -24,6 +24,7 @@ use crate::read::native::is_native;
 use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, report};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, SceneFile, Threads};
 use furrow_render::render::RenderMonitor;
@@ -95,13 +96,13 @@ impl CostEstimate {
         // Images of one field are rendered one after another, so at most one image per scene construction is in
         // progress.
         let at_once = cores.clamp(1, MOST_AT_ONCE).min(usize::try_from(self.growings.max(1)).unwrap_or(usize::MAX));
-        self.base_memory + at_once as u64 * self.image_memory
+        self.base_memory + at_once.to_u64() * self.image_memory
     }
 
     /// Returns the number of shards that take about an hour each on `cores` cores; no shard is empty.
     pub fn shards(&self, cores: u32) -> u64 {
         let hours = self.core_s / 3600.0 / f64::from(cores.max(1));
-        (hours.ceil() as u64).clamp(1, self.units.max(1))
+        hours.ceil_to::<u64>().clamp(1, self.units.max(1))
     }
 }
 
@@ -158,18 +159,18 @@ pub fn estimate_cost(
     }
     begun(Step::Lists);
     let peak = meter::peak_memory().unwrap_or(0);
-    let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Probe) -> f64| probes.iter().map(of).sum::<f64>() / probes.len().max(1).to_f64();
     let all = threads.install(|| SharedFiles::of(&recipe, &files, &probes))?;
     let growings = recipe.count.div_ceil(recipe.captures_a_day());
-    let (count, spp) = (recipe.count as f64, f64::from(images.spp));
-    let (grow_s, sample_s) = (growings as f64 * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
+    let (count, spp) = (recipe.count.to_f64(), f64::from(images.spp));
+    let (grow_s, sample_s) = (growings.to_f64() * mean(&|p| p.grow_s), count * spp * mean(&|p| p.sample_s));
     let rest_s = start + count * mean(&|p| p.fixed_s) + all.core_s;
-    let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count() as u64);
+    let packs = Packing::of(&recipe).map_or(0, |packing| packing.all().count().to_u64());
     // Each pack is an archive and its record.
-    let (mut bytes, mut number) = (all.bytes + count * LOG_ROW as f64, all.files + 1 + 2 * packs);
+    let (mut bytes, mut number) = (all.bytes + count * LOG_ROW.to_f64(), all.files + 1 + 2 * packs);
     for (split, images) in Split::ALL.into_iter().zip(images_of_splits(&recipe)) {
         if images > 0 {
-            bytes += images as f64 * mean(&|p| p.bytes(split));
+            bytes += images.to_f64() * mean(&|p| p.bytes(split));
             number += images * probes.first().map_or(0, |p| p.lying(&p.files[&split]));
         }
     }
@@ -183,10 +184,10 @@ pub fn estimate_cost(
         core_s: grow_s + sample_s + rest_s,
         grow_s,
         sample_s,
-        bytes: bytes as u64,
+        bytes: bytes.trunc_to::<u64>(),
         files: number,
         base_memory,
-        image_memory: (peak.saturating_sub(base_memory) as f64 * images.largest_over(&probes)) as u64,
+        image_memory: (peak.saturating_sub(base_memory).to_f64() * images.largest_over(&probes)).trunc_to::<u64>(),
     };
     Ok((cost, warnings))
 }
@@ -196,7 +197,8 @@ pub fn estimate_cost(
 fn probed(count: u64) -> Vec<u64> {
     let last = count.saturating_sub(1);
     let halves = (2..).flat_map(|level: u32| (1..1_u64 << level).step_by(2).map(move |odd| (odd, level)));
-    let between = halves.take(4 * PROBES[1]).map(|(odd, level)| ((u128::from(last) * u128::from(odd)) >> level) as u64);
+    let between =
+        halves.take(4 * PROBES[1]).map(|(odd, level)| ((u128::from(last) * u128::from(odd)) >> level).to_u64());
     let mut all = Vec::new();
     for index in [0, count / 2, last].into_iter().chain(between) {
         if all.len() < PROBES[1] && !all.contains(&index) {
@@ -262,17 +264,18 @@ impl Probe {
     /// Returns the size in bytes of its files in a split with all samples, including the checksum record.
     fn bytes(&self, split: Split) -> f64 {
         let files = self.files.get(&split).map_or(&[][..], Vec::as_slice);
-        let seal = files.iter().map(|file| file.path.len() as u64 + 100).sum::<u64>() + 2 * SEAL_HASH;
-        let in_archive = if self.packed { files.iter().filter(|file| is_native(&file.path)).count() as u64 } else { 0 };
+        let seal = files.iter().map(|file| file.path.len().to_u64() + 100).sum::<u64>() + 2 * SEAL_HASH;
+        let in_archive =
+            if self.packed { files.iter().filter(|file| is_native(&file.path)).count().to_u64() } else { 0 };
         // In an archive each file has a header, is padded by half a block on average, and has an entry in the archive's
         // record.
-        length(files) as f64 * self.longer + (seal + in_archive * MEMBER) as f64
+        length(files).to_f64() * self.longer + (seal + in_archive * MEMBER).to_f64()
     }
 
     /// Returns how many of its files, including the checksum record, are stored outside archives.
     fn lying(&self, files: &[File]) -> u64 {
         let in_archive = |file: &&File| self.packed && is_native(&file.path);
-        (files.len() - files.iter().filter(in_archive).count()) as u64 + u64::from(!self.packed)
+        (files.len() - files.iter().filter(in_archive).count()).to_u64() + u64::from(!self.packed)
     }
 }
 
@@ -339,7 +342,7 @@ impl Images {
         let (mut made, files, seconds) = draw(many)?;
         let (sample_s, longer) = less.map_or((0.0, 1.0), |(short, short_s)| {
             let doublings = |from: f64, to: f64| (to / from).log2();
-            let (short, long) = (short as f64, length(&files) as f64);
+            let (short, long) = (short.to_f64(), length(&files).to_f64());
             // Each doubling of samples halves the variance of the noise, which saves a constant number of bits per
             // pixel.
             let steepness = (long - short) / doublings(fewer, more);
@@ -378,7 +381,7 @@ impl Images {
 fn length(files: &[File]) -> u64 {
     let mut known = BTreeSet::new();
     let fresh = files.iter().filter(|file| file.bytes.len() <= BLOCK || known.insert(file.bytes.as_slice()));
-    fresh.map(|file| file.bytes.len() as u64).sum()
+    fresh.map(|file| file.bytes.len().to_u64()).sum()
 }
 
 /// Estimated cost of the files that belong to the whole dataset.
@@ -394,23 +397,23 @@ impl SharedFiles {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         let small = ProbeDataset::of(recipe, probes, 1);
         small.write(folder.path(), scene)?;
-        let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count() as u64;
+        let splits = images_of_splits(recipe).into_iter().filter(|images| *images > 0).count().to_u64();
         let per_field = small.recipe.captures();
         // Finished with one field per split, with an additional incomplete field if the last field is incomplete, and
         // with an additional field per probe.
         let few_images = splits * per_field;
-        let many_images = few_images + probes.len() as u64 * per_field;
+        let many_images = few_images + probes.len().to_u64() * per_field;
         let few = small.finished(folder.path(), few_images)?;
         let of_cut = recipe.count % recipe.captures();
         let cut = of_cut.min(per_field);
         let partial = if cut == 0 { 0 } else { small.finished(folder.path(), few_images + cut)?.files - few.files };
         let begin = cpu()?;
         let many = small.finished(folder.path(), many_images)?;
-        let core_s = (cpu()? - begin) / many_images as f64 * recipe.count.min(MOST_LOOKED_AT) as f64;
+        let core_s = (cpu()? - begin) / many_images.to_f64() * recipe.count.min(MOST_LOOKED_AT).to_f64();
         let whole_fields = recipe.count / recipe.captures();
-        let each = (many.files - few.files) / probes.len().max(1) as u64;
+        let each = (many.files - few.files) / probes.len().max(1).to_u64();
         // Number of days after the first one, summed over all fields.
-        let days = (recipe.days().len() as u64).saturating_sub(1);
+        let days = recipe.days().len().to_u64().saturating_sub(1);
         let later_days = whole_fields * days + of_cut.div_ceil(recipe.captures_a_day()).saturating_sub(1);
         let of_later_days = if later_days > 0 {
             later_days * ProbeDataset::of(recipe, probes, 2).files_of_a_field(scene, splits)?.saturating_sub(each)
@@ -419,14 +422,18 @@ impl SharedFiles {
         };
         let files = few.files + whole_fields * each + partial + of_later_days - splits * each;
         let prolonged = |few: u64, many: u64, images: u64| {
-            let each = (many as f64 - few as f64) / (many_images - few_images).max(1) as f64;
-            (few as f64 + each * (images as f64 - few_images as f64)).max(0.0)
+            let each = (many.to_f64() - few.to_f64()) / (many_images - few_images).max(1).to_f64();
+            (few.to_f64() + each * (images.to_f64() - few_images.to_f64())).max(0.0)
         };
         let lists = prolonged(few.lists, many.lists, recipe.count);
         let page = prolonged(few.page, many.page, recipe.count.min(REPORTED));
-        let own: u64 = scene.iter().map(|file| file.bytes.len() as u64).sum();
-        let recipe_bytes = recipe.text()?.len() as u64;
-        Ok(Self { files: files + scene.len() as u64 + 1, bytes: lists + page + (own + recipe_bytes) as f64, core_s })
+        let own: u64 = scene.iter().map(|file| file.bytes.len().to_u64()).sum();
+        let recipe_bytes = recipe.text()?.len().to_u64();
+        Ok(Self {
+            files: files + scene.len().to_u64() + 1,
+            bytes: lists + page + (own + recipe_bytes).to_f64(),
+            core_s,
+        })
     }
 }
 
@@ -454,7 +461,7 @@ impl<'a> ProbeDataset<'a> {
         let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
         if let ImageOrigin::Rendered(rendering) = &mut small.made {
             rendering.days.truncate(days);
-            rendering.captures = recipe.captures_a_day().min(cameras as u64) * rendering.days.len().max(1) as u64;
+            rendering.captures = recipe.captures_a_day().min(cameras.to_u64()) * rendering.days.len().max(1).to_u64();
         }
         Self { recipe: small, probes }
     }
@@ -464,7 +471,7 @@ impl<'a> ProbeDataset<'a> {
         write_files(folder, scene)?;
         write_files(folder, &[File { path: FILE.into(), bytes: self.recipe.text()? }])?;
         let fields = Split::ALL.len() + self.probes.len();
-        for (index, probe) in (0..fields as u64 * self.recipe.captures()).zip(self.probes.iter().cycle()) {
+        for (index, probe) in (0..fields.to_u64() * self.recipe.captures()).zip(self.probes.iter().cycle()) {
             let files = self.copy(probe, index)?;
             write_files(folder, &files)?;
             ChecksumRecord::of(index, &self.recipe, &files)?.write(folder)?;
@@ -481,7 +488,7 @@ impl<'a> ProbeDataset<'a> {
         record.split = self.recipe.split_of(index);
         if let Some(of_probe) = &mut record.capture {
             let (of_day, day) = of_day(&self.recipe, capture);
-            let camera = probe.cameras.get(of_day as usize).cloned().unwrap_or_default();
+            let camera = probe.cameras.get(of_day.to_usize()).cloned().unwrap_or_default();
             *of_probe = CaptureRecord { field, day, frame: 0, camera, ..of_probe.clone() };
         }
         let own = format!("{}/record.json", native::folder(&record.name));
@@ -497,7 +504,7 @@ impl<'a> ProbeDataset<'a> {
     fn files_of_a_field(&self, scene: &[File], splits: u64) -> Result<u64> {
         let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
         self.write(folder.path(), scene)?;
-        let (per_field, fields) = (self.recipe.captures(), self.probes.len() as u64);
+        let (per_field, fields) = (self.recipe.captures(), self.probes.len().to_u64());
         let few = self.finished(folder.path(), splits * per_field)?;
         let many = self.finished(folder.path(), (splits + fields) * per_field)?;
         Ok((many.files - few.files) / fields.max(1))
@@ -507,7 +514,7 @@ impl<'a> ProbeDataset<'a> {
     fn finished(&self, folder: &Path, images: u64) -> Result<Finished> {
         let recipe = Recipe { count: images, ..self.recipe.clone() };
         let paths = finish(&Set::new(folder, recipe), None)?;
-        let mut finished = Finished { files: paths.len() as u64, page: 0, lists: 0 };
+        let mut finished = Finished { files: paths.len().to_u64(), page: 0, lists: 0 };
         for path in paths {
             let bytes = std::fs::metadata(&path).map_err(Error::io(&path))?.len();
             let sum = if path.ends_with(report::FILE) { &mut finished.page } else { &mut finished.lists };
@@ -533,7 +540,7 @@ mod tests {
             let all = probed(count);
             assert_eq!(all.iter().collect::<BTreeSet<_>>().len(), all.len());
             assert!(all.iter().all(|index| *index < count));
-            assert!(all.len() as u64 >= count.min(PROBES[0] as u64) && all.len() <= PROBES[1], "{count}: {all:?}");
+            assert!(all.len().to_u64() >= count.min(PROBES[0].to_u64()) && all.len() <= PROBES[1], "{count}: {all:?}");
         }
     }
 

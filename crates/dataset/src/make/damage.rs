@@ -4,6 +4,7 @@
 //! uses for shading ([`furrow_render::material::Damage`]).
 
 use furrow_base::geometry::{Intersect, Window};
+use furrow_base::math::ToInt;
 use furrow_render::material::Damage;
 use furrow_render::render::label;
 use furrow_render::scene::Scene;
@@ -14,12 +15,12 @@ use rayon::prelude::*;
 pub fn damage(scene: &Scene, geometry: &dyn Intersect) -> Vec<Damage> {
     let camera = &scene.camera;
     let window = Window::full(camera.width(), camera.height());
-    let mut all = vec![Damage::default(); (camera.width() * camera.height()) as usize];
-    all.par_chunks_mut(camera.width() as usize).zip(0..camera.height()).for_each(|(row, y)| {
+    let mut all = vec![Damage::default(); (camera.width() * camera.height()).to_usize()];
+    all.par_chunks_mut(camera.width().to_usize()).zip(0..camera.height()).for_each(|(row, y)| {
         label::row_hits(geometry, camera, window, y, |x, ray, hit| {
-            let part = &scene.parts[hit.part as usize];
+            let part = &scene.parts[hit.part.to_usize()];
             let at = part.interaction(hit, 0.0);
-            row[x] = scene.materials[part.material as usize].damage(&at, ray.direction);
+            row[x] = scene.materials[part.material.to_usize()].damage(&at, ray.direction);
         });
     });
     all

@@ -6,7 +6,7 @@
 
 use crate::model::sample::Flow;
 use furrow_base::geometry::{Intersect, Ray};
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, ToInt, Vec3};
 use furrow_field::drive::Capture;
 use furrow_optics::sensor::Camera;
 use rayon::prelude::*;
@@ -25,15 +25,15 @@ pub fn flows(captures: &[Capture], at: usize, depth: &[f32], geometry: &dyn Inte
 }
 
 fn flow(to: &str, from: &Camera, other: &Camera, depth: &[f32], geometry: &dyn Intersect) -> Flow {
-    let width = from.width() as usize;
+    let width = from.width().to_usize();
     let forward = from.pose().axes.z_axis;
     let one = |(i, depth): (usize, &f32)| {
-        let (x, y) = ((i % width) as u32, (i / width) as u32);
+        let (x, y) = ((i % width).to_u32(), (i / width).to_u32());
         let (origin, direction) = from.centre_ray(x, y);
         let point = origin + direction * (depth / direction.dot(forward));
         let there = if depth.is_finite() { other.project(point) } else { None };
         let Some(there) = there else { return ([f32::NAN; 2], false) };
-        let moved = [there.x - x as f32 - 0.5, there.y - y as f32 - 0.5];
+        let moved = [there.x - x.to_f32() - 0.5, there.y - y.to_f32() - 0.5];
         (moved, other.contains(there) && !hidden(point, other.eye(there.y), geometry))
     };
     let (pixels, visible) = depth.par_iter().enumerate().map(one).unzip();

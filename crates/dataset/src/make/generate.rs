@@ -19,6 +19,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
@@ -117,9 +118,9 @@ pub(crate) const MOST_AT_ONCE: usize = 16;
 /// Returns how many fields like field `index` fit into memory, from 1 to [`MOST_AT_ONCE`]. Returns 1 if the estimate
 /// fails; building the field then reports the error.
 pub(crate) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usize {
-    let memory = memory.unwrap_or_else(usual_memory) as f64;
+    let memory = memory.unwrap_or_else(usual_memory).to_f64();
     let one = scene.estimate(index).map_or(memory, |estimate| estimate.total().bytes);
-    ((memory / one) as usize).clamp(1, MOST_AT_ONCE)
+    (memory / one).trunc_to::<usize>().clamp(1, MOST_AT_ONCE)
 }
 
 /// Makes the missing images of a shard. A stopped run returns [`Kind::Interrupted`] with the number of complete images;

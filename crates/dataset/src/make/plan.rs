@@ -18,6 +18,7 @@ use crate::read::links;
 use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::BuildProgress;
@@ -124,7 +125,7 @@ pub fn plan(folder: &Path, order: &Order, stop: &Arc<AtomicBool>) -> Result<(Set
 fn given_up(folder: &Path, images: u64, error: Error) -> Error {
     let begun = Set::open(folder).and_then(|set| Ok((images_there(&set)?, set.recipe.count)));
     match begun {
-        Ok((there, before)) => interrupted(folder, there, images.max(before) as usize),
+        Ok((there, before)) => interrupted(folder, there, images.max(before).to_usize()),
         Err(_) => error.in_file(folder),
     }
 }

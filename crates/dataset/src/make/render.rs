@@ -10,7 +10,7 @@ use crate::model::recipe::{self, Recipe};
 use crate::model::record::{CaptureRecord, Exposure, Leaf, Plant, PlantAttributes, Record, Seen};
 use crate::model::sample::{Rendered, Sample};
 use crate::read::set::Set;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec3};
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
@@ -132,7 +132,7 @@ impl CachedField {
 /// Splits the number of a capture of a field into its number within the day and the day.
 pub(crate) fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
     let a_day = recipe.captures_a_day();
-    (capture % a_day, recipe.days().get((capture / a_day) as usize).copied())
+    (capture % a_day, recipe.days().get((capture / a_day).to_usize()).copied())
 }
 
 /// Makes image `index` of a dataset from its [`scene_file`], on the threads of the scene file.
@@ -244,7 +244,7 @@ fn labelled(
         nir: Vec::new(),
         semantics: labels.tags.iter().map(|t| t.class as u8).collect(),
         // At most 255 species, checked when the dataset is planned.
-        species: labels.tags.iter().map(|t| kind(t.plant) as u8).collect(),
+        species: labels.tags.iter().map(|t| kind(t.plant).to_u8()).collect(),
         parts: if recipe.rendering()?.parts { annotate::part_numbers(&labels, &field.kinds) } else { Vec::new() },
         plants: labels.tags.iter().map(|t| t.plant).collect(),
         leaves: labels.tags.iter().map(|t| t.leaf).collect(),
@@ -281,7 +281,7 @@ fn taken(recipe: &Recipe, field: &furrow_field::Field) -> CaptureRecord {
     CaptureRecord {
         field: field.index,
         day: field.day,
-        frame: place.unwrap_or(0) as u32 * frames + frame,
+        frame: place.unwrap_or(0).to_u32() * frames + frame,
         camera: name.clone(),
         time_s: time_s + f64::from(later) * SECONDS_A_DAY,
     }

@@ -11,6 +11,7 @@ use crate::model::recipe::compact;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::set::{Set, in_parallel};
 use furrow_base::input::below;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -135,17 +136,17 @@ impl Status {
         // Shards beyond the number of images are empty; without the limit a huge number would exhaust memory.
         let mut all: Vec<ShardStatus> = (0..of.min(set.recipe.count.max(1))).map(ShardStatus::empty).collect();
         for (index, done) in (0..).zip(&there) {
-            if let Some(shard) = all.get_mut(shard_of(index) as usize) {
+            if let Some(shard) = all.get_mut(shard_of(index).to_usize()) {
                 shard.images += 1;
                 shard.done += u64::from(*done);
             }
         }
         for shard in &mut all {
-            shard.failed = failures.iter().filter(|failure| failure.shard == shard.number).count() as u64;
+            shard.failed = failures.iter().filter(|failure| failure.shard == shard.number).count().to_u64();
             let own = runs.iter().filter(|run| run.shard == Some((shard.number, of)));
             shard.follow(own.max_by(|a, b| a.last.total_cmp(&b.last)), now);
         }
-        let done = there.iter().filter(|done| **done).count() as u64;
+        let done = there.iter().filter(|done| **done).count().to_u64();
         let (working, images_per_hour) = rate(&runs, now);
         let left = |done: u64, rate: Option<f64>| left(set.recipe.count - done, rate);
         let lacking = || all.iter().filter(|shard| shard.done < shard.images);
@@ -242,7 +243,7 @@ impl<'a> Run<'a> {
         let done = self.images.iter().filter_map(|image| image.done_s).fold(0.0, f64::max);
         match self.began {
             Some(began) => done - began,
-            None => self.images.iter().map(|image| image.seconds / image.at_once.max(1) as f64).sum(),
+            None => self.images.iter().map(|image| image.seconds / image.at_once.max(1).to_f64()).sum(),
         }
     }
 
@@ -265,12 +266,12 @@ impl<'a> Run<'a> {
 }
 
 fn per_hour(images: usize, seconds: f64) -> Option<f64> {
-    (images > 0 && seconds > 0.0).then(|| 3600.0 * images as f64 / seconds)
+    (images > 0 && seconds > 0.0).then(|| 3600.0 * images.to_f64() / seconds)
 }
 
 /// Returns the seconds for `images` images at a rate per hour.
 fn left(images: u64, per_hour: Option<f64>) -> Option<f64> {
-    if images == 0 { Some(0.0) } else { per_hour.map(|rate| 3600.0 * images as f64 / rate) }
+    if images == 0 { Some(0.0) } else { per_hour.map(|rate| 3600.0 * images.to_f64() / rate) }
 }
 
 /// Returns the number of working runs and their images per hour together; if none is working, the mean rate of a single

@@ -4,6 +4,7 @@
 //! constructions, the rest to the number of images. Several images are in progress at the same time; therefore
 //! remaining time = elapsed time × remaining work / completed work.
 
+use furrow_base::math::ToFloat;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -62,7 +63,8 @@ impl Run {
         if self.done == 0 || self.work_s <= 0.0 {
             return None;
         }
-        let all = |work_s: f64, done: usize, of: usize| work_s * of.saturating_sub(done) as f64 / done.max(1) as f64;
+        let all =
+            |work_s: f64, done: usize, of: usize| work_s * of.saturating_sub(done).to_f64() / done.max(1).to_f64();
         let images = all(self.work_s - self.grow_s, self.done, self.images);
         let growings = all(self.grow_s, self.grown, self.growings);
         Some(elapsed_s * (images + growings) / self.work_s)

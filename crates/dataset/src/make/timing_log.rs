@@ -7,6 +7,7 @@
 
 use crate::make::render::Times;
 use furrow_base::input::refuse_links;
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
@@ -127,7 +128,7 @@ pub enum End {
 /// Returns the current time in seconds since 1970, to a millisecond.
 pub fn now() -> f64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    since.as_millis() as f64 / 1000.0
+    since.as_millis().to_f64() / 1000.0
 }
 
 /// The timing log of a run; its file is created with the first row.

@@ -3,7 +3,7 @@
 use crate::model::record::{ClassShare, Keypoint, Leaf, Plant, PointState, Seen};
 use crate::model::rle::{Box2, Rle};
 use crate::model::sample::{IGNORE, Sample};
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3};
 use furrow_field::PartKind;
 use furrow_optics::sensor::Camera;
 use furrow_render::render::LabelMap;
@@ -20,16 +20,16 @@ fn count(width: u32, plants: &[u32], leaves: &[u16]) -> PixelCounts {
     let mut from = 0;
     while from < plants.len() {
         let key = (plants[from], leaves[from]);
-        let (x, y) = (from as u32 % width, from as u32 / width);
-        let row_end = (y as usize + 1) * width as usize;
+        let (x, y) = (from.to_u32() % width, from.to_u32() / width);
+        let row_end = (y.to_usize() + 1) * width.to_usize();
         let mut to = from + 1;
         while to < row_end && (plants[to], leaves[to]) == key {
             to += 1;
         }
-        let last = x + (to - from) as u32 - 1;
+        let last = x + (to - from).to_u32() - 1;
         let mut add = |key| {
             let (pixels, bounds) = all.entry(key).or_insert((0, Box2::of(x, y)));
-            *pixels += (to - from) as u32;
+            *pixels += (to - from).to_u32();
             bounds.add(x, y);
             bounds.add(last, y);
         };
@@ -52,7 +52,7 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
     let (width, height) = sample.size();
     let (plants, leaves) = (&sample.plants, &sample.leaves);
     let counted = count(width, plants, leaves);
-    let at = |x: u32, y: u32| (y * width + x) as usize;
+    let at = |x: u32, y: u32| (y * width + x).to_usize();
     let seen = |(plant, leaf): (u32, u16), (pixels, bounds): (u32, Box2)| {
         let inside = |x: u32, y: u32| plants[at(x, y)] == plant && (leaf == 0 || leaves[at(x, y)] == leaf);
         let mask = Some(Rle::encode(width, height, bounds, inside));
@@ -91,7 +91,7 @@ pub fn plants(sample: &Sample) -> Vec<Plant> {
 
 /// Returns the part number of each pixel, 0 where nothing is visible.
 pub fn part_numbers(labels: &LabelMap, kinds: &[PartKind]) -> Vec<u8> {
-    let number = |part: &u32| kinds.get(*part as usize).map_or(0, |kind| kind.number());
+    let number = |part: &u32| kinds.get(part.to_usize()).map_or(0, |kind| kind.number());
     labels.parts.iter().map(number).collect()
 }
 
@@ -112,7 +112,7 @@ pub fn classes(sample: &Sample) -> (Vec<ClassShare>, u64) {
     }
     let covered = |class: Class| {
         let sum: u64 = sample.coverage.iter().map(|c| u64::from(c[class as usize])).sum();
-        (!sample.coverage.is_empty()).then(|| sum as f64 / 255.0)
+        (!sample.coverage.is_empty()).then(|| sum.to_f64() / 255.0)
     };
     let shares = Class::ALL.map(|class| ClassShare { class, pixels: pixels[class as usize], covered: covered(class) });
     (shares.to_vec(), ignored)
@@ -128,11 +128,11 @@ const NEAR: i64 = 1;
 pub fn keypoint(camera: &Camera, point: Vec3, owns: impl Fn(usize) -> bool) -> Option<Keypoint> {
     let at = camera.project(point)?;
     let (w, h) = (i64::from(camera.width()), i64::from(camera.height()));
-    let (column, row) = (at.x.floor() as i64, at.y.floor() as i64);
+    let (column, row) = (at.x.floor_to::<i64>(), at.y.floor_to::<i64>());
     let state = if camera.contains(at) {
         let near = (row - NEAR..=row + NEAR).flat_map(|y| (column - NEAR..=column + NEAR).map(move |x| (x, y)));
         let seen =
-            near.filter(|(x, y)| (0..w).contains(x) && (0..h).contains(y)).any(|(x, y)| owns((y * w + x) as usize));
+            near.filter(|(x, y)| (0..w).contains(x) && (0..h).contains(y)).any(|(x, y)| owns((y * w + x).to_usize()));
         if seen { PointState::Visible } else { PointState::Hidden }
     } else {
         PointState::Outside
@@ -144,12 +144,12 @@ pub fn keypoint(camera: &Camera, point: Vec3, owns: impl Fn(usize) -> bool) -> O
 /// those with the largest fractional parts.
 pub fn of_255(shares: [f32; 3]) -> [u8; 3] {
     let exact = shares.map(|s| s.clamp(0.0, 1.0) * 255.0);
-    let mut whole = exact.map(|s| s as u8);
+    let mut whole = exact.map(RoundTo::trunc_to::<u8>);
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| (exact[*b] - exact[*b].floor()).total_cmp(&(exact[*a] - exact[*a].floor())));
     let missing = 255 - whole.iter().map(|n| i32::from(*n)).sum::<i32>();
     for k in 0..missing.max(0) {
-        whole[order[k as usize % 3]] += 1;
+        whole[order[k.to_usize() % 3]] += 1;
     }
     whole
 }

@@ -13,6 +13,7 @@
 //! A pixel that no class claims has no label; neither has one that the class `ignore` claims.
 
 use crate::model::sample::IGNORE;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_field::PartKind;
 use furrow_field::record::SpeciesRecord;
@@ -157,7 +158,7 @@ impl Classes {
         for (i, class) in self.counted().iter().enumerate() {
             let color = match place(class).filter(|p| !std::mem::replace(&mut taken[*p], true)) {
                 Some(place) => known[place],
-                None => hue(i as f32 * 0.618_034),
+                None => hue(i.to_f32() * 0.618_034),
             };
             colors.push(color);
         }
@@ -202,7 +203,7 @@ impl Classes {
         }
         let place = |claims: &dyn Fn(&str) -> bool| {
             let place = self.0.iter().position(|class| class.labels.iter().any(|label| claims(label)))?;
-            Some(if place < self.len() { place as u8 } else { IGNORE })
+            Some(if place < self.len() { place.to_u8() } else { IGNORE })
         };
         let of_species = |names: &[&str; 2]| place(&|label| names.iter().any(|name| name.eq_ignore_ascii_case(label)));
         let mut parts = Vec::new();
@@ -253,7 +254,7 @@ fn unknown(label: &str, species: &[SpeciesRecord], models: &[String]) -> Error {
 fn hue(turns: f32) -> [u8; 3] {
     let channel = |shift: f32| {
         let t = ((turns + shift).rem_euclid(1.0) * 6.0 - 3.0).abs() - 1.0;
-        (t.clamp(0.0, 1.0) * 200.0 + 55.0) as u8
+        (t.clamp(0.0, 1.0) * 200.0 + 55.0).trunc_to::<u8>()
     };
     [channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)]
 }

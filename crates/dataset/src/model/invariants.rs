@@ -4,6 +4,7 @@ use crate::model::annotate;
 use crate::model::recipe::{ImageOrigin, Recipe};
 use crate::model::record::{Leaf, Plant, Seen};
 use crate::model::sample::{IGNORE, Sample};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
 use std::collections::BTreeMap;
@@ -118,7 +119,7 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     let recorded = record.capture.as_ref().map(|capture| (capture.field, capture.time_s.is_finite()));
     let frames = record.capture.as_ref().is_none_or(|recorded| u64::from(recorded.frame) <= capture);
     let day = record.capture.as_ref().and_then(|capture| capture.day);
-    let of_day = recipe.days().get((capture / recipe.captures_a_day()) as usize).copied();
+    let of_day = recipe.days().get((capture / recipe.captures_a_day()).to_usize()).copied();
     if recorded != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
         all.push("its field, frame or day does not match its number".into());
     }
@@ -204,7 +205,7 @@ fn shares(sample: &Sample, spp: u32) -> Vec<String> {
     }
     let decided = |c: &[u8; 3]| (0_u8..3).find(|k| c[usize::from(*k)] >= DECIDED);
     let edges = edges(sample);
-    let of_edges = edges.iter().filter(|edge| **edge).count() as f64;
+    let of_edges = edges.iter().filter(|edge| **edge).count().to_f64();
     let (mut asked, mut on_edges, mut other) = (0_u64, 0_u64, 0_u64);
     for (at, (share, label)) in sample.coverage.iter().zip(&sample.semantics).enumerate() {
         if let Some(class) = decided(share) {
@@ -213,11 +214,11 @@ fn shares(sample: &Sample, spp: u32) -> Vec<String> {
             other += u64::from(class != *label);
         }
     }
-    let missed = 0.5_f64.powi(spp.min(64) as i32);
-    let allowed = (THIN + FEW * missed) * asked as f64;
-    let allowed_on_edges = (THIN_ON_EDGES * on_edges as f64).max(by_chance(spp) * of_edges);
+    let missed = 0.5_f64.powi(spp.min(64).to_i32());
+    let allowed = (THIN + FEW * missed) * asked.to_f64();
+    let allowed_on_edges = (THIN_ON_EDGES * on_edges.to_f64()).max(by_chance(spp) * of_edges);
     // If few pixels are decided, the allowed fraction can be less than one pixel.
-    if other as f64 > allowed.max(allowed_on_edges).max(ALWAYS_ALLOWED) {
+    if other.to_f64() > allowed.max(allowed_on_edges).max(ALWAYS_ALLOWED) {
         all.push(format!("{other} of {asked} pixels are of one class by their samples and of another by their centre"));
     }
     all
@@ -234,7 +235,7 @@ fn by_chance(spp: u32) -> f64 {
 
 /// Returns for each pixel whether the label of a horizontal or vertical neighbour differs.
 fn edges(sample: &Sample) -> Vec<bool> {
-    let (width, labels) = (sample.size().0 as usize, &sample.semantics);
+    let (width, labels) = (sample.size().0.to_usize(), &sample.semantics);
     let mut edges = vec![false; labels.len()];
     for at in 0..labels.len() {
         let beside = ((at + 1) % width > 0).then_some(at + 1);

@@ -155,6 +155,7 @@ const STEPS: f32 = 128.0;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
 
     /// Expected: options of earlier versions keep their meaning; naming a label map omits those that are not named.
     #[test]
@@ -178,7 +179,7 @@ mod tests {
     /// step, and maps that are not kept are empty.
     #[test]
     fn precision_is_as_promised() {
-        let depth: Vec<f32> = (1..2000).map(|i| 0.3 + i as f32 * 0.0137).chain([f32::INFINITY]).collect();
+        let depth: Vec<f32> = (1..2000).map(|i| 0.3 + i.to_f32() * 0.0137).chain([f32::INFINITY]).collect();
         for (exact, kept) in depth.iter().zip(depths(&OptionalMap::USUAL, &depth)) {
             assert!(*exact == kept || (exact / kept - 1.0).abs() <= 1.0 / 2048.0, "{exact} {kept}");
         }

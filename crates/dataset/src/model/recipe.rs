@@ -10,6 +10,7 @@ use crate::model::optional_maps::{OmittableMap, OptionalMap};
 use crate::model::photo::Photo;
 use crate::model::split::{Shares, Split};
 use furrow_base::input::{Scope, below};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::{self, Edit};
 use furrow_field::record::SpeciesRecord;
@@ -246,7 +247,7 @@ impl Recipe {
 
     /// Returns the number of images of each field per day.
     pub fn captures_a_day(&self) -> u64 {
-        (self.captures() / self.days().len().max(1) as u64).max(1)
+        (self.captures() / self.days().len().max(1).to_u64()).max(1)
     }
 
     /// Returns the days on which images are taken; empty if fields have no days.

@@ -6,6 +6,7 @@
 //!
 //! It is implemented here because no maintained crate writes this packing, and its bytes must not change.
 
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +103,7 @@ impl Rle {
 
     /// Returns one value per pixel, row by row from the top.
     pub fn decode(&self) -> Result<Vec<bool>> {
-        let [height, width] = self.size.map(|n| n as usize);
+        let [height, width] = self.size.map(ToInt::to_usize);
         let mut mask = vec![false; width * height];
         self.pixels()?.for_each(|pixel| mask[pixel] = true);
         Ok(mask)
@@ -110,11 +111,11 @@ impl Rle {
 
     /// Returns the indices of the pixels inside the mask, counted row by row from the top.
     pub fn pixels(&self) -> Result<impl Iterator<Item = usize>> {
-        let [height, width] = self.size.map(|n| n as usize);
+        let [height, width] = self.size.map(ToInt::to_usize);
         let mut at = 0;
         let inside = self.runs()?.into_iter().enumerate().flat_map(move |(i, run)| {
             let from = at;
-            at += run as usize;
+            at += run.to_usize();
             // Runs go down the columns; the first one is outside the mask.
             (if i % 2 == 1 { from..at } else { at..at }).map(move |k| k % height * width + k / height)
         });
@@ -129,9 +130,9 @@ impl Rle {
 fn pack(runs: &[u64]) -> String {
     let mut text = String::new();
     for (i, run) in runs.iter().enumerate() {
-        let mut x = *run as i64 - if i > 2 { runs[i - 2] as i64 } else { 0 };
+        let mut x = run.to_i64() - if i > 2 { runs[i - 2].to_i64() } else { 0 };
         loop {
-            let group = (x & 0x1f) as u8;
+            let group = (x & 0x1f).to_u8();
             x >>= 5;
             let more = if group & 0x10 == 0 { x != 0 } else { x != -1 };
             text.push(char::from(48 + group + if more { 0x20 } else { 0 }));
@@ -161,7 +162,7 @@ fn unpack(text: &str) -> Option<Vec<u64>> {
             byte = bytes.next()?;
         }
         let before = if runs.len() > 2 { runs[runs.len() - 2] } else { 0 };
-        runs.push(u64::try_from(x.checked_add(before as i64)?).ok()?);
+        runs.push(u64::try_from(x.checked_add(before.to_i64())?).ok()?);
     }
     Some(runs)
 }
@@ -169,12 +170,13 @@ fn unpack(text: &str) -> Option<Vec<u64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
     use proptest::prelude::*;
 
     fn bounds(width: u32, mask: &[bool]) -> Option<Box2> {
         let mut all: Option<Box2> = None;
         for (i, _) in mask.iter().enumerate().filter(|(_, m)| **m) {
-            let (x, y) = (i as u32 % width, i as u32 / width);
+            let (x, y) = (i.to_u32() % width, i.to_u32() / width);
             all.get_or_insert(Box2::of(x, y)).add(x, y);
         }
         all
@@ -186,12 +188,12 @@ mod tests {
             let mut bits = seed;
             let mask: Vec<bool> = (0..width * height).map(|_| {
                 bits = bits.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                ((bits >> 40) as f64 / (1_u64 << 24) as f64) < share
+                ((bits >> 40).to_f64() / (1_u64 << 24).to_f64()) < share
             }).collect();
             if let Some(bounds) = bounds(width, &mask) {
-                let rle = Rle::encode(width, height, bounds, |x, y| mask[(y * width + x) as usize]);
+                let rle = Rle::encode(width, height, bounds, |x, y| mask[(y * width + x).to_usize()]);
                 prop_assert_eq!(rle.decode().unwrap(), mask.clone());
-                prop_assert_eq!(rle.area().unwrap(), mask.iter().filter(|m| **m).count() as u64);
+                prop_assert_eq!(rle.area().unwrap(), mask.iter().filter(|m| **m).count().to_u64());
             }
         }
 

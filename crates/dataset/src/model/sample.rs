@@ -2,6 +2,7 @@
 
 use crate::model::photo::Jpegs;
 use crate::model::record::Record;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
@@ -94,7 +95,7 @@ impl Sample {
 
     /// Returns the number of pixels.
     pub fn pixels(&self) -> usize {
-        self.record.width as usize * self.record.height as usize
+        self.record.width.to_usize() * self.record.height.to_usize()
     }
 
     /// Returns a leaf number for each pixel that is unique in the image, 0 for none. Leaves are numbered in the order
@@ -104,7 +105,7 @@ impl Sample {
             .record
             .leaves()
             .enumerate()
-            .map(|(i, (plant, leaf))| ((plant.number, leaf.number), i as u32 + 1))
+            .map(|(i, (plant, leaf))| ((plant.number, leaf.number), i.to_u32() + 1))
             .collect();
         let of = |(plant, leaf): (&u32, &u16)| numbers.get(&(*plant, *leaf)).copied().unwrap_or(0);
         self.plants.iter().zip(&self.leaves).map(of).collect()

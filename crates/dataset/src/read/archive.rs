@@ -1,6 +1,7 @@
 //! Image files in tar archives, with names that the package `webdataset` groups by image: the file
 //! `images/000123/rgb.png` of the dataset is the member `000123.rgb.png`, with the key `000123`.
 
+use furrow_base::math::ToInt;
 use std::io::{self, Write};
 
 /// Block size of tar archives, bytes. A file starts with a header of one block, and its contents are padded to whole
@@ -9,7 +10,7 @@ pub(crate) const BLOCK: u64 = 512;
 
 /// Adds a file of an image to an archive; `path` is relative to the dataset's folder.
 pub(crate) fn append(archive: &mut tar::Builder<impl Write>, path: &str, bytes: &[u8]) -> io::Result<()> {
-    archive.append(&header(path, bytes.len() as u64)?, bytes)
+    archive.append(&header(path, bytes.len().to_u64())?, bytes)
 }
 
 /// Returns the name of an image's file in an archive.

@@ -1,5 +1,6 @@
 //! Checksum of a file: its length and its SHA-256.
 
+use furrow_base::math::ToInt;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io;
@@ -17,7 +18,7 @@ pub struct Checksum {
 impl Checksum {
     /// Returns the checksum of the contents of a file.
     pub fn of(bytes: &[u8]) -> Self {
-        Self { sha256: hex::encode(Sha256::digest(bytes)), bytes: bytes.len() as u64 }
+        Self { sha256: hex::encode(Sha256::digest(bytes)), bytes: bytes.len().to_u64() }
     }
 
     /// Returns the checksum of a file. The file is read in pieces, since an archive may be larger than memory.

@@ -5,6 +5,7 @@
 //! restored exactly.
 
 use crate::model::record::{Record, Seen};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 
 /// Returns the plant number of each pixel, 0 for none.
@@ -27,13 +28,13 @@ pub(crate) fn species(record: &Record) -> Result<Vec<u8>> {
     if record.seen().any(|plant| plant.kind > u8::MAX.into()) {
         return Err(Error::damaged("a plant has a species number above 255"));
     }
-    painted(record, record.seen().map(|plant| (&plant.seen, plant.kind as u8)))
+    painted(record, record.seen().map(|plant| (&plant.seen, plant.kind.to_u8())))
 }
 
 /// Returns a map with the number of each plant or leaf in the pixels of its mask, row by row from the top. An error if
 /// masks overlap, or if their size or number of pixels differs from the record.
 fn painted<'a, T: Copy + Default>(record: &'a Record, things: impl Iterator<Item = (&'a Seen, T)>) -> Result<Vec<T>> {
-    let all = record.width as usize * record.height as usize;
+    let all = record.width.to_usize() * record.height.to_usize();
     let (mut map, mut taken) = (vec![T::default(); all], vec![false; all]);
     for (seen, number) in things {
         let mask = seen.mask.as_ref().filter(|mask| mask.size == [record.height, record.width]);

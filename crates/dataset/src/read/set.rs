@@ -14,6 +14,7 @@ use crate::read::packs::Packing;
 use crate::read::packs::record::Packs;
 use furrow_base::error::Kind;
 use furrow_base::input::below;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::stream_atomically;
 use rayon::prelude::*;
@@ -265,7 +266,7 @@ impl Write for Stream<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let n = self.file.write(bytes)?;
         self.hash.update(&bytes[..n]);
-        self.bytes += n as u64;
+        self.bytes += n.to_u64();
         Ok(n)
     }
 

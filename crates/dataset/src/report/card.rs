@@ -6,6 +6,7 @@ use crate::model::image_files::belongs;
 use crate::model::photo::Photo;
 use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::split::Split;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_render::scene::tag::Class;
 use furrow_render::settings::Engine;
 use furrow_report::{count, keyed, legend, list, pairs, percent, whole};
@@ -92,11 +93,11 @@ pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> 
             thead { tr { th { "split" } th { "images" } th { "share" } } }
             tbody {
                 @for (split, names) in Split::ALL.into_iter().zip(names) {
-                    @let n = names.len() as u64;
+                    @let n = names.len().to_u64();
                     tr {
                         th { (split.name()) }
                         td { (keyed(&format!("split.{}", split.name()), n, &whole(n))) }
-                        td { (percent(n as f64 / images.max(1) as f64)) }
+                        td { (percent(n.to_f64() / images.max(1).to_f64())) }
                     }
                 }
             }
@@ -108,7 +109,7 @@ pub(super) fn splits(recipe: &Recipe, names: &[Vec<String>; 3], images: u64) -> 
 /// Returns the table of species with the numbers of visible plants and pixels.
 pub(super) fn species(recipe: &Recipe, found: &Statistics) -> Markup {
     let of = |(k, one): (usize, &'_ furrow_field::record::SpeciesRecord)| {
-        (k as u16 + 1, one.name.clone(), one.eppo.clone(), one.class.name())
+        (k.to_u16() + 1, one.name.clone(), one.eppo.clone(), one.class.name())
     };
     let mut rows: Vec<(u16, String, String, &str)> = recipe.species.iter().enumerate().map(of).collect();
     if found.species.contains_key(&0) {
@@ -136,7 +137,7 @@ pub(super) fn species(recipe: &Recipe, found: &Statistics) -> Markup {
                             td { (class) }
                             td { (keyed(&format!("species.{kind}.plants"), of.plants, &whole(of.plants))) }
                             td { (keyed(&format!("species.{kind}.images"), of.images, &whole(of.images))) }
-                            td { (percent(of.pixels as f64 / all.max(1) as f64)) }
+                            td { (percent(of.pixels.to_f64() / all.max(1).to_f64())) }
                             td { (stages(of)) }
                         }
                     }
@@ -294,7 +295,7 @@ pub(super) fn pixels(found: &Statistics) -> Markup {
     if found.ignored > 0 {
         parts.push(("no label", found.ignored));
     }
-    let share = |n: u64| n as f64 / all.max(1) as f64;
+    let share = |n: u64| n.to_f64() / all.max(1).to_f64();
     let class = |name: &str| Class::named(name).map_or("none", Class::name);
     let entry = |(name, n): &(&str, u64)| {
         let value = keyed(&format!("pixels.{}", class(name)), n, &percent(share(*n)));

@@ -7,6 +7,7 @@ use crate::model::sample::{IGNORE, Sample};
 use crate::model::split::Split;
 use crate::read::native;
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_field::record::SpeciesRecord;
 use furrow_output::ImageData;
 use furrow_render::scene::tag::Class;
@@ -65,7 +66,7 @@ impl ImageProperties {
     fn of(record: &Record, table: &[SpeciesRecord]) -> Self {
         let pixels = f64::from(record.width) * f64::from(record.height);
         let share = |class: Class| {
-            100.0 * record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels
+            100.0 * record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels).to_f64() / pixels
         };
         let crops = record.seen().filter(|p| p.class == Class::Crop);
         let stage = crops.filter_map(|p| Some(p.grown.as_ref()?.bbch)).max();
@@ -87,7 +88,7 @@ fn unusual(properties: &[ImageProperties]) -> Vec<f64> {
     let mut far = vec![0.0_f64; properties.len()];
     for k in 0..3 {
         let known = || properties.iter().map(|f| f.values()[k]).filter(|v| v.is_finite());
-        let n = known().count().max(1) as f64;
+        let n = known().count().max(1).to_f64();
         let mean = known().sum::<f64>() / n;
         let sd = (known().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();
         for (far, properties) in far.iter_mut().zip(properties) {
@@ -180,12 +181,13 @@ fn rounded(value: f64) -> String {
 /// Returns the caption of an image: its numbers of plants, or the fractions of the classes if plants are not labelled.
 fn words(record: &Record) -> String {
     let pixels = f64::from(record.width) * f64::from(record.height);
-    let share = |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels) as f64 / pixels;
+    let share =
+        |class: Class| record.classes.iter().find(|c| c.class == class).map_or(0, |c| c.pixels).to_f64() / pixels;
     let (crop, weed) = (share(Class::Crop), share(Class::Weed));
     if record.plants.is_empty() && crop + weed > 0.0 {
         return format!("crop {}, weed {}", percent(crop), percent(weed));
     }
-    let of = |class: Class| record.seen().filter(|p| p.class == class).count() as u64;
+    let of = |class: Class| record.seen().filter(|p| p.class == class).count().to_u64();
     let stages: Vec<u32> =
         record.seen().filter(|p| p.class == Class::Crop).filter_map(|p| Some(p.grown.as_ref()?.bbch)).collect();
     let stage = match (stages.iter().min(), stages.iter().max()) {
@@ -207,10 +209,10 @@ fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
     // Index of the full-size pixel at the centre of a small pixel.
     let of = |x: u32, y: u32| {
         let at = |k: u32, small: u32, large: u32| (2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small));
-        (at(y, h, height) * u64::from(width) + at(x, w, width)) as usize
+        (at(y, h, height) * u64::from(width) + at(x, w, width)).to_usize()
     };
     let who = |x: u32, y: u32| (sample.semantics[of(x, y)], sample.plants[of(x, y)]);
-    let mut out = Vec::with_capacity(w as usize * h as usize);
+    let mut out = Vec::with_capacity(w.to_usize() * h.to_usize());
     for y in 0..h {
         for x in 0..w {
             let here = who(x, y);
@@ -228,7 +230,7 @@ fn overlay(sample: &Sample, w: u32, h: u32) -> Vec<[u8; 4]> {
 fn tint((class, plant): (u8, u32), edge: bool) -> [u8; 4] {
     const CROP: [[u8; 3]; 3] = [[40, 200, 80], [20, 160, 120], [130, 210, 50]];
     const WEED: [[u8; 3]; 3] = [[235, 60, 50], [215, 50, 120], [250, 125, 40]];
-    let shade = (plant % 3) as usize;
+    let shade = (plant % 3).to_usize();
     let color = match class {
         c if c == Class::Crop as u8 => CROP[shade],
         c if c == Class::Weed as u8 => WEED[shade],

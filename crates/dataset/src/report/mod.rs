@@ -21,6 +21,7 @@ mod tests;
 use crate::model::split::Split;
 use crate::read::set::{Set, SetWriter};
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_report::chart::{self, Series, grid, histograms};
 use furrow_report::{Number, Page, Tally, numbers, section, whole};
 use maud::{Markup, html};
@@ -96,7 +97,7 @@ fn figures(found: &Statistics) -> Markup {
 
 /// Returns the total number of plants in all images, by class.
 fn sums(plants: &Pair) -> [u64; 2] {
-    plants.each_ref().map(|tally| (tally.mean() * tally.n() as f64).round() as u64)
+    plants.each_ref().map(|tally| (tally.mean() * tally.n().to_f64()).round_to::<u64>())
 }
 
 /// Returns a chart with a row for crop and a row for weed.
@@ -144,7 +145,7 @@ fn light(found: &Statistics) -> [Markup; 6] {
     let light = &found.light;
     let all: u64 = light.kinds.values().sum();
     let kinds: Vec<(String, &str, f64)> =
-        light.kinds.iter().map(|(kind, n)| (kind.clone(), "light", *n as f64 / all.max(1) as f64)).collect();
+        light.kinds.iter().map(|(kind, n)| (kind.clone(), "light", n.to_f64() / all.max(1).to_f64())).collect();
     [
         chart::suns(&light.suns),
         one("sun_elevation_deg", "Elevation of the sun", "degrees; images", "light", &light.elevation_deg),

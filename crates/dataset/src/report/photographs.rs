@@ -3,6 +3,7 @@
 use crate::Set;
 use crate::read::native;
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_report::Tally;
 use rayon::prelude::*;
 
@@ -32,7 +33,7 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
     let measured = count.min(MOST);
     // Indices of the measured images, spread evenly.
     let places: Vec<u64> =
-        (0..measured).map(|k| (u128::from(k) * u128::from(count) / u128::from(measured)) as u64).collect();
+        (0..measured).map(|k| (u128::from(k) * u128::from(count) / u128::from(measured)).to_u64()).collect();
     let all: Vec<Means> = places.par_iter().map(|k| means(set, &Set::name(*k))).collect::<Result<_>>()?;
     let mut found = Photographs {
         measured,
@@ -47,7 +48,7 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
         if let Some(nir) = nir {
             found.nir.add(*nir);
         }
-        found.colors.push(rgb.map(|x| x.round() as u8));
+        found.colors.push(rgb.map(RoundTo::round_to::<u8>));
     }
     found.colors.sort_by_key(|c| (c.iter().map(|x| u32::from(*x)).sum::<u32>(), *c));
     Ok(found)
@@ -56,7 +57,7 @@ pub(super) fn measure(set: &Set) -> Result<Photographs> {
 fn means(set: &Set, name: &str) -> Result<Means> {
     let image = native::Image::of(set, name);
     let (_, _, rgb) = image.photograph()?;
-    let n = rgb.len().max(1) as f64;
+    let n = rgb.len().max(1).to_f64();
     let mut sums = [0_u64; 3];
     let mut clipped = 0_u64;
     for pixel in &rgb {
@@ -65,7 +66,7 @@ fn means(set: &Set, name: &str) -> Result<Means> {
         }
         clipped += u64::from(pixel.contains(&255));
     }
-    let mean = |gray: &[u8]| gray.iter().map(|x| u64::from(*x)).sum::<u64>() as f64 / n;
+    let mean = |gray: &[u8]| gray.iter().map(|x| u64::from(*x)).sum::<u64>().to_f64() / n;
     let nir = image.band("nir")?.map(|file| mean(&file.values));
-    Ok(Means(sums.map(|s| s as f64 / n), clipped as f64 / n, nir))
+    Ok(Means(sums.map(|s| s.to_f64() / n), clipped.to_f64() / n, nir))
 }

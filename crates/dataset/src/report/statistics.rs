@@ -2,6 +2,7 @@
 //! images.
 
 use crate::model::record::{Plant, Record};
+use furrow_base::math::ToFloat;
 use furrow_grow::soil::SoilRecord;
 use furrow_optics::light::LightRecord;
 use furrow_optics::sensor::CameraRecord;
@@ -157,11 +158,11 @@ impl Statistics {
         for share in &record.classes {
             let class = share.class as usize;
             self.pixels[class] += share.pixels;
-            self.shares[class].add(100.0 * share.pixels as f64 / pixels);
+            self.shares[class].add(100.0 * share.pixels.to_f64() / pixels);
         }
         for (k, class) in PLANTS.into_iter().enumerate() {
             let of_class = || record.plants.iter().filter(|p| p.class == class);
-            self.plants[k].add(of_class().filter(|p| p.seen.pixels > 0).count() as f64);
+            self.plants[k].add(of_class().filter(|p| p.seen.pixels > 0).count().to_f64());
             of_class().for_each(|plant| self.add_plant(k, plant));
         }
         let here: BTreeSet<u16> = record.seen().map(|plant| plant.kind).collect();

@@ -1,5 +1,6 @@
 //! Labels of tools that render label colours with anti-aliasing.
 
+use furrow_base::math::ToInt;
 use furrow_render::film::{Film, Pixel};
 use furrow_render::render::{LabelMap, coverage};
 use furrow_render::scene::tag::{Class, Tag};
@@ -32,7 +33,7 @@ fn nearest(shares: [f32; Class::ALL.len()]) -> Class {
 
 /// Returns the tag of the part of `class` that most samples of a pixel hit; the first of several, and the default tag for soil.
 fn most_met(pixel: &Pixel, tags: &[Tag], class: Class) -> Tag {
-    let of = |part: u32| tags.get(part as usize).copied().filter(|tag| tag.class == class && class != Class::Soil);
+    let of = |part: u32| tags.get(part.to_usize()).copied().filter(|tag| tag.class == class && class != Class::Soil);
     let met = pixel.tally.iter().filter_map(|(part, count)| Some((count, Reverse(part), of(part)?)));
     met.max_by_key(|(count, part, _)| (*count, *part)).map(|(.., tag)| tag).unwrap_or_default()
 }

@@ -1,6 +1,6 @@
 //! Edits of the camera, the sensor and the image.
 
-use furrow_base::math::Spectrum;
+use furrow_base::math::{RoundTo, Spectrum};
 use furrow_optics::sensor::{Camera, MatrixDesc, MosaicDesc, Motion, Photograph, PsfDesc, SensorDesc};
 use furrow_render::film::{Filter, Footprint};
 
@@ -14,9 +14,9 @@ pub(super) fn sharp(camera: &mut Camera, filter: &mut Footprint) {
 pub(super) fn gray_nir(photograph: &mut Photograph) {
     let gray = |rgb: [f32; 3]| Spectrum::new(rgb[0], rgb[1], rgb[2], 0.0).luminance().round();
     let pixels = photograph.rgb.as_chunks::<3>().0.iter();
-    photograph.nir = pixels.map(|rgb| gray(rgb.map(f32::from)) as u8).collect();
+    photograph.nir = pixels.map(|rgb| gray(rgb.map(f32::from)).trunc_to::<u8>()).collect();
     if let Some(deep) = &mut photograph.deep {
-        deep.nir = deep.rgb.as_chunks::<3>().0.iter().map(|rgb| gray(rgb.map(f32::from)) as u16).collect();
+        deep.nir = deep.rgb.as_chunks::<3>().0.iter().map(|rgb| gray(rgb.map(f32::from)).trunc_to::<u16>()).collect();
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::estimate::gib;
 use furrow_base::geometry::Cost;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::MOST_PLANTS;
@@ -57,9 +58,9 @@ impl<'a> Census<'a> {
     /// Creates a census for a field that may take `memory` bytes. `culled` states that positions outside the view are left out.
     pub(super) fn new(page: &'a RonFile, culled: bool, memory: u64) -> Self {
         // A plant takes at least the memory of one part.
-        let fit = (memory as f64 / Cost::of(0.0, 1.0).bytes) as u64;
-        let most = fit.clamp(FEW, u64::from(MOST_PLANTS)) as usize;
-        let most_places = if culled { MOST_PLACES } else { 2.0 * most as f64 };
+        let fit = (memory.to_f64() / Cost::of(0.0, 1.0).bytes).trunc_to::<u64>();
+        let most = fit.clamp(FEW, u64::from(MOST_PLANTS)).to_usize();
+        let most_places = if culled { MOST_PLACES } else { 2.0 * most.to_f64() };
         Self { page, memory, most, most_places, begun: Vec::new() }
     }
 
@@ -72,7 +73,7 @@ impl<'a> Census<'a> {
         if places <= self.most_places {
             return Ok(());
         }
-        Err(self.refusal(population, places.ceil() + before as f64))
+        Err(self.refusal(population, places.ceil() + before.to_f64()))
     }
 
     /// Returns the index range of each population, given the total number of plants.
@@ -92,7 +93,7 @@ impl<'a> Census<'a> {
             .populations(plants)
             .into_iter()
             .reduce(|most, next| if next.1.len() > most.1.len() { next } else { most });
-        Err(self.refusal(largest.map_or(Population::Placed, |(population, _)| population), plants as f64))
+        Err(self.refusal(largest.map_or(Population::Placed, |(population, _)| population), plants.to_f64()))
     }
 
     fn refusal(&self, population: Population, plants: f64) -> Error {
@@ -100,8 +101,8 @@ impl<'a> Census<'a> {
         let about = format!("about {plants:.3e} plants or places for them");
         let (words, more) = if plants > f64::from(MOST_PLANTS) {
             (format!("{about}: labels can number {MOST_PLANTS}"), "")
-        } else if plants > self.most as f64 {
-            let words = format!("{about}: they would need more memory than the limit, {}", gib(self.memory as f64));
+        } else if plants > self.most.to_f64() {
+            let words = format!("{about}: they would need more memory than the limit, {}", gib(self.memory.to_f64()));
             (words, "; --memory sets the limit, in GiB")
         } else {
             (format!("{about}, most of them outside the view: at most {MOST_PLACES} can be checked"), "")
@@ -142,7 +143,7 @@ mod tests {
             assert!(words.contains("about 1.678e7 plants or places for them: labels can number 16777215"), "{words}");
             assert!(words.contains(place) && error.exit_code() == 2, "{words}");
         }
-        let places = Census::new(&page, false, u64::MAX).open(Population::Crop(0), 3.0 * MANY as f64, 0).unwrap_err();
+        let places = Census::new(&page, false, u64::MAX).open(Population::Crop(0), 3.0 * MANY.to_f64(), 0).unwrap_err();
         assert!(places.to_string().contains("labels can number 16777215"), "{places}");
     }
 

@@ -3,7 +3,7 @@
 use super::grown::GrownOrgan;
 use crate::library::Choice;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Spectrum, Vec2};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec2};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_grow::plant::condition::{Bearer, leaf_stream};
 use furrow_grow::plant::{Condition, ConditionDesc, LeafLife, OrganKind};
@@ -96,10 +96,10 @@ impl<'a> PlantCondition<'a> {
             Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
             _ => vec![Mesh::clone(&grown.part.mesh)],
         };
-        let share = 1.0 / pieces.len().max(1) as f32;
+        let share = 1.0 / pieces.len().max(1).to_f32();
         let mut dressed = Vec::with_capacity(pieces.len());
         for (k, mesh) in pieces.into_iter().enumerate() {
-            let of_piece = stream.child(Purpose::Condition, 100 + k as u64);
+            let of_piece = stream.child(Purpose::Condition, 100 + k.to_u64());
             let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
             let chlorophyll = base * bare.green * green;
             let mut one = GrownOrgan { chlorophyll, material: own.clone(), ..grown.with(mesh) };
@@ -126,7 +126,7 @@ impl<'a> PlantCondition<'a> {
         bare: &HealthyOrgan<'_>,
         stream: &Stream,
     ) -> Marks {
-        let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1) as f32;
+        let middle = mesh.positions.iter().map(|p| p.z).sum::<f32>() / mesh.positions.len().max(1).to_f32();
         let image = mesh.image_size().filter(|_| bare.choice.pictured);
         let met = self.met(leaf, share);
         let bearer = Bearer {

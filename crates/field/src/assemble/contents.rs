@@ -1,6 +1,7 @@
 //! Scene parts under construction, with their materials and kinds.
 
 use crate::PartKind;
+use furrow_base::math::ToInt;
 use furrow_render::material::Material;
 use furrow_render::scene::Part;
 
@@ -17,7 +18,7 @@ impl Contents {
     /// Adds a material and returns its index.
     pub(super) fn material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
-        self.materials.len() as u32 - 1
+        self.materials.len().to_u32() - 1
     }
 
     pub(super) fn push(&mut self, part: Part, kind: PartKind) {
@@ -27,7 +28,7 @@ impl Contents {
 
     /// Inserts the parts of the ground before all others.
     pub(super) fn lay_below(&mut self, ground: &Self) {
-        let first = self.materials.len() as u32;
+        let first = self.materials.len().to_u32();
         let parts = ground.parts.iter().map(|part| Part { material: first + part.material, ..part.clone() });
         self.parts.splice(0..0, parts);
         self.kinds.splice(0..0, ground.kinds.iter().copied());

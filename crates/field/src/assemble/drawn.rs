@@ -11,7 +11,7 @@ use crate::drive::Capture;
 use crate::estimate::usual_memory;
 use crate::layer::Layer;
 use crate::library::Library;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{ToInt, Vec2, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
@@ -78,7 +78,7 @@ impl<'a> Drawn<'a> {
             today.as_ref().map_or_else(|| stream.clone(), |today| today.stream(&stream))
         };
         let (mut lights, mut records) = (Vec::new(), Vec::new());
-        let lists = |place| daily(LIGHTING + place as u64);
+        let lists = |place: usize| daily(LIGHTING + place.to_u64());
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
         if listed.len() > MOST_LIGHTS {
             let fault = Error::input(format!("{} lights: a field may have at most {MOST_LIGHTS}", listed.len()))
@@ -91,7 +91,7 @@ impl<'a> Drawn<'a> {
         }
         for (i, SceneLight { desc: light, at }) in listed.into_iter().enumerate() {
             let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
-            let drawn = light.draw(&mut daily(1 + i as u64), &mut open);
+            let drawn = light.draw(&mut daily(1 + i.to_u64()), &mut open);
             let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
             records.push(record);
             lights.extend(drawn);
@@ -184,7 +184,7 @@ impl<'a> Drawn<'a> {
     /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
     pub(super) fn seed_rows(&self) -> Option<SeedRows> {
         self.sown.clone().next().map(|k| {
-            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k as u64));
+            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k.to_u64()));
             SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
         })
     }

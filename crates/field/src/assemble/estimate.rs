@@ -12,7 +12,7 @@ use crate::estimate::{Estimate, Share};
 use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::geometry::Cost;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, Vec3};
 use furrow_base::ron_file::Step;
 use furrow_grow::plant::most_triangles;
 use furrow_grow::soil::Expected;
@@ -49,7 +49,7 @@ const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &VisibleGround) -> Result<Estimate> {
     let camera = &drawn.camera;
     let pixels = f64::from(camera.width()) * f64::from(camera.height());
-    let film = Cost::work(pixels * (size_of::<Pixel>() as f64 + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
+    let film = Cost::work(pixels * (size_of::<Pixel>().to_f64() + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
     let coarser = if drawn.desc.detail == Detail::Full {
         ", or lower the camera, or set detail: ByPixel"
     } else {
@@ -95,7 +95,7 @@ pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Visible
     for (k, model) in drawn.desc.models.iter().enumerate() {
         let model = library.model(drawn.page, model)?;
         let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
-        let cost = Cost::of(triangles as f64, model.parts.len() as f64);
+        let cost = Cost::of(triangles.to_f64(), model.parts.len().to_f64());
         add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
     }
     shares.extend(pictured(drawn, library)?);
@@ -149,7 +149,7 @@ fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
     let place = PlantSite { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
     let (_, organs) = grow(&healthy, &place, |_| true);
     let organs = organs.unwrap_or_default();
-    (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>() as f64, organs.len() as f64)
+    (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>().to_f64(), organs.len().to_f64())
 }
 
 /// Estimates the cost of `number` plants from the samples `some`. `shared` lists the bank plants of those that are instances.
@@ -157,7 +157,7 @@ fn expected(some: &[CountedPlant], number: usize, shared: &[Member]) -> Cost {
     let (triangles, organs) = some.iter().fold((0.0, 0.0), |(a, b), CountedPlant { size: (t, o), .. }| (a + t, b + o));
     let each = Cost::of(triangles, organs) + Cost::work(0.0, triangles * SECONDS_PER_TRIANGLE);
     let meshes = number - shared.len() + shared.iter().collect::<BTreeSet<_>>().len();
-    let of = some.len().max(1) as f64;
+    let of = some.len().max(1).to_f64();
     let instances = Cost::work(BYTES_PER_INSTANCE + organs / of * BYTES_PER_INSTANCED_ORGAN, SECONDS_PER_INSTANCE);
-    each * (meshes as f64 / of) + instances * shared.len() as f64
+    each * (meshes.to_f64() / of) + instances * shared.len().to_f64()
 }

@@ -3,6 +3,7 @@
 use super::drawn::{Asked, Drawn};
 use super::{Options, Source, ground, lidar, plausibility, sight};
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::{Rows, WeedsRecord};
 use furrow_optics::sensor::CameraRecord;
@@ -52,12 +53,12 @@ impl Source {
 
 fn expected_plants(Asked { drawn, warnings, .. }: Asked<'_>) -> Result<f64> {
     let desc = drawn.desc;
-    let placed = desc.plants.len() as f64;
+    let placed = desc.plants.len().to_f64();
     if drawn.sown.is_empty() && desc.weeds.is_empty() {
         return Ok(placed);
     }
     let crops = drawn.sown.clone().map(|k| {
-        let rows = Rows::draw(&desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k as u64)).record();
+        let rows = Rows::draw(&desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k.to_u64())).record();
         rows.emergence * (1.0 + rows.doubles) / f64::from(rows.spacing_m * rows.in_row_m)
     });
     let weeds = desc

@@ -3,7 +3,7 @@
 use super::record::{Conditions, SpeciesRecord};
 use crate::drive::Capture;
 use crate::{PartKind, PlantRecord};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::sampling::rng::mix;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::sensor::{Lidar, Linear, Photograph, SensorDesc};
@@ -68,7 +68,7 @@ impl Field {
 
     /// Returns the number of the image among all images of the field on all days.
     fn shot(&self) -> u64 {
-        self.day.map_or(0, |day| (1 + u64::from(day)) << 32) + self.capture as u64
+        self.day.map_or(0, |day| (1 + u64::from(day)) << 32) + self.capture.to_u64()
     }
 
     /// Returns the LiDAR at the frame of the current image and the random stream of its scan; `None` if the field was not built for a scan.
@@ -76,7 +76,7 @@ impl Field {
         let frame = self.captures.get(self.capture)?.frame;
         let day = self.day.map_or(0, |day| (1 + u64::from(day)) << 32);
         let stream = Stream::of(self.seed, self.index, Purpose::Lidar, day + u64::from(frame));
-        Some((self.scanners.get(frame as usize)?, stream))
+        Some((self.scanners.get(frame.to_usize())?, stream))
     }
 
     /// Returns the field's provenance, one `key: value` per line: program, hash of the scene files, seed, index.

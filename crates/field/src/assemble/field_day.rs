@@ -6,6 +6,7 @@
 use super::season::growths;
 use crate::desc::{FieldDesc, Growth};
 use crate::library::Library;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::ron_file::{Factor, RonFile, Step, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
@@ -58,15 +59,15 @@ impl FieldDay {
         let crops = sown.map(|k| (&desc.crops[k].species, &desc.crops[k].growth));
         let plants = desc.plants.iter().map(|p| (&p.species, &p.growth));
         let weeds = desc.weeds.iter().map(|w| (&w.species, &w.growth));
-        let middle = |(lo, hi): (f64, f64)| (0.5 * (lo + hi)) as f32;
+        let middle = |(lo, hi): (f64, f64)| (0.5 * (lo + hi)).to_f32();
         let written = match crops.chain(plants).chain(weeds).next().map(|(path, growth)| (path, growth.at(season))) {
             Some((_, Growth::AgeDays(days))) => middle(days.usual()),
             Some((path, Growth::Bbch(code))) => {
                 let species = library.species(page, path)?;
-                plant::age_days(&species.desc.plant, Stage::Bbch(middle(code.usual()).round() as u32))
+                plant::age_days(&species.desc.plant, Stage::Bbch(middle(code.usual()).round_to::<u32>()))
             }
             // The first entry uses `EmergesOn`: ages and stages of the others then refer to the first day.
-            _ => first.unwrap_or(0) as f32,
+            _ => first.unwrap_or(0).to_f32(),
         };
         let days = desc.days.clone().unwrap_or_default();
         Ok(Some(Self { day, crust: days.crust(day), written, pace: days.pace }))
@@ -81,7 +82,7 @@ impl FieldDay {
         shape: &Stream,
     ) -> Option<Stage> {
         let pace = self.pace.draw32(&mut shape.child(Purpose::Plant, PACE));
-        let day = self.day as f32;
+        let day = self.day.to_f32();
         let age = match growth.at(season) {
             Growth::EmergesOn(emerges) => (day - emerges.draw32(stream)) * pace,
             growth => plant::age_days(desc, growth.draw(season, stream)) + (day - self.written) * pace,

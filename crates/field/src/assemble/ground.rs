@@ -15,7 +15,7 @@ use crate::desc::Detail;
 use crate::layer::Layer;
 use crate::library::Library;
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{Spectrum, Vec2};
+use furrow_base::math::{Spectrum, ToInt, Vec2};
 use furrow_base::ron_file::{Step, Vary};
 use furrow_base::sampling::Purpose;
 use furrow_base::sampling::rng::mix;
@@ -261,7 +261,7 @@ fn lay(
     let mut laid = Contents::default();
     let black = || Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ZERO, 0.0)));
     let mut add = |mesh: Mesh, material: Material, kind| {
-        let material_of = laid.materials.len() as u32;
+        let material_of = laid.materials.len().to_u32();
         laid.materials.push(material);
         laid.kinds.push(kind);
         laid.parts.push(Part {
@@ -292,7 +292,7 @@ fn lay(
         // A stone is uniform; dead plant matter is mottled by decay.
         let patch = 0.5 * thing.radius.max(1e-3);
         let patch = if thing.kind == DebrisKind::Stone { patch } else { patch.min(MOTTLE) };
-        let solid = solid.with_grain(mix(i as u64) as u32, patch, 0.35);
+        let solid = solid.with_grain(mix(i.to_u64()).low_u32(), patch, 0.35);
         let solid = solid.with_dust(baked.dust, thing.dust, DUST_PATCH);
         // Quantised, so that exporters can merge pieces with the same water film.
         let moisture = floor.ground.moisture(thing.centre.x, thing.centre.y);

@@ -9,6 +9,7 @@
 //! the one that it collides with is out of view.
 
 use crate::PlantRecord;
+use furrow_base::math::ToInt;
 use furrow_base::sampling::rng::mix;
 use std::collections::BTreeSet;
 
@@ -44,7 +45,7 @@ fn alone(mut id: u32, taken: &mut BTreeSet<u32>) -> u32 {
 
 /// Returns the upper 32 bits of a hash, but never 0, which means "no plant".
 fn folded(hash: u64) -> u32 {
-    ((hash >> 32) as u32).max(1)
+    (hash >> 32).to_u32().max(1)
 }
 
 #[cfg(test)]

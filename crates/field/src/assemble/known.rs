@@ -5,6 +5,7 @@ use super::models::{self, called};
 use super::record::{CropRecord, SpeciesRecord, WeedRecord};
 use crate::PlantRecord;
 use crate::library::Library;
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::Step;
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
@@ -58,7 +59,7 @@ pub(super) fn crop_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
     for k in drawn.sown.clone() {
         let crop = &drawn.desc.crops[k];
         let species = library.species(drawn.page, &crop.species)?.desc.name.clone();
-        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k as u64)).record();
+        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k.to_u64())).record();
         all.push(CropRecord { species, rows });
     }
     Ok(all)
@@ -69,7 +70,7 @@ pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
     let mut all = Vec::new();
     for (k, weed) in drawn.desc.weeds.iter().enumerate() {
         let species = library.species(drawn.page, &weed.species)?.desc.name.clone();
-        let spread = WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, 1000 + k as u64));
+        let spread = WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, 1000 + k.to_u64()));
         all.push(WeedRecord { species, spread });
     }
     Ok(all)
@@ -79,6 +80,6 @@ pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
 pub(super) fn number_kinds(plants: &mut [PlantRecord], table: &[SpeciesRecord]) {
     for plant in plants {
         let same = |s: &SpeciesRecord| s.name == plant.species && s.eppo == plant.eppo && s.class == plant.class;
-        plant.kind = table.iter().position(same).map_or(0, |k| k as u16 + 1);
+        plant.kind = table.iter().position(same).map_or(0, |k| k.to_u16() + 1);
     }
 }

@@ -6,7 +6,7 @@ use super::options::Scanner;
 use super::terrain::ViewRay;
 use crate::desc::{Detail, FieldDesc};
 use crate::drive::{Capture, FIRST};
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{ToInt, Vec2, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
@@ -93,7 +93,7 @@ pub(super) fn spacing_at(lidars: &[Lidar], at: Vec2) -> Option<f32> {
 pub(super) fn view_rays(lidar: &Lidar) -> impl Iterator<Item = ViewRay> {
     let columns = lidar.columns();
     let some = columns.min(LOOKED_AT);
-    let column = move |k: u32| (u64::from(k) * u64::from(columns - 1) / u64::from((some - 1).max(1))) as u32;
+    let column = move |k: u32| (u64::from(k) * u64::from(columns - 1) / u64::from((some - 1).max(1))).to_u32();
     (0..some).flat_map(move |k| (0..lidar.beams()).map(move |beam| lidar.pulse(column(k), beam))).map(|pulse| {
         let furrow_optics::sensor::Pulse { origin, direction, .. } = pulse;
         (origin, direction)

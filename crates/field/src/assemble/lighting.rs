@@ -74,7 +74,7 @@ mod tests {
     use crate::Field;
     use crate::assemble::{self, Options};
     use furrow_base::Result;
-    use furrow_base::math::Spectrum;
+    use furrow_base::math::{Spectrum, ToFloat, ToInt};
     use furrow_base::ron_file::RonFile;
     use furrow_base::sampling::{Purpose, Stream};
     use furrow_optics::light::{LightDesc, LightRecord};
@@ -105,7 +105,7 @@ mod tests {
             assert_eq!(places, [(0, 3), (1, 2)]);
             let [first, second] = [of.lighting[0].drawn, of.lighting[1].drawn];
             let reds: Vec<_> = of.lights.iter().map(radiance).map(|l| l.to_array()[0]).collect();
-            assert_eq!(reds, [first as f32 + 1.0, second as f32 + 1.0]);
+            assert_eq!(reds, [first.to_f32() + 1.0, second.to_f32() + 1.0]);
             seen[first][second] += 1;
         }
         // 900 / 6 ± 4 √(900 · 1/6 · 5/6).
@@ -129,7 +129,7 @@ mod tests {
             assert!(plain.lighting.is_empty() && serde_json::to_value(&plain).unwrap().get("lighting").is_none());
             for (i, desc) in [DAY, FLASH].into_iter().enumerate() {
                 let desc: LightDesc = RonFile::of(desc).parse().unwrap();
-                let mut stream = Stream::of(5, index, Purpose::Page, 1 + i as u64);
+                let mut stream = Stream::of(5, index, Purpose::Page, 1 + i.to_u64());
                 let (record, _) = desc.draw(&mut stream, &mut |_, _| unreachable!()).unwrap();
                 assert_eq!(field(&format!("{DAY}, {FLASH}"), index).unwrap().conditions.lights[i], record);
             }

@@ -1,5 +1,6 @@
 //! Selects the bank plant that a plant is an instance of.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::TAU;
 
@@ -24,13 +25,13 @@ pub(super) struct Member {
 impl Member {
     /// Returns the bank plant for a plant with this random stream and a minimum cell length of `cell` metres.
     pub(super) fn of(population: u64, stream: &Stream, cell: f32) -> Self {
-        let number = stream.child(Purpose::Plant, CHOICE).index(MEMBERS) as u64;
-        Self { population, number, octave: cell.log2().floor() as i32 }
+        let number = stream.child(Purpose::Plant, CHOICE).index(MEMBERS).to_u64();
+        Self { population, number, octave: cell.log2().floor_to::<i32>() }
     }
 
     /// Returns the minimum cell length of the mesh, metres.
     pub(super) fn cell(self) -> f32 {
-        (self.octave as f32).exp2()
+        self.octave.to_f32().exp2()
     }
 
     /// Returns the rotation of an instance with this random stream, radians.
@@ -42,7 +43,7 @@ impl Member {
     /// square is 1, so that leaf area and cover of the field are preserved.
     pub(super) fn size(stream: &Stream) -> f32 {
         let deviation = stream.child(Purpose::Plant, CHOICE + 2).normal().clamp(-3.0, 3.0);
-        (SIZE_SD * (deviation - SIZE_SD)).exp() as f32
+        (SIZE_SD * (deviation - SIZE_SD)).exp().to_f32()
     }
 }
 
@@ -62,7 +63,7 @@ mod tests {
             for (member, cell) in [near, far] {
                 assert!(member.cell() <= cell && 2.0 * member.cell() > cell, "{member:?} {cell}");
             }
-            chosen[near.0.number as usize] += 1;
+            chosen[near.0.number.to_usize()] += 1;
         }
         // 100 each on average; the bounds are six standard deviations.
         assert!(chosen.iter().all(|n| (40..160).contains(n)), "{chosen:?}");

@@ -46,6 +46,7 @@ use drawn::{Asked, Drawn};
 pub use field::Field;
 use furrow_base::Result;
 use furrow_base::input::Scope;
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::Purpose;
 use furrow_render::scene::Scene;
@@ -135,8 +136,8 @@ impl Source {
 
     /// Returns the number of images per field and day: frames times cameras.
     pub fn captures(&self) -> u64 {
-        let frames = self.desc.drive.as_ref().map_or(1, |drive| drive.frames.get() as u64);
-        frames * (1 + self.desc.cameras.len() as u64)
+        let frames = self.desc.drive.as_ref().map_or(1, |drive| drive.frames.get().trunc_to::<u64>());
+        frames * (1 + self.desc.cameras.len().to_u64())
     }
 
     /// Builds field `options.index`. Call it inside a thread pool.

@@ -9,7 +9,7 @@ use crate::desc::ModelDesc;
 use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Mat3, Spectrum, Vec3};
+use furrow_base::math::{Mat3, Spectrum, ToInt, Vec3};
 use furrow_base::ron_file::{Num, Step};
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
@@ -34,9 +34,9 @@ pub(super) fn models(
     let mut last = numbered;
     for (k, desc) in drawn.desc.models.iter().enumerate() {
         let named = names.iter().position(|name| desc.name.as_ref() == Some(name));
-        let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place as u8));
+        let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place.to_u8()));
         let found = place(drawn, library, parts, (k, desc, kind), last, floor)?;
-        last = found.iter().map(|r| r.number as usize).max().unwrap_or(last);
+        last = found.iter().map(|r| r.number.to_usize()).max().unwrap_or(last);
         records.extend(found);
     }
     Ok(records)
@@ -57,7 +57,7 @@ fn place(
             .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
         return Err(drawn.page.blame(&at, fault));
     }
-    let mut stream = drawn.stream(Purpose::Scatter, 3000 + k as u64);
+    let mut stream = drawn.stream(Purpose::Scatter, 3000 + k.to_u64());
     let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
     let turn = desc.turn_deg.draw32(&mut stream).to_radians();
     let scale = desc.scale.draw32(&mut stream);
@@ -92,8 +92,8 @@ fn place(
     }
     let plants = plants.into_iter().map(|(number, parts)| {
         // Plant number within the model, independent of the number of plants before it.
-        let own = u64::from(number) - numbered as u64;
-        let id = identity::of(drawn.seed, drawn.index, identity::MODELS + k as u64, own);
+        let own = u64::from(number) - numbered.to_u64();
+        let id = identity::of(drawn.seed, drawn.index, identity::MODELS + k.to_u64(), own);
         let parts: Vec<&Part> = parts.iter().map(|i| &all.parts[*i]).collect();
         record((number, id), &parts, called(desc), foot, &model)
     });
@@ -171,7 +171,9 @@ fn tag(class: Option<Class>, label: Option<&Label>, numbered: usize) -> Option<T
     match (class, label) {
         (Some(Class::Soil), _) | (None, None) => Some(Tag::default()),
         (Some(class), label) => Some(Tag { class, plant: number(1)?, leaf: label.map_or(0, |(_, l)| l.leaf) }),
-        (None, Some((class, l))) if l.plant > 0 => Some(Tag { class, plant: number(l.plant as usize)?, leaf: l.leaf }),
+        (None, Some((class, l))) if l.plant > 0 => {
+            Some(Tag { class, plant: number(l.plant.to_usize())?, leaf: l.leaf })
+        }
         (None, Some((class, l))) => Some(Tag { class, plant: 0, leaf: l.leaf }),
     }
 }

@@ -5,7 +5,7 @@ use crate::PlantRecord;
 use crate::desc::{Detail, Growth, SpeciesDesc};
 use crate::library::Library;
 use furrow_base::Result;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec3};
 use furrow_base::ron_file::{Step, place};
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::Rows;
@@ -52,7 +52,7 @@ pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Str
     let (page, desc) = (drawn.page, drawn.desc);
     for k in drawn.sown.clone() {
         let crop = &desc.crops[k];
-        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k as u64));
+        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k.to_u64()));
         let (species, spacing, in_row) = (&crop.species, rows.spacing_m, rows.in_row_m);
         if spacing > WIDE_ROWS_M {
             let words = format!("rows of {species} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm");

@@ -3,7 +3,7 @@
 use crate::desc::FieldDesc;
 use crate::drive::{self, Capture, DriveInputs, FIRST, PathDesc};
 use crate::library::Library;
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, ToInt, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
@@ -36,8 +36,9 @@ pub(super) fn first(
         (w, h) => {
             let (w0, h0) = (camera.width(), camera.height());
             let aspect = f64::from(h0) / f64::from(w0);
-            let width = w.unwrap_or_else(|| h.map_or(w0, |h| (f64::from(h) / aspect).round().max(1.0) as u32));
-            let height = h.unwrap_or_else(|| (f64::from(width) * aspect).round().max(1.0) as u32);
+            let width =
+                w.unwrap_or_else(|| h.map_or(w0, |h| (f64::from(h) / aspect).round().max(1.0).trunc_to::<u32>()));
+            let height = h.unwrap_or_else(|| (f64::from(width) * aspect).round().max(1.0).trunc_to::<u32>());
             camera.with_size(width, height)
         }
     };
@@ -82,7 +83,7 @@ pub(super) fn captures(
             let help = format!("give this camera another name; the first camera is called `{FIRST}`");
             return Err(blame(Error::input(words).help(help)));
         }
-        let camera = mounted.camera.build(&mut stream(Purpose::Page, DRIVE + 1 + k as u64)).map_err(blame)?;
+        let camera = mounted.camera.build(&mut stream(Purpose::Page, DRIVE + 1 + k.to_u64())).map_err(blame)?;
         let shape = |camera: &Camera| f64::from(camera.width()) / f64::from(camera.height());
         let own = desc.camera.build(&mut stream(Purpose::Page, 0)).map_or(shape(&first), |camera| shape(&camera));
         if (shape(&camera) / own - 1.0).abs() > SAME_SHAPE {
@@ -94,15 +95,15 @@ pub(super) fn captures(
         }
         cameras.push((mounted.name.clone(), camera.with_size(first.width(), first.height())));
     }
-    let frames = desc.drive.as_ref().map_or(1, |drive| drive.frames.get() as u64);
-    if frames.saturating_mul(cameras.len() as u64) > MOST_CAPTURES {
+    let frames = desc.drive.as_ref().map_or(1, |drive| drive.frames.get().trunc_to::<u64>());
+    if frames.saturating_mul(cameras.len().to_u64()) > MOST_CAPTURES {
         let words = format!("{frames} frames of {} cameras are too many for one field", cameras.len());
         let help = format!("at most {MOST_CAPTURES} images; drive through several fields");
         return Err(page.blame(&[Step::Field("drive"), Step::Field("frames")], Error::input(words).help(help)));
     }
     let mut around = DriveInputs::default();
     if let Some(k) = sown.into_iter().next() {
-        around.rows = Some(Rows::draw(&desc.crops[k].rows, &stream(Purpose::Scatter, k as u64)).azimuth);
+        around.rows = Some(Rows::draw(&desc.crops[k].rows, &stream(Purpose::Scatter, k.to_u64())).azimuth);
     }
     if let Some(PathDesc::Poses(file)) = desc.drive.as_ref().map(|drive| &drive.path) {
         around.poses = library.poses(page, file)?;

@@ -8,7 +8,7 @@ use super::member::Member;
 use crate::PlantRecord;
 use crate::desc::{Growth, SpeciesDesc};
 use crate::library::Species;
-use furrow_base::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
+use furrow_base::math::{Frame, Mat3, Spectrum, ToFloat, Vec2, Vec3};
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_grow::plant::{self, ConditionDesc, GrowOptions, LeafAge, LeafAxis, OrganKind, Stage};
@@ -167,7 +167,7 @@ pub(super) fn grow(
 fn begun(s: &Seedling, stream: &mut Stream) -> (Option<Stage>, f32) {
     let stage = stage(s, stream);
     let green = (1.0 + s.species.desc.chlorophyll_sd.get() * stream.normal()).clamp(0.6, 1.5);
-    (stage, green as f32)
+    (stage, green.to_f32())
 }
 
 /// Returns a plant's chlorophyll relative to the species' mean. The value is the same whether the plant is grown or is an instance.

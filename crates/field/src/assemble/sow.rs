@@ -10,7 +10,7 @@ use super::{bank, identity};
 use crate::desc::{Detail, Growth};
 use crate::library::{Library, Species};
 use furrow_base::Result;
-use furrow_base::math::vec2;
+use furrow_base::math::{RoundTo, ToInt, vec2};
 use furrow_base::ron_file::Vary;
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::{self, Disc, Spot};
@@ -31,34 +31,34 @@ pub(super) fn seedlings(
     for k in drawn.sown.clone() {
         let crop = &desc.crops[k];
         let species = library.species(page, &crop.species)?;
-        let places = scatter::rows_looked_at(&crop.rows, area, &drawn.stream(Purpose::Scatter, k as u64));
+        let places = scatter::rows_looked_at(&crop.rows, area, &drawn.stream(Purpose::Scatter, k.to_u64()));
         census.open(Population::Crop(k), places, all.len())?;
-        for spot in scatter::rows(&crop.rows, area, stones, &drawn.stream(Purpose::Scatter, k as u64)) {
+        for spot in scatter::rows(&crop.rows, area, stones, &drawn.stream(Purpose::Scatter, k.to_u64())) {
             if !view::may_be_seen(drawn, sight, spot.at) {
                 continue;
             }
             census.close(all.len())?;
-            let seedling = seedling(drawn, &species, &crop.growth, spot, 1 + k as u64);
+            let seedling = seedling(drawn, &species, &crop.growth, spot, 1 + k.to_u64());
             all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
         }
     }
     for (k, weed) in desc.weeds.iter().enumerate() {
         let species = library.species(page, &weed.species)?;
-        let places = scatter::weeds_looked_at(&weed.spread, area, &drawn.stream(Purpose::Scatter, 1000 + k as u64));
+        let places = scatter::weeds_looked_at(&weed.spread, area, &drawn.stream(Purpose::Scatter, 1000 + k.to_u64()));
         census.open(Population::Weed(k), places, all.len())?;
-        for spot in scatter::weeds(&weed.spread, area, stones, &drawn.stream(Purpose::Scatter, 1000 + k as u64)) {
+        for spot in scatter::weeds(&weed.spread, area, stones, &drawn.stream(Purpose::Scatter, 1000 + k.to_u64())) {
             if !view::may_be_seen(drawn, sight, spot.at) {
                 continue;
             }
             census.close(all.len())?;
-            let seedling = seedling(drawn, &species, &weed.growth, spot, 1001 + k as u64);
+            let seedling = seedling(drawn, &species, &weed.growth, spot, 1001 + k.to_u64());
             all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
         }
     }
     census.open(Population::Placed, 0.0, all.len())?;
     for (k, placed) in desc.plants.iter().enumerate() {
         let species = library.species(page, &placed.species)?;
-        let mut stream = drawn.stream(Purpose::Scatter, 2000 + k as u64);
+        let mut stream = drawn.stream(Purpose::Scatter, 2000 + k.to_u64());
         let position = vec2(placed.position_m.0.draw32(&mut stream), placed.position_m.1.draw32(&mut stream));
         let seedling = Seedling {
             species: species.clone(),
@@ -67,12 +67,12 @@ pub(super) fn seedlings(
             today: drawn.today.clone(),
             position,
             turn: placed.turn_deg.draw32(&mut stream).to_radians(),
-            only_leaf: placed.only_leaf.map(|l| l.get() as u16),
+            only_leaf: placed.only_leaf.map(|l| l.get().trunc_to::<u16>()),
             stream: stream.child(Purpose::Plant, 0),
             individual: Individual::of(&species.desc, (drawn.seed, drawn.index)),
             vigour: placed.vigour.clone(),
             condition: species.desc.condition.clone(),
-            id: identity::of(drawn.seed, drawn.index, identity::PLACED, k as u64),
+            id: identity::of(drawn.seed, drawn.index, identity::PLACED, k.to_u64()),
             member: None,
         };
         all.push(seedling.tended(&placed.vigour, placed.condition.as_ref()));

@@ -10,7 +10,7 @@ use super::ground_view::{GroundView, Viewpoint, meets};
 use super::terrain::{Near, Seen, ViewLimits, ViewRay};
 use crate::desc::Detail;
 use crate::drive::{Capture, FIRST};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{ToFloat, Vec2, vec2};
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};
 use furrow_grow::soil::Rect;
@@ -159,7 +159,7 @@ fn view_of(
     warnings: &mut Vec<String>,
 ) -> Result<View> {
     let (camera, reach) = (&capture.camera, reach(drawn)?);
-    let (w, h) = (camera.width() as f32, camera.height() as f32);
+    let (w, h) = (camera.width().to_f32(), camera.height().to_f32());
     let below = camera.pose().position.truncate();
     if camera.pose().position.abs().max_element() > FARTHEST {
         let words = format!("{} is more than {FARTHEST} m from the field's origin", which(drawn, capture));
@@ -172,7 +172,7 @@ fn view_of(
     let mut view_rays: Vec<ViewRay> = Vec::new();
     // Corners and midpoints of the sides: barrel distortion makes the sides bulge.
     for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
-        let (origin, direction) = camera.ray(vec2(w * x as f32 / 2.0, h * y as f32 / 2.0), [0.5; 2]);
+        let (origin, direction) = camera.ray(vec2(w * x.to_f32() / 2.0, h * y.to_f32() / 2.0), [0.5; 2]);
         if direction.z < -HORIZON && origin.z > 0.0 {
             seen.extend(meets(origin, direction));
             view_rays.push((origin, direction));
@@ -286,10 +286,10 @@ fn blind(which: &str, camera: &Camera) -> Error {
 
 /// Returns rays through a uniform raster of image points, from corner to corner.
 fn raster(camera: &Camera) -> impl Iterator<Item = ViewRay> {
-    let size = vec2(camera.width() as f32, camera.height() as f32);
+    let size = vec2(camera.width().to_f32(), camera.height().to_f32());
     (0..=RAYS * (RAYS + 2))
-        .map(|n| vec2((n % (RAYS + 1)) as f32, (n / (RAYS + 1)) as f32))
-        .map(move |at| camera.ray(size * at / RAYS as f32, [0.5; 2]))
+        .map(|n| vec2((n % (RAYS + 1)).to_f32(), (n / (RAYS + 1)).to_f32()))
+        .map(move |at| camera.ray(size * at / RAYS.to_f32(), [0.5; 2]))
 }
 
 /// Returns the share of the ground points `places` that are outside `area`, and the distance of the farthest of them from `below`, metres.

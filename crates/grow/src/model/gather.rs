@@ -5,7 +5,7 @@ use super::notes::Notes;
 use super::parts::{Label, MOST_TRIANGLES, Model, ModelPart};
 use super::settle::{ModelError, settle, too_many_triangles};
 use furrow_base::geometry::{AlphaMask, Coverage, Mesh};
-use furrow_base::math::{DMat4, DVec3};
+use furrow_base::math::{DMat4, DVec3, ToInt};
 use furrow_optics::texture::Surface;
 
 /// Distance from the origin, in the file's unit, above which a model may be moved: national grids begin there.
@@ -99,5 +99,5 @@ fn warn_of_invisible(model: &Model, notes: &mut Notes) {
 
 fn is_cut_away(part: &ModelPart, mask: &AlphaMask) -> bool {
     let Mesh { triangles, uvs, .. } = &part.mesh;
-    triangles.iter().all(|t| mask.coverage(t.map(|k| uvs[k as usize])) == Coverage::Transparent)
+    triangles.iter().all(|t| mask.coverage(t.map(|k| uvs[k.to_usize()])) == Coverage::Transparent)
 }

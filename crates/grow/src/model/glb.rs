@@ -1,5 +1,7 @@
 //! GLB container: a header, a JSON chunk and a binary chunk. Source: glTF 2.0 specification, section 4.
 
+use furrow_base::math::{ToFloat, ToInt};
+
 const MAGIC: &[u8; 4] = b"glTF";
 const JSON: &[u8; 4] = b"JSON";
 const BIN: &[u8; 4] = b"BIN\0";
@@ -18,13 +20,13 @@ pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     if version != 2 {
         return Err(format!("it is glTF {version}; only glTF 2.0 can be read"));
     }
-    let length = length as usize;
+    let length = length.to_usize();
     let Some(bytes) = bytes.get(..length) else {
         return Err(format!("the file ends too early: {} of {length} bytes", bytes.len()));
     };
     let (mut at, mut json, mut own) = (12, None, None);
     while at + 8 <= length {
-        let size = number(at).unwrap_or(0) as usize;
+        let size = number(at).unwrap_or(0).to_usize();
         let kind = &bytes[at + 4..at + 8];
         let Some(data) = bytes[at + 8..].get(..size) else {
             return Err("a chunk is longer than the file".into());
@@ -46,14 +48,14 @@ pub fn join(mut json: Vec<u8>, mut own: Vec<u8>) -> Result<Vec<u8>, String> {
     own.resize(own.len().next_multiple_of(4), 0);
     let length = 12 + 8 + json.len() + 8 + own.len();
     let Ok(total) = u32::try_from(length) else {
-        return Err(format!("{:.1} GB do not fit into a GLB file, whose limit is 4.3 GB", length as f64 / 1e9));
+        return Err(format!("{:.1} GB do not fit into a GLB file, whose limit is 4.3 GB", length.to_f64() / 1e9));
     };
     let mut bytes = Vec::with_capacity(length);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&2_u32.to_le_bytes());
     bytes.extend_from_slice(&total.to_le_bytes());
     for (kind, data) in [(JSON, json), (BIN, own)] {
-        bytes.extend_from_slice(&(data.len() as u32).to_le_bytes());
+        bytes.extend_from_slice(&data.len().to_u32().to_le_bytes());
         bytes.extend_from_slice(kind);
         bytes.extend_from_slice(&data);
     }

@@ -3,7 +3,7 @@
 use super::notes::Notes;
 use super::parts::MOST_TRIANGLES;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{DMat4, Vec2, Vec3};
+use furrow_base::math::{DMat4, ToInt, Vec2, Vec3};
 use furrow_optics::texture::Wrap;
 
 /// Largest distance of texture coordinates from an alpha mask, in tiles.
@@ -51,9 +51,9 @@ pub(super) fn settle(mesh: &mut Mesh, to: &DMat4, name: &str) -> Result<(), Stri
 /// Makes a mesh without normals faceted: every triangle gets its own vertices.
 pub(super) fn faceted(mesh: &mut Mesh) {
     let corners: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    mesh.positions = corners.iter().map(|i| mesh.positions[*i as usize]).collect();
-    mesh.uvs = corners.iter().map(|i| mesh.uvs[*i as usize]).collect();
-    mesh.triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    mesh.positions = corners.iter().map(|i| mesh.positions[i.to_usize()]).collect();
+    mesh.uvs = corners.iter().map(|i| mesh.uvs[i.to_usize()]).collect();
+    mesh.triangles = (0..corners.len().to_u32() / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     mesh.recompute_normals();
 }
 

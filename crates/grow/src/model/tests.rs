@@ -2,6 +2,7 @@
 
 use super::{Model, Up, glb};
 use furrow_base::Result;
+use furrow_base::math::ToInt;
 use serde_json::Value;
 
 /// Writes files into a new folder and loads the first one.
@@ -16,7 +17,7 @@ pub(super) fn load(files: &[(&str, &[u8])], up: Up) -> Result<Model> {
 /// Encodes a PNG file of rows of R, G, B, A.
 pub(super) fn png(width: u32, rgba: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, rgba.len() as u32 / width);
+    let mut encoder = png::Encoder::new(&mut bytes, width, rgba.len().to_u32() / width);
     encoder.set_color(png::ColorType::Rgba);
     encoder.write_header().unwrap().write_image_data(rgba.as_flattened()).unwrap();
     bytes

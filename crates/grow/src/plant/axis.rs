@@ -4,7 +4,7 @@ use super::growth::{Growth, LeafState};
 use super::leaf::Seat;
 use super::organ::{self, Organ, OrganKind, StemLine, StemPosition, StemVertices};
 use super::tube::{self, Profile, Ring};
-use furrow_base::math::{Frame, Vec3, direction, lerp, smoothstep, vec3};
+use furrow_base::math::{Frame, ToFloat, Vec3, direction, lerp, smoothstep, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -49,7 +49,7 @@ impl Axis {
         let last = self.nodes.len().saturating_sub(1);
         let (point, axis) = self.nodes[leaf.layer.min(last)];
         let out = direction(FRAC_PI_2, leaf.azimuth);
-        let share = leaf.layer as f32 / last.max(1) as f32;
+        let share = leaf.layer.to_f32() / last.max(1).to_f32();
         let r = self.radii[leaf.layer.min(last)] * lerp(self.section.seat.0, self.section.seat.1, share);
         // On a crown the younger leaves sit higher up the dome, just under its surface.
         let whole = self.radii[0];
@@ -113,7 +113,7 @@ pub(super) fn stem(
         nodes.push((point, direction_now));
         radii.push(radius * lerp(1.0, section.taper, share));
         // Each internode strays a little and turns back towards the light.
-        let wander = vec3(stream.normal() as f32, stream.normal() as f32, 0.0)
+        let wander = vec3(stream.normal().to_f32(), stream.normal().to_f32(), 0.0)
             * if *rise > below { section.wander } else { 0.0 };
         direction_now = (direction_now + wander + Vec3::Z * (0.8 * section.wander)).normalize_or(Vec3::Z);
         below = *rise;
@@ -154,7 +154,7 @@ pub(super) fn stem(
         let number = organ::next_line(organs);
         let line = StemLine { number, points: nodes.iter().map(|(point, _)| *point).collect(), on: Some(foot) };
         organs.push(Organ::stem(OrganKind::Stem, material, mesh, line));
-        (0..nodes.len()).map(|k| StemPosition { line: number, at: k as f32 }).collect()
+        (0..nodes.len()).map(|k| StemPosition { line: number, at: k.to_f32() }).collect()
     };
     Axis { nodes, radii, section, on, crown }
 }
@@ -170,12 +170,12 @@ pub(super) fn hypocotyl(organs: &mut Vec<Organ>, growth: &Growth<'_>, foot: Stem
     let StemBase { point, along, size, root, mut stream } = foot;
     let length = growth.hypocotyl * size;
     let side = along.cross(direction(FRAC_PI_2, stream.range32(0.0, TAU))).normalize_or(Vec3::X);
-    let bow = 0.05 * stream.normal().clamp(-2.0, 2.0) as f32 * length;
+    let bow = 0.05 * stream.normal().clamp(-2.0, 2.0).to_f32() * length;
     let slender = smoothstep(2.0, 6.0, length / (2.0 * radius));
     let below = -root / along.z.max(0.3);
     let mut rings = vec![ring(point + along * below, along, radius, Profile::Channelled(1.0))];
     for i in 0..=HYPOCOTYL {
-        let s = i as f32 / HYPOCOTYL as f32;
+        let s = i.to_f32() / HYPOCOTYL.to_f32();
         let centre = point + (along * (length * s) + side * (slender * bow * (PI * s).sin()));
         let direction = (along + side * (slender * PI * bow / length.max(1e-4) * (PI * s).cos())).normalize();
         let thick = 1.0 - 0.18 * slender * (PI * s).sin().max(0.0).powf(0.7);

@@ -6,7 +6,7 @@
 
 use super::skeleton::{Skeleton, Weights};
 use furrow_base::geometry::outline::{self, MARGIN, Outline};
-use furrow_base::math::{Vec2, Vec3, vec3};
+use furrow_base::math::{ToFloat, ToInt, Vec2, Vec3, vec3};
 use std::f32::consts::TAU;
 
 /// Distance by which a blade's mesh extends beyond its outline, as a fraction of its length (at the ends) and of its
@@ -33,12 +33,12 @@ impl RestMesh {
         self.positions.push(position);
         self.uvs.push(uv);
         self.weights.push(weights);
-        self.positions.len() as u32 - 1
+        self.positions.len().to_u32() - 1
     }
 
     /// Adds all vertices and triangles of `other`.
     pub fn append(&mut self, other: Self) {
-        let first = self.positions.len() as u32;
+        let first = self.positions.len().to_u32();
         self.positions.extend(other.positions);
         self.uvs.extend(other.uvs);
         self.weights.extend(other.weights);
@@ -89,22 +89,22 @@ pub fn sheet(outline: Outline, width: f32, rows: usize, columns: usize, skeleton
     };
     let (mut ts, mut half_widths) = (Vec::with_capacity(rows + 1), Vec::with_capacity(rows + 1));
     for i in 0..=rows {
-        let s = i as f32 / rows as f32;
+        let s = i.to_f32() / rows.to_f32();
         let s = s - 0.4 * (TAU * s).sin() / TAU;
         let t = (1.0 + 2.0 * end) * s - end;
         let reach = reach(outline, t) + side;
         ts.push(t);
         half_widths.push((outline.half_width(t) * width).max(0.02 * width));
         for j in 0..=columns {
-            let q = 2.0 * j as f32 / columns as f32 - 1.0;
+            let q = 2.0 * j.to_f32() / columns.to_f32() - 1.0;
             let x = q * reach;
             let p = vec3(x * width, t * length, 0.0);
             rest.corner(p, outline::uv(x, t), skeleton.weights(p.x, p.y, q.abs()));
         }
     }
-    let stride = columns as u32 + 1;
-    for i in 0..rows as u32 {
-        rest.stitch(i * stride, (i + 1) * stride, columns as u32);
+    let stride = columns.to_u32() + 1;
+    for i in 0..rows.to_u32() {
+        rest.stitch(i * stride, (i + 1) * stride, columns.to_u32());
     }
     BladeGrid { rest, rows, columns, t: ts, half_width: half_widths }
 }
@@ -139,12 +139,12 @@ mod tests {
             assert!(mesh.fault().is_none());
             assert!(mesh.normals.iter().all(|n| n.z > 0.999));
             let inside =
-                0.5 * (0..4000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 4000.0)).sum::<f32>() / 4000.0;
+                0.5 * (0..4000).map(|i| 2.0 * outline.half_width((i.to_f32() + 0.5) / 4000.0)).sum::<f32>() / 4000.0;
             let extra = mesh.area() / inside;
             assert!(extra > 1.0 && extra < 1.15, "{a} {b}: {extra}");
             // Edges are straight between rows: the chord at every t must still be outside the outline.
             for k in 1..400 {
-                let t = k as f32 / 400.0;
+                let t = k.to_f32() / 400.0;
                 let i = s.t.partition_point(|row| *row <= t) - 1;
                 let f = (t - s.t[i]) / (s.t[i + 1] - s.t[i]);
                 let edge = |row: usize| s.rest.positions[(row + 1) * (s.columns + 1) - 1].x;

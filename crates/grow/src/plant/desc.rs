@@ -5,6 +5,7 @@ use super::inflorescence::check;
 use super::kind::LeafKind;
 use super::stage::{MOST_SHOOTS, StageDesc, Tilt};
 use super::twine::TwineDesc;
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{self, NonNegative, Num, Positive, Signed, Step, Vary};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -245,7 +246,7 @@ impl PlantDesc {
             }
             for (field, shoots) in [("tillers", &stage.tillers), ("branches", &stage.branches)] {
                 let most = shoots.largest().round();
-                if most > MOST_SHOOTS as f64 {
+                if most > MOST_SHOOTS.to_f64() {
                     let at = vec![Field("stages"), Item(i), Field(field)];
                     let message = format!("up to {most} side shoots at BBCH {}", stage.bbch);
                     let help =

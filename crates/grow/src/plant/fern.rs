@@ -7,7 +7,7 @@
 use super::blade::RestMesh;
 use super::ribbons::{MOST, Ribbons, series};
 use super::skeleton::Skeleton;
-use furrow_base::math::{Vec3, lerp, vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, lerp, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// An axis of the blade and the parameters of its branches.
@@ -34,11 +34,18 @@ pub(super) fn blade(
 ) -> RestMesh {
     let length = skeleton.length();
     // Small leaves have fewer, not finer, segments.
-    let (pairs, pinnules) = (pairs.min(MOST) as f32, pinnules.min(MOST) as f32);
+    let (pairs, pinnules) = (pairs.min(MOST).to_f32(), pinnules.min(MOST).to_f32());
     let pairs = pairs.min(length / (2.4 * segment)).max(1.0);
     let half_width = |t: f32| half_width(t) * width;
     let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
-    ribbons.strip(Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO, segment, 2 * pairs.min(8.0) as u32);
+    ribbons.strip(
+        Vec3::ZERO,
+        vec3(0.0, length, 0.0),
+        Vec3::Z,
+        Vec3::ZERO,
+        segment,
+        2 * pairs.min(8.0).trunc_to::<u32>(),
+    );
     let whole =
         FernAxis { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
     // Branches shorter than a segment's width are not built yet.
@@ -81,7 +88,7 @@ fn branches(limb: &FernAxis, stream: &Stream) -> Vec<(FernAxis, Stream)> {
     for (k, place, grown) in series(limb.pairs) {
         let t = lerp(0.08, 0.9, (place - 0.15 / limb.pairs.max(1.0)).max(0.0).powf(0.9));
         for (far, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
-            let mut own = stream.child(Purpose::Leaf, (2 * k + far) as u64);
+            let mut own = stream.child(Purpose::Leaf, (2 * k + far).to_u64());
             let t = (t + own.range32(-0.12, 0.12) / (limb.pairs + 1.0)).clamp(0.03, 0.96);
             let spread = lerp(1.05, 0.55, t) + own.range32(-0.1, 0.1);
             let tilt = own.range32(-0.12, 0.4);

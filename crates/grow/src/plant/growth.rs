@@ -7,7 +7,7 @@ use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
 use super::numbers::Numbers;
 use super::stage::{BUD, MOST_SHOOTS, StageDesc};
-use furrow_base::math::lerp;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, lerp};
 use furrow_base::ron_file::{Bound, NonNegative, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
@@ -104,8 +104,8 @@ impl Growth<'_> {
 
 /// Iterates over `many` shoots: the index of each and the fraction of it that has grown, 0–1.
 pub(super) fn shoots(many: f32) -> impl Iterator<Item = (usize, f32)> {
-    let most = (many.ceil().max(0.0) as usize).min(MOST_SHOOTS);
-    (0..most).map(move |k| (k, (many - k as f32).clamp(0.0, 1.0)))
+    let most = many.ceil().max(0.0).trunc_to::<usize>().min(MOST_SHOOTS);
+    (0..most).map(move |k| (k, (many - k.to_f32()).clamp(0.0, 1.0)))
 }
 
 /// Two neighbouring stages and the position between them.
@@ -121,11 +121,11 @@ impl<'a> StageInterpolation<'a> {
     fn find(stages: &'a [StageDesc], stage: Stage) -> Option<Self> {
         let key = |s: &StageDesc| match stage {
             Stage::Age(_) => s.days.f32(),
-            Stage::Bbch(_) => s.bbch as f32,
+            Stage::Bbch(_) => s.bbch.to_f32(),
         };
         let x = match stage {
             Stage::Age(days) => days,
-            Stage::Bbch(code) => code as f32,
+            Stage::Bbch(code) => code.to_f32(),
         };
         let after = stages.partition_point(|s| key(s) <= x);
         let from = stages.get(after.saturating_sub(1))?;
@@ -164,7 +164,7 @@ fn covering(desc: &PlantDesc, code: u32) -> Option<(u32, f32)> {
     }
     let (before, early) = desc.cover_days.range(..=code).next_back()?;
     let Some((after, late)) = desc.cover_days.range(code..).next() else { return Some((*before, early.f32())) };
-    let u = (code - before) as f32 / (after - before).max(1) as f32;
+    let u = (code - before).to_f32() / (after - before).max(1).to_f32();
     Some((code, lerp(early.f32(), late.f32(), u)))
 }
 
@@ -214,11 +214,11 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     for (k, layer) in to.layers.iter().enumerate() {
         let before = from.layers.get(k);
         let ends = (before, layer);
-        let shared = own.child(Purpose::Plant, 16 + k as u64);
+        let shared = own.child(Purpose::Plant, 16 + k.to_u64());
         height += between.draw(ends, Some(0.0), &shared, 0, |l| &l.internode_mm) * MM * vigour;
         rise.push(height);
         let alpha = between.draw(ends, None, &shared, 1, |l| &l.alpha);
-        let n = layer.leaves.get() as u32;
+        let n = layer.leaves.get().trunc_to::<u32>();
         for i in 0..n {
             number += 1;
             let mut stream = stream.child(Purpose::Leaf, u64::from(number));
@@ -226,7 +226,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
             let jitter = desc.azimuth_deg.draw32(&mut stream).to_radians();
             let blade = between.draw(ends, Some(0.0), &stream, 1, |l| &l.blade_mm) * MM * size;
             let Some((name, kind)) = desc.kinds.get_key_value(&layer.kind) else { continue };
-            let azimuth = spin + PI * (2.0 * i as f32 / n as f32 + alpha) + jitter;
+            let azimuth = spin + PI * (2.0 * i.to_f32() / n.to_f32() + alpha) + jitter;
             axils.push((k, azimuth));
             if blade < BUD {
                 continue;

@@ -2,6 +2,7 @@
 
 use super::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::ron_file::{Count, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -228,7 +229,7 @@ impl LeafKind {
     /// `count` evenly spaced ones.
     pub(super) fn joints_along(&self, count: usize) -> Vec<f32> {
         if self.joint_at.is_empty() {
-            (1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect()
+            (1..=count).map(|k| k.to_f32() / (count.to_f32() + 1.0)).collect()
         } else {
             self.joint_at.iter().map(|t| t.f32()).collect()
         }
@@ -252,7 +253,7 @@ impl LeafKind {
         };
         let pairs = match &self.shape {
             Shape::Leaflets { pair_at, pairs, .. } if !pair_at.is_empty() => {
-                pair_at.len() == pairs.get() as usize && rises(pair_at, 1.0)
+                pair_at.len() == pairs.get().trunc_to::<usize>() && rises(pair_at, 1.0)
             }
             _ => true,
         };

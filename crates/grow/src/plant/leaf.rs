@@ -15,7 +15,7 @@ use super::spines;
 use super::stipules;
 use super::tube::{self, Profile, Ring};
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Mat3, Vec3, lerp, smoothstep, vec3};
+use furrow_base::math::{Mat3, RoundTo, ToFloat, Vec3, lerp, smoothstep, vec3};
 use furrow_base::sampling::Stream;
 
 /// Number of vertices around a stalk.
@@ -82,13 +82,14 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lo
             sheet.rest
         }
         Shape::Pinnate { pairs, lobes, segment_mm, bare } => {
-            let (pairs, lobes) = (pairs.draw(&mut stream) as usize, lobes.draw(&mut stream) as usize);
+            let (pairs, lobes) =
+                (pairs.draw(&mut stream).trunc_to::<usize>(), lobes.draw(&mut stream).trunc_to::<usize>());
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
             let division = Division { pairs, lobes, bare: bare.f32().min(MOST_BARE), segment, cell: leaf.cell };
             pressed(leaf, ribbons::blade(division, leaf.width, &skeleton, &mut stream))
         }
         Shape::Fern { pairs, pinnules, segment_mm } => {
-            let counts = (pairs.draw(&mut stream) as usize, pinnules.draw(&mut stream) as usize);
+            let counts = (pairs.draw(&mut stream).trunc_to::<usize>(), pinnules.draw(&mut stream).trunc_to::<usize>());
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
             pressed(leaf, fern::blade(counts, segment, (leaf.width, leaf.cell), &skeleton, &mut stream))
         }
@@ -140,7 +141,7 @@ fn sides(leaf: &LeafState<'_>) -> u32 {
 
 /// Returns the number of segments of a stalk or midrib of `length` metres; `usual` at the usual mesh resolution.
 fn pieces(leaf: &LeafState<'_>, length: f32, usual: u8) -> u8 {
-    if leaf.cell > CELL { ((length / leaf.cell).ceil().min(255.0) as u8).clamp(2, usual) } else { usual }
+    if leaf.cell > CELL { (length / leaf.cell).ceil().min(255.0).trunc_to::<u8>().clamp(2, usual) } else { usual }
 }
 
 /// Returns the number of cells along and across the blade: that of the kind, reduced where cells would be shorter than
@@ -152,11 +153,11 @@ fn cells(leaf: &LeafState<'_>) -> (usize, usize) {
     let across = (columns * (fit / rows).sqrt()).round();
     // Columns of a coarse blade are as wide as its rows are long.
     let across = if leaf.cell > CELL { across.min(f64::from(leaf.width / leaf.cell).ceil()) } else { across };
-    (fit.round() as usize, across.max(fewest.1).min(columns) as usize)
+    (fit.round_to::<usize>(), across.max(fewest.1).min(columns).trunc_to::<usize>())
 }
 
 fn measures(leaf: &LeafState<'_>) -> Measures {
-    let count = leaf.kind.joints.get() as usize;
+    let count = leaf.kind.joints.get().trunc_to::<usize>();
     let half_width = |t: f32| match &leaf.kind.shape {
         Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => outline.half_width(t) * leaf.width,
         Shape::Pinnate { bare, .. } => ribbons::half_width(bare.f32().min(MOST_BARE), t) * leaf.width,
@@ -164,7 +165,7 @@ fn measures(leaf: &LeafState<'_>) -> Measures {
     };
     let (veins, secondaries) = if let Shape::Leaflets { .. } = leaf.kind.shape {
         // The branching joints are in the leaflets.
-        ((1..=count).map(|k| k as f32 / (count as f32 + 1.0)).collect(), None)
+        ((1..=count).map(|k| k.to_f32() / (count.to_f32() + 1.0)).collect(), None)
     } else {
         let veins = leaf.kind.joints_along(count);
         let branches = leaf.kind.branches(half_width, &veins);
@@ -212,7 +213,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
         .map(|k| {
             let s = along[k] / leaf.blade;
             let moment: f32 =
-                (0..12).map(|i| (i as f32 + 0.5) / 12.0).filter(|t| *t > s).map(|t| shape(t) * (t - s)).sum();
+                (0..12).map(|i| (i.to_f32() + 0.5) / 12.0).filter(|t| *t > s).map(|t| shape(t) * (t - s)).sum();
             moment / (1.0 - 0.75 * s).powi(3)
         })
         .collect();
@@ -223,7 +224,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
     let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
     for k in 0..along.len() - 1 {
         let (designed, load) = if k < base {
-            (0.0, stalk_bend / base as f32)
+            (0.0, stalk_bend / base.to_f32())
         } else {
             let pitch = if k == base { -leaf.pitch } else { 0.0 };
             (pitch, leaf.bend * sag[k - base] / total)
@@ -231,7 +232,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
         let mut bend = designed - load * (elevation + designed).cos().max(0.0);
         // Neighbouring stalks hold the base of a stalk (k = 0); a sheath does not wobble at all.
         let held = if k < base { free } else { 1.0 };
-        bend += wobble * stream.normal() as f32 * if k == 0 { 0.4 } else { 1.0 } * held;
+        bend += wobble * stream.normal().to_f32() * if k == 0 { 0.4 } else { 1.0 } * held;
         let link = along[k + 1] - along[k];
         let lying = lerp(near, far.max(near), ((along[k + 1] - start) / whole).min(1.0));
         let lowest = ((lying - height) / link.max(1e-6)).clamp(-1.0, 0.25).asin();
@@ -248,7 +249,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
     let [inner, outer] = [&leaf.kind.branch_bend_deg.0, &leaf.kind.branch_bend_deg.1];
     skeleton.bend_branches(|_, _| {
         let designed = [inner, outer].map(|bend| bend.draw32(&mut own).to_radians());
-        let noise = [wobble * stream.normal() as f32, 1.5 * wobble * stream.normal() as f32];
+        let noise = [wobble * stream.normal().to_f32(), 1.5 * wobble * stream.normal().to_f32()];
         (designed[0] + noise[0], designed[1] + noise[1] - hang)
     });
 }

@@ -6,7 +6,7 @@
 //! random, use the mirrored texture. Colour and labels use the same mesh.
 
 use super::blade::BladeGrid;
-use furrow_base::math::vec2;
+use furrow_base::math::{ToFloat, vec2};
 use furrow_base::sampling::Stream;
 use furrow_optics::texture::noise::Perlin;
 use std::f32::consts::PI;
@@ -52,10 +52,10 @@ impl LeafOutline {
             let t = t.clamp(0.0, 1.0);
             let free = (PI * t).sin().max(0.0).sqrt();
             for (j, p) in sheet.rest.positions[i * stride..(i + 1) * stride].iter_mut().enumerate() {
-                let out = (j.abs_diff(middle)) as f32 / middle as f32;
+                let out = (j.abs_diff(middle)).to_f32() / middle.to_f32();
                 let row = if j < middle { 3.7 } else { 11.3 };
                 let along = PERIODS * f64::from(t);
-                let [wider, ahead] = [row, row + 5.9].map(|y| self.sd / NOISE_SD * noise.at2(along, y) as f32);
+                let [wider, ahead] = [row, row + 5.9].map(|y| self.sd / NOISE_SD * noise.at2(along, y).to_f32());
                 p.x *= 1.0 + wider.clamp(-MOST, MOST) * free;
                 p.y += ALONG * length * ahead.clamp(-MOST, MOST) * free * free * out * out;
             }
@@ -70,6 +70,7 @@ mod tests {
     use super::*;
     use furrow_base::geometry::Mesh;
     use furrow_base::geometry::outline::Outline;
+    use furrow_base::math::ToInt;
     use furrow_base::sampling::Purpose;
 
     fn sheet() -> BladeGrid {
@@ -99,7 +100,7 @@ mod tests {
             let mut one = sheet();
             outline.apply(&mut one, 0.08);
             for [a, b, c] in &one.rest.triangles {
-                let [a, b, c] = [a, b, c].map(|i| one.rest.positions[*i as usize].truncate());
+                let [a, b, c] = [a, b, c].map(|i| one.rest.positions[i.to_usize()].truncate());
                 assert!((b - a).perp_dot(c - a) > 0.0, "seed {seed}");
             }
             for (i, (p, q)) in one.rest.positions.iter().zip(&plain.rest.positions).enumerate() {
@@ -115,7 +116,7 @@ mod tests {
             assert!((0.67..1.34).contains(&share), "seed {seed}: {share}");
             areas += share / 200.0;
         }
-        let sd = (squares / count as f32).sqrt();
+        let sd = (squares / count.to_f32()).sqrt();
         assert!((sd / 0.08 - 1.0).abs() < 0.25, "{sd}");
         assert!((areas - 1.0).abs() < 0.02, "{areas}");
         assert!((65..=135).contains(&mirrored), "{mirrored}");

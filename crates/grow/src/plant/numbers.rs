@@ -7,6 +7,7 @@
 use super::desc::{Form, PlantDesc};
 use super::inflorescence::check;
 use super::stage::{MOST_SHOOTS, StageDesc};
+use furrow_base::math::RoundTo;
 
 /// Blocks of leaf numbers of one species.
 #[derive(Clone, Debug)]
@@ -32,10 +33,11 @@ impl Numbers {
     pub(super) fn of(desc: &PlantDesc) -> Self {
         let stages = || desc.stages.iter();
         let most =
-            |pick: fn(&StageDesc) -> f64| (stages().map(pick).fold(0.0, f64::max).round() as usize).min(MOST_SHOOTS);
+            |pick: fn(&StageDesc) -> f64| stages().map(pick).fold(0.0, f64::max).round_to::<usize>().min(MOST_SHOOTS);
         let branching = matches!(desc.form, Form::Runner | Form::Whorl);
         let last = desc.stages.last();
-        let each = last.map_or(0, |stage| stage.layers.iter().map(|layer| layer.leaves.get() as usize).sum());
+        let each =
+            last.map_or(0, |stage| stage.layers.iter().map(|layer| layer.leaves.get().trunc_to::<usize>()).sum());
         let mut numbers = Self {
             each,
             shoots: most(|stage| stage.tillers.largest()),
@@ -44,14 +46,15 @@ impl Numbers {
         };
         let mut first = each * (1 + numbers.shoots * (1 + numbers.branches));
         for k in 0..last.map_or(0, |stage| stage.inflorescences.len()) {
-            let axes = stages().filter_map(|stage| check::axes(stage).get(k).copied()).fold(0.0, f64::max) as usize;
+            let axes =
+                stages().filter_map(|stage| check::axes(stage).get(k).copied()).fold(0.0, f64::max).trunc_to::<usize>();
             // Side shoots of second order have tips too.
             let axes = axes * (1 + numbers.branches);
             let rows = stages().filter_map(|stage| stage.inflorescences.get(k)).map(|axis| axis.leaves.len()).max();
             let mut ends = vec![0];
             for row in 0..rows.unwrap_or(0) {
                 let leaves = stages().filter_map(|stage| stage.inflorescences.get(k)?.leaves.get(row));
-                let count = leaves.map(|leaves| leaves.count.largest().round()).fold(0.0, f64::max) as usize;
+                let count = leaves.map(|leaves| leaves.count.largest().round()).fold(0.0, f64::max).trunc_to::<usize>();
                 ends.push(ends[row] + count);
             }
             let of_one = ends[ends.len() - 1];

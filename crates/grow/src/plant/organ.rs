@@ -3,7 +3,7 @@
 use super::rig::RigJoint;
 use super::skeleton::PlacedJoint;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, ToInt, Vec3};
 
 /// Kind of organ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
@@ -112,7 +112,7 @@ pub struct StemLine {
 impl StemLine {
     /// Returns the position of the tip.
     pub(super) fn end(&self) -> StemPosition {
-        StemPosition { line: self.number, at: self.points.len().saturating_sub(1) as f32 }
+        StemPosition { line: self.number, at: self.points.len().saturating_sub(1).to_f32() }
     }
 }
 
@@ -185,5 +185,5 @@ impl Organ {
 
 /// Returns the number of the next stem line of these organs.
 pub(super) fn next_line(organs: &[Organ]) -> u32 {
-    organs.iter().map(|organ| organ.lines.len()).sum::<usize>() as u32
+    organs.iter().map(|organ| organ.lines.len()).sum::<usize>().to_u32()
 }

@@ -10,7 +10,7 @@
 use super::blade::RestMesh;
 use super::growth::CELL;
 use super::skeleton::{Skeleton, Weights};
-use furrow_base::math::{Vec3, lerp, smoothstep, vec2, vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, lerp, smoothstep, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::PI;
 
@@ -85,7 +85,7 @@ impl<'a> Ribbons<'a> {
         let mut wider = 1.0;
         if pieces == 1 && self.drawn < 1.0 {
             // Additive recurrence with the golden ratio: the kept ribbons are spread evenly over the blade.
-            if (self.count as f32 * GOLDEN).fract() >= self.drawn {
+            if (self.count.to_f32() * GOLDEN).fract() >= self.drawn {
                 return;
             }
             wider = 1.0 / self.drawn;
@@ -93,15 +93,15 @@ impl<'a> Ribbons<'a> {
         let right = along.cross(up).normalize_or(Vec3::X);
         let mut previous = None;
         for i in 0..=pieces {
-            let s = i as f32 / pieces as f32;
+            let s = i.to_f32() / pieces.to_f32();
             let centre = start + along * s + bow * (s * s);
             let half = 0.5 * wider * width(s);
             let tie = self.tie(centre);
-            let first = self.rest.positions.len() as u32;
+            let first = self.rest.positions.len().to_u32();
             for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
                 let keel = if side == 0.0 { -0.55 * half } else { 0.0 };
                 let p = centre + right * (half * side) + up * keel;
-                self.rest.corner(p, vec2(0.5 * k as f32, 1.0 - s), tie);
+                self.rest.corner(p, vec2(0.5 * k.to_f32(), 1.0 - s), tie);
             }
             if let Some(near) = previous {
                 self.rest.stitch(near, first, 2);
@@ -126,9 +126,9 @@ impl<'a> Ribbons<'a> {
         let bow = (up * stream.range32(-0.12, 0.2) + right * stream.range32(-CURL, CURL)) * length;
         self.strip(start, along, up, bow, self.width, 2);
         for (k, place, grown) in series(lobes) {
-            let s = lerp(0.18, 0.88, place) + stream.child(Purpose::Leaf, k as u64).range32(-0.05, 0.05);
+            let s = lerp(0.18, 0.88, place) + stream.child(Purpose::Leaf, k.to_u64()).range32(-0.05, 0.05);
             for (far, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
-                let mut own = stream.child(Purpose::Leaf, 1 << 10 | (2 * k + far) as u64);
+                let mut own = stream.child(Purpose::Leaf, 1 << 10 | (2 * k + far).to_u64());
                 let reach = grown * length * own.range32(0.42, 0.68) * (1.2 - s);
                 let spread = own.range32(0.55, 0.95);
                 let tilt = own.range32(-0.35, 0.5);
@@ -166,9 +166,9 @@ impl<'a> Ribbons<'a> {
 /// Iterates over the pairs along an axis, the last of them partially grown: the index of each from the base, its centre
 /// as a fraction of the axis, and the fraction of it that has grown. All values are continuous in `pairs`.
 pub(super) fn series(pairs: f32) -> impl Iterator<Item = (usize, f32, f32)> {
-    (0..pairs.ceil() as usize).map(move |k| {
-        let grown = (pairs - k as f32).min(1.0);
-        (k, (k as f32 + 0.5 * grown) / pairs, grown)
+    (0..pairs.ceil_to::<usize>()).map(move |k| {
+        let grown = (pairs - k.to_f32()).min(1.0);
+        (k, (k.to_f32() + 0.5 * grown) / pairs, grown)
     })
 }
 
@@ -215,12 +215,12 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
     let length = skeleton.length();
     let Division { pairs, lobes, bare, segment, cell } = division;
     // Small leaves have fewer, not finer, segments.
-    let pairs = (pairs.min(MOST) as f32).min(length * (1.0 - bare) / (1.6 * segment)).max(1.0);
-    let lobes = (lobes.min(MOST) as f32).min(0.5 * width / (3.0 * segment));
+    let pairs = pairs.min(MOST).to_f32().min(length * (1.0 - bare) / (1.6 * segment)).max(1.0);
+    let lobes = lobes.min(MOST).to_f32().min(0.5 * width / (3.0 * segment));
     let half_width = |t: f32| half_width(bare, t) * width;
     let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
     let rachis = (Vec3::ZERO, vec3(0.0, length, 0.0), Vec3::Z, Vec3::ZERO);
-    ribbons.band(rachis, (2 * pairs.min(12.0) as u32).max(8), |s| {
+    ribbons.band(rachis, (2 * pairs.min(12.0).trunc_to::<u32>()).max(8), |s| {
         // A thread that widens where the pinnae are; with few of them the tip itself is a small blade.
         let blade = 1.4 * bare * smoothstep(bare, 0.9, s);
         segment * (lerp(0.8, 0.95, s) + blade) * (1.0 - 0.8 * smoothstep(0.88, 1.0, s))
@@ -228,7 +228,7 @@ pub(super) fn blade(division: Division, width: f32, skeleton: &Skeleton, stream:
     for (k, place, grown) in series(pairs) {
         for (far, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
             // Each pinna has its own stream, so that it keeps its shape while others grow beside it.
-            let mut own = stream.child(Purpose::Leaf, (2 * k + far) as u64);
+            let mut own = stream.child(Purpose::Leaf, (2 * k + far).to_u64());
             let stray = own.range32(-0.3, 0.3) / (pairs + 1.0);
             let u = (place + stray).clamp(0.03, 0.97);
             let t = lerp(first(bare), LAST, u);
@@ -264,7 +264,7 @@ mod tests {
             let division = Division { pairs: 9, lobes: 4, bare: 0.3, segment: 7e-4, cell: CELL };
             let mut stream = Stream::of(seed, 0, Purpose::Leaf, 0);
             let rest = blade(division, 0.4 * length, &Skeleton::new(&measures), &mut stream);
-            let corner = |k: u32| rest.positions[k as usize];
+            let corner = |k: u32| rest.positions[k.to_usize()];
             let double = |[a, b, c]: &[u32; 3]| (corner(*b) - corner(*a)).cross(corner(*c) - corner(*a)).length();
             0.5 * rest.triangles.iter().map(double).sum::<f32>()
         };

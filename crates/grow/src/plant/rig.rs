@@ -1,7 +1,7 @@
 //! Joints of a leaf with their axes, for programs that animate the leaf.
 
 use super::skeleton::{Name, Pose, Skeleton};
-use furrow_base::math::{Mat3, Vec3};
+use furrow_base::math::{Mat3, ToInt, Vec3};
 
 /// Joint of a leaf's kinematic tree in the current posture. Skin weights refer to it by its index in the list.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub(super) fn rig(skeleton: &Skeleton, root: Pose) -> Vec<RigJoint> {
     let poses = skeleton.forward(root);
     let joint = |(joint, pose): (&super::skeleton::Joint, Pose)| RigJoint {
         name: named(joint.name),
-        parent: joint.parent.map(|parent| parent as u16),
+        parent: joint.parent.map(ToInt::to_u16),
         at: pose.origin,
         axes: pose.rotation,
     };

@@ -12,7 +12,7 @@ use super::organ::{self, Organ, OrganKind, StemLine, StemPosition};
 use super::stage::MOST_SHOOTS;
 use super::tube::{self, Profile};
 use super::twine::Helix;
-use furrow_base::math::{Vec2, Vec3, direction, lerp, smoothstep};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, direction, lerp, smoothstep};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -44,7 +44,7 @@ impl Stem {
     fn node(&self, node: usize) -> Option<((Vec3, Vec3, f32), StemPosition)> {
         let k = node.min(self.nodes.len().saturating_sub(1));
         // The line starts at the stem's base, before its first node.
-        Some((*self.nodes.get(k)?, StemPosition { line: self.line, at: (k + 1) as f32 }))
+        Some((*self.nodes.get(k)?, StemPosition { line: self.line, at: (k + 1).to_f32() }))
     }
 }
 
@@ -73,7 +73,7 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
 /// Builds the main shoot, its side shoots and the side shoots of these.
 pub(super) fn shoots(growth: &Growth<'_>, habit: ShootParameters) -> Vec<Organ> {
     let mut plant = ShootBuilder {
-        organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers as usize)),
+        organs: Vec::with_capacity(2 + 2 * growth.leaves.len() * (1 + growth.tillers.trunc_to::<usize>())),
         growth,
         habit,
         line: Vec2::ZERO,
@@ -94,8 +94,8 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: ShootParameters) -> Vec<Organ> 
     // The lowest axils sprout first.
     for ((k, there), axil) in growth::shoots(growth.tillers).zip(&axils) {
         let Some(above) = growth.numbers.side(k) else { break };
-        let stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-        let size = 0.95_f32.powi(k as i32) * there;
+        let stream = growth.stream.child(Purpose::Plant, 100 + k.to_u64());
+        let size = 0.95_f32.powi(k.to_i32()) * there;
         let Some(shoot) = plant.side(&stem, Axil { layer: axil.0, node: axil.0, azimuth: axil.1, size }, above, stream)
         else {
             continue;
@@ -104,7 +104,7 @@ pub(super) fn shoots(growth: &Growth<'_>, habit: ShootParameters) -> Vec<Organ> 
         let own = axils.iter().filter(|a| a.0 > axil.0 + 1);
         for ((m, there), (layer, azimuth)) in growth::shoots(growth.branches).zip(own) {
             let Some(above) = growth.numbers.branch(k, m) else { break };
-            let stream = growth.stream.child(Purpose::Plant, 200 + (MOST_SHOOTS * k + m) as u64);
+            let stream = growth.stream.child(Purpose::Plant, 200 + (MOST_SHOOTS * k + m).to_u64());
             let azimuth = azimuth + shoot.turn;
             let axil = Axil { layer: *layer, node: layer - axil.0 - 1, azimuth, size: 0.8 * shoot.size * there };
             plant.side(&shoot.stem, axil, above, stream);
@@ -180,11 +180,11 @@ impl ShootBuilder<'_> {
         for rise in rise {
             let radius = foot.radius * lerp(1.0, TAPER, if whole > 0.0 { rise / whole } else { 0.0 });
             let pieces = helix.map_or(PIECES, |helix| helix.steps(rise - below).max(PIECES));
-            let step = (rise - below) / pieces as f32;
-            let (swerve, sway) = (swerve * stream.normal() as f32, 0.07 * stream.normal() as f32);
+            let step = (rise - below) / pieces.to_f32();
+            let (swerve, sway) = (swerve * stream.normal().to_f32(), 0.07 * stream.normal().to_f32());
             for piece in 1..=if step > 1e-6 { pieces } else { 0 } {
-                let t = (below + step * piece as f32) / whole;
-                heading += swerve / pieces as f32;
+                let t = (below + step * piece.to_f32()) / whole;
+                heading += swerve / pieces.to_f32();
                 // An upright stem turns towards the light; a sinking one descends from its base, and only its tip rises.
                 let stands = start + (1.0 - sunk) * 0.6 * t * start.cos();
                 let lies = lerp(stands, CREEP, sunk * smoothstep(0.0, 0.45, t));

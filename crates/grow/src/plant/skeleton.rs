@@ -21,7 +21,7 @@
 //! the blade). The second, at the midrib (α = +90° turns the hinge back), and the third, half-way out, bend the blade
 //! sideways.
 
-use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::math::{Mat3, ToFloat, ToInt, Vec3, vec3};
 use std::f32::consts::FRAC_PI_2;
 use std::fmt;
 
@@ -172,17 +172,17 @@ impl Skeleton {
             along.push(y);
         };
         for i in 0..stalk_joints {
-            chain(Name::St(i as u8 + 1), -m.stalk * (1.0 - i as f32 / stalk_joints as f32));
+            chain(Name::St(i.to_u8() + 1), -m.stalk * (1.0 - i.to_f32() / stalk_joints.to_f32()));
         }
         chain(Name::B, 0.0);
         for (i, t) in m.veins.iter().enumerate() {
-            chain(Name::Vn(i as u8 + 1), t * m.length);
+            chain(Name::Vn(i.to_u8() + 1), t * m.length);
         }
         chain(Name::Pk, m.length);
         let base = stalk_joints;
         if let Some((angle, half_widths)) = &m.secondaries {
             for (i, half_width) in half_widths.iter().enumerate().take(m.veins.len()) {
-                let n = i as u8 + 1;
+                let n = i.to_u8() + 1;
                 let reach = half_width / angle.sin();
                 for (name, sign) in [(Name::StL as fn(u8, u8) -> Name, 1.0), (Name::StR as fn(u8, u8) -> Name, -1.0)] {
                     let turn = joints.len();
@@ -287,11 +287,11 @@ impl Skeleton {
         let chain = self.along.len();
         let place = |(k, joint): (usize, &Joint)| match joint.name {
             Name::StL(vein, 3) | Name::StR(vein, 3) => {
-                let parent = Some((self.base + usize::from(vein)) as u16);
+                let parent = Some((self.base + usize::from(vein)).to_u16());
                 Some(PlacedJoint { name: joint.name, parent, at: poses[k].origin })
             }
             _ if k < chain => {
-                let parent = joint.parent.map(|parent| parent as u16);
+                let parent = joint.parent.map(ToInt::to_u16);
                 Some(PlacedJoint { name: joint.name, parent, at: poses[k].origin })
             }
             _ => None,
@@ -327,7 +327,7 @@ impl Skeleton {
     /// Returns the skin weights of a point on the stalk or midrib.
     pub fn weights_on_chain(&self, y: f32) -> Weights {
         let (a, b, share) = self.carriers(y);
-        [(a as u16, 1.0 - share), (b as u16, share), (0, 0.0), (0, 0.0)]
+        [(a.to_u16(), 1.0 - share), (b.to_u16(), share), (0, 0.0), (0, 0.0)]
     }
 
     /// Returns the skin weights of a point of the flat blade at (x, y); `across` = |x| / half-width at y.
@@ -346,13 +346,13 @@ impl Skeleton {
         let (lo, hi) = (upper.saturating_sub(1), upper.min(veins - 1));
         let share = if hi > lo { ((origin - at[lo]) / (at[hi] - at[lo])).clamp(0.0, 1.0) } else { 0.0 };
         let right = x > 0.0;
-        let part = |vein, part| self.branch(vein, right, part) as u16;
+        let part = |vein, part| self.branch(vein, right, part).to_u16();
         if across < INNER {
             let out = across / INNER;
             let (a, b, along) = self.carriers(y);
             [
-                (a as u16, (1.0 - out) * (1.0 - along)),
-                (b as u16, (1.0 - out) * along),
+                (a.to_u16(), (1.0 - out) * (1.0 - along)),
+                (b.to_u16(), (1.0 - out) * along),
                 (part(lo, 2), out * (1.0 - share)),
                 (part(hi, 2), out * share),
             ]
@@ -393,10 +393,10 @@ mod tests {
     fn forward_kinematics_is_the_product_of_the_textbook_matrices() {
         let mut skeleton = Skeleton::new(&beet());
         for (i, joint) in skeleton.joints.iter_mut().enumerate() {
-            joint.bend = 0.3 * (i as f32 * 1.7).sin();
+            joint.bend = 0.3 * (i.to_f32() * 1.7).sin();
         }
         let poses = skeleton.forward(Pose::leaf(-0.04));
-        let root = [[0., 0., 1., 0.], [1., 0., 0., -0.04f32 as f64], [0., 1., 0., 0.], [0., 0., 0., 1.]];
+        let root = [[0., 0., 1., 0.], [1., 0., 0., f64::from(-0.04f32)], [0., 1., 0., 0.], [0., 0., 0., 1.]];
         let mut matrices: Vec<[[f64; 4]; 4]> = Vec::new();
         for (joint, pose) in skeleton.joints.iter().zip(&poses) {
             let (a, alpha) = (f64::from(joint.a), f64::from(joint.alpha));
@@ -445,7 +445,7 @@ mod tests {
     fn a_straightened_blade_is_flat_and_points_where_its_tip_was() {
         let mut skeleton = Skeleton::new(&beet());
         for (i, joint) in skeleton.joints.iter_mut().enumerate() {
-            joint.bend = -0.2 + 0.1 * (i as f32 * 1.7).sin();
+            joint.bend = -0.2 + 0.1 * (i.to_f32() * 1.7).sin();
         }
         let tip = skeleton.along().len() - 1;
         let ends = |s: &Skeleton| [s.base(), tip].map(|k| s.forward(Pose::leaf(-0.04))[k].origin);
@@ -468,7 +468,7 @@ mod tests {
         let skeleton = Skeleton::new(&beet());
         for i in 0..=60 {
             for j in -10..=10 {
-                let (y, across) = (-0.045 + 0.13 * i as f32 / 60.0, j as f32 / 9.0);
+                let (y, across) = (-0.045 + 0.13 * i.to_f32() / 60.0, j.to_f32() / 9.0);
                 let weights = skeleton.weights(0.02 * across, y, across.abs());
                 let sum: f32 = weights.iter().map(|(_, w)| w).sum();
                 assert!((sum - 1.0).abs() < 1e-5, "{sum}");

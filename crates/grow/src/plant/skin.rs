@@ -13,7 +13,7 @@
 use super::blade::{BladeGrid, RestMesh};
 use super::skeleton::{Pose, Skeleton};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec3, smoothstep, vec3};
+use furrow_base::math::{ToFloat, Vec3, smoothstep, vec3};
 use furrow_optics::texture::noise::Perlin;
 use std::f32::consts::{PI, TAU};
 
@@ -106,15 +106,15 @@ impl BladeRelief {
         if self.wave != 0.0 {
             // Phase and amplitude vary over about two periods, independently for the two margins.
             let wander = f64::from(origin / (2.2 * self.period.max(0.02)));
-            let drift = noise.at2(wander, f64::from(side) * 7.3 + 0.5) as f32;
-            let swell = 1.0 + 1.3 * noise.at2(2.0 * wander + 31.7, f64::from(side) * 5.1 + 0.5) as f32;
+            let drift = noise.at2(wander, f64::from(side) * 7.3 + 0.5).to_f32();
+            let swell = 1.0 + 1.3 * noise.at2(2.0 * wander + 31.7, f64::from(side) * 5.1 + 0.5).to_f32();
             let phase = TAU * (origin / self.period.max(0.02) + 0.8 * drift) + side;
             lift += self.wave * swell.max(0.1) * ends * across.powf(1.5) * phase.sin();
         }
         if self.quilt != 0.0 {
             // One blister between neighbouring secondary veins: high in its middle, zero on the midrib, lowest on the veins.
             let cell = (PI * self.pairs * origin).sin().abs();
-            let patch = 1.0 + 0.8 * noise.at2(f64::from(9.0 * t), f64::from(side * across * 3.0) + 11.3) as f32;
+            let patch = 1.0 + 0.8 * noise.at2(f64::from(9.0 * t), f64::from(side * across * 3.0) + 11.3).to_f32();
             lift += self.quilt * patch * ends * (cell - 0.35) * (PI * across.min(1.0)).sin();
         }
         lift

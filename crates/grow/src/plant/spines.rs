@@ -4,7 +4,7 @@
 
 use super::blade::{BladeGrid, RestMesh};
 use super::kind::Spines;
-use furrow_base::math::{Vec3, lerp, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, lerp, vec2};
 use furrow_base::sampling::Stream;
 use std::f32::consts::TAU;
 
@@ -24,24 +24,24 @@ pub(super) fn grow(sheet: &BladeGrid, spines: &Spines, blade: f32, stream: &mut 
     if blade < LEAST {
         return rest;
     }
-    let lobes = spines.lobes.get() as usize;
+    let lobes = spines.lobes.get().trunc_to::<usize>();
     let grown = 1e-3 * (blade / GROWN).min(1.0);
     let (stride, half) = (sheet.columns + 1, sheet.columns / 2);
     for side in [-1.0_f32, 1.0] {
         for i in 0..3 * lobes {
             let main = i % 3 == 1;
-            let place = (i / 3) as f32 + [0.2, 0.5, 0.8][i % 3] + stream.range32(-0.05, 0.05);
+            let place = (i / 3).to_f32() + [0.2, 0.5, 0.8][i % 3] + stream.range32(-0.05, 0.05);
             let long = spines.length_mm.draw32(stream) * grown * if main { 1.0 } else { 0.55 };
             let tilt =
                 stream.range32(0.15, 0.9) * if (i + usize::from(side > 0.0)).is_multiple_of(2) { 1.0 } else { -1.0 };
             let lean = stream.range32(0.15, 0.75);
-            let t = lerp(0.06, 0.96, place / lobes as f32);
+            let t = lerp(0.06, 0.96, place / lobes.to_f32());
             let row = sheet.t.partition_point(|r| *r <= t).clamp(1, sheet.rows - 1);
-            let out = half as f32 * if main { FOOT.0 } else { FOOT.1 };
-            let inner = (out as usize).min(half - 1);
+            let out = half.to_f32() * if main { FOOT.0 } else { FOOT.1 };
+            let inner = out.trunc_to::<usize>().min(half - 1);
             let at = |row: usize, step: usize| row * stride + if side < 0.0 { half - step } else { half + step };
             let corner = |row: usize, step: usize| sheet.rest.positions[at(row, step)];
-            let foot = corner(row, inner).lerp(corner(row, inner + 1), out - inner as f32);
+            let foot = corner(row, inner).lerp(corner(row, inner + 1), out - inner.to_f32());
             let outward = (corner(row, half) - corner(row, half - 1)).normalize_or(Vec3::X);
             let forward = (corner(row + 1, inner) - corner(row, inner)).normalize_or(Vec3::Y);
             let above = outward.cross(forward).normalize_or(Vec3::Z);
@@ -50,11 +50,11 @@ pub(super) fn grow(sheet: &BladeGrid, spines: &Spines, blade: f32, stream: &mut 
             let right = axis.cross(above).normalize_or(forward);
             let up = right.cross(axis);
             let tie = sheet.rest.weights[at(row, inner)];
-            let first = rest.positions.len() as u32;
+            let first = rest.positions.len().to_u32();
             for k in 0..3 {
-                let (sin, cos) = (TAU * k as f32 / 3.0).sin_cos();
+                let (sin, cos) = (TAU * k.to_f32() / 3.0).sin_cos();
                 let round = (right * cos + up * sin) * (0.5 * SLENDER * long);
-                rest.corner(foot + round, vec2(k as f32 / 3.0, 0.0), tie);
+                rest.corner(foot + round, vec2(k.to_f32() / 3.0, 0.0), tie);
             }
             rest.corner(foot + axis * long, vec2(0.5, 1.0), tie);
             // Counter-clockwise seen from outside, because up × right points against the axis.

@@ -7,6 +7,7 @@
 //! detection", IROS, §III-B; BBCH scale: Meier 2001, "Growth stages of mono- and dicotyledonous plants".
 
 use super::inflorescence::desc::InflorescenceDesc;
+use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +36,7 @@ impl Bound for Code {
 
 /// Reads a BBCH code.
 fn code<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    Num::<Code>::deserialize(deserializer).map(|code| code.get() as u32)
+    Num::<Code>::deserialize(deserializer).map(|code| code.get().trunc_to::<u32>())
 }
 
 /// Length below which a blade is hidden in the bud, metres.

@@ -8,7 +8,7 @@
 use super::organ::{Organ, StemLine, StemPosition};
 use super::rig::RigJoint;
 use furrow_base::geometry::JointWeights;
-use furrow_base::math::{Mat3, Vec3};
+use furrow_base::math::{Mat3, RoundTo, Vec3};
 use std::collections::BTreeMap;
 
 /// Length below which a link has no joint of its own, metres.
@@ -78,7 +78,7 @@ impl Stems {
         if on.at <= 0.0 && chain.parent.is_some() {
             return chain.parent;
         }
-        let link = (on.at.ceil() as usize).saturating_sub(1).min(last);
+        let link = on.at.ceil_to::<usize>().saturating_sub(1).min(last);
         Some(chain.links[link])
     }
 

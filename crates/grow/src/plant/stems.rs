@@ -12,7 +12,7 @@ use super::axis::StemBase;
 use super::desc::Form;
 use super::growth::{self, Growth, LeafState};
 use super::stage::{BUD, MOST_SHOOTS};
-use furrow_base::math::{direction, lerp};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, direction, lerp};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -62,11 +62,11 @@ pub(super) fn others(growth: &Growth<'_>) -> Vec<OtherStem> {
     if growth.desc.form != Form::Erect {
         return Vec::new();
     }
-    let count = (growth.tillers.round() as usize).min(MOST_SHOOTS);
+    let count = growth.tillers.round_to::<usize>().min(MOST_SHOOTS);
     let stem = |k: usize| {
         let above = growth.numbers.side(k)?;
-        let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-        let towards = growth::turn(growth.stream) + GOLDEN * k as f32 + stream.range32(-0.4, 0.4);
+        let mut stream = growth.stream.child(Purpose::Plant, 100 + k.to_u64());
+        let towards = growth::turn(growth.stream) + GOLDEN * k.to_f32() + stream.range32(-0.4, 0.4);
         let out = direction(FRAC_PI_2, towards);
         let foot = StemBase {
             point: out * stream.range32(APART.0, APART.1),

@@ -8,7 +8,7 @@ use super::growth::LeafState;
 use super::kind::Stipules;
 use super::ribbons::Ribbons;
 use super::skeleton::Skeleton;
-use furrow_base::math::{Vec3, lerp, vec3};
+use furrow_base::math::{RoundTo, ToFloat, Vec3, lerp, vec3};
 use furrow_base::sampling::Purpose;
 
 /// Angle between stalk and end lobe, radians.
@@ -20,7 +20,7 @@ pub(super) fn pair(plan: &Stipules, leaf: &LeafState<'_>, skeleton: &Skeleton) -
     let long = plan.length.f32() * leaf.blade;
     let rest = RestMesh::default();
     let mut ribbons = Ribbons { rest, skeleton, half_width: None, width: 0.2 * long, count: 0, drawn: 1.0 };
-    let lobes = plan.lobes.get().min(12.0) as usize;
+    let lobes = plan.lobes.get().min(12.0).trunc_to::<usize>();
     for side in [-1.0_f32, 1.0] {
         let heading = |angle: f32, rise: f32| vec3(side * angle.sin(), angle.cos(), rise).normalize_or(Vec3::Y);
         let foot = vec3(side * 0.3 * leaf.kind.stalk_width.f32() * leaf.blade, -0.96 * leaf.stalk, 0.0);
@@ -32,7 +32,7 @@ pub(super) fn pair(plan: &Stipules, leaf: &LeafState<'_>, skeleton: &Skeleton) -
         });
         for (inner, count) in [(false, lobes + 1), (true, lobes)] {
             for k in 0..count {
-                let share = (k as f32 + 0.5) / count as f32;
+                let share = (k.to_f32() + 0.5) / count.to_f32();
                 let reach = long * lerp(0.3, 0.5, share) * stream.range32(0.8, 1.2);
                 let turn = lerp(1.0, 0.4, share) + stream.range32(-0.12, 0.12);
                 let lobe = heading(SPREAD + if inner { -turn } else { turn }, stream.range32(-0.1, 0.3));

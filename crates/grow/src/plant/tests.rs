@@ -2,7 +2,7 @@
 
 use super::*;
 use furrow_base::geometry::{Mesh, outline};
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{ToFloat, ToInt, Vec2, Vec3};
 use furrow_base::ron_file::Vary;
 use furrow_base::sampling::Purpose;
 use furrow_field::species_text::SpeciesFile;
@@ -115,7 +115,7 @@ fn every_age_between_the_stages_grows_valid_meshes() {
     for page in pages() {
         let (first, last) = page.plant.days();
         for k in 0..40 {
-            let age = first - 3.0 + (last - first + 8.0) * k as f32 / 39.0;
+            let age = first - 3.0 + (last - first + 8.0) * k.to_f32() / 39.0;
             let plant = grow(&page.plant, Stage::Age(age), &stream(k));
             for organ in &plant.organs {
                 assert_eq!(organ.mesh.fault(), None, "{} at {age} days", page.eppo);
@@ -185,7 +185,7 @@ fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
 
 fn distance(points: &[Vec3], mesh: &Mesh) -> f32 {
     let mut least = f32::MAX;
-    for i in 0..mesh.triangles.len() as u32 {
+    for i in 0..mesh.triangles.len().to_u32() {
         let corners = mesh.corners(i);
         // No point of a triangle is farther from a vertex than the longer of the two sides that meet there.
         let side = corners[1].distance(corners[0]).max(corners[2].distance(corners[0]));
@@ -331,7 +331,7 @@ fn a_plant_only_grows_with_its_days() {
             let stream = stream(seed);
             let mut before: BTreeMap<u16, f32> = BTreeMap::new();
             for day in 4..=43 {
-                for leaf in growth::growth(&desc, Stage::Age(day as f32), &stream, 1.0).unwrap().leaves {
+                for leaf in growth::growth(&desc, Stage::Age(day.to_f32()), &stream, 1.0).unwrap().leaves {
                     if leaf.kind.organ == OrganKind::Blade {
                         let last = before.insert(leaf.number, leaf.blade).unwrap_or(0.0);
                         assert!(leaf.blade > last * 0.999, "{eppo} leaf {} on day {day}", leaf.number);
@@ -435,11 +435,11 @@ fn a_written_page_reads_back_the_same() {
 /// Returns the point of a mesh at these texture coordinates.
 fn point_at(mesh: &Mesh, uv: Vec2) -> Option<Vec3> {
     mesh.triangles.iter().find_map(|t| {
-        let [a, b, c] = t.map(|i| mesh.uvs[i as usize]);
+        let [a, b, c] = t.map(|i| mesh.uvs[i.to_usize()]);
         let whole = (b - a).perp_dot(c - a);
         let weights = [(c - b).perp_dot(uv - b), (a - c).perp_dot(uv - c), (b - a).perp_dot(uv - a)].map(|w| w / whole);
         let inside = weights.iter().all(|w| *w >= -1e-5);
-        inside.then(|| t.iter().zip(weights).map(|(i, w)| mesh.positions[*i as usize] * w).sum())
+        inside.then(|| t.iter().zip(weights).map(|(i, w)| mesh.positions[i.to_usize()] * w).sum())
     })
 }
 

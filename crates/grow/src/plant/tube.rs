@@ -5,7 +5,7 @@ use super::blade::RestMesh;
 use super::growth::CELL;
 use super::skeleton::Weights;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec3, vec2};
+use furrow_base::math::{ToFloat, ToInt, Vec3, vec2};
 use std::f32::consts::{FRAC_1_SQRT_2, TAU};
 
 /// Number of vertices around a tube in meshes coarser than usual.
@@ -58,10 +58,10 @@ pub(super) fn sweep(rest: &mut RestMesh, rings: &[Ring], sides: u32, mut weights
             along += ring.centre.distance(rings[i - 1].centre);
         }
         let tie = weights(ring.centre);
-        let first = rest.positions.len() as u32;
+        let first = rest.positions.len().to_u32();
         for k in 0..=sides {
             // Clockwise when looking against the tube's direction, so that the stitched triangles face outward.
-            let u = k as f32 / sides as f32;
+            let u = k.to_f32() / sides.to_f32();
             let (sin, cos) = (TAU * (u - 0.25)).sin_cos();
             let (x, z) = match ring.profile {
                 Profile::Channelled(top) => (-cos, if sin > 0.0 { top * sin } else { sin }),
@@ -94,7 +94,7 @@ pub(super) fn rigid(rings: &[Ring], sides: u32) -> Mesh {
 /// Averages the normals of the first and the last vertex of each ring, which coincide. The first `corners` vertices
 /// belong to rings.
 pub(super) fn close_seams(mesh: &mut Mesh, sides: u32, corners: usize) {
-    let stride = sides as usize + 1;
+    let stride = sides.to_usize() + 1;
     for ring in mesh.normals[..corners].chunks_exact_mut(stride) {
         let normal = (ring[0] + ring[stride - 1]).normalize_or(Vec3::Z);
         ring[0] = normal;

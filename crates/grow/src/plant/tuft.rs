@@ -10,7 +10,7 @@ use super::growth::{self, Growth, LeafState};
 use super::leaf::{self, Lower, Seat};
 use super::organ::Organ;
 use super::stage::BUD;
-use furrow_base::math::{Vec3, direction, lerp};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, direction, lerp};
 use furrow_base::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -31,17 +31,17 @@ const LACKS: usize = 3;
 
 /// Builds a grass with its tillers.
 pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
-    let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers as usize));
+    let mut organs = Vec::with_capacity(2 * growth.leaves.len() * (1 + growth.tillers.trunc_to::<usize>()));
     let axis = lean(growth);
     shoot(&mut organs, (0.5 * growth.stem, TAPER), axis, Vec3::ZERO, growth.leaves.iter().cloned());
     for (k, there) in growth::shoots(growth.tillers) {
         let Some(above) = growth.numbers.side(k) else { break };
-        let mut stream = growth.stream.child(Purpose::Plant, 100 + k as u64);
-        let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k as i32);
+        let mut stream = growth.stream.child(Purpose::Plant, 100 + k.to_u64());
+        let size = stream.range32(TILLER.0, TILLER.1) * 0.93_f32.powi(k.to_i32());
         let grown = growth.tillers_grown;
         let size = lerp(size, 1.0, grown) * there;
         // A tiller grows out of the axil of an older leaf, perpendicular to the ranks; tillers of one rank form a fan.
-        let rank = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2) as f32;
+        let rank = growth.leaves.first().map_or(0.0, |l| l.azimuth) + PI * (k % 2).to_f32();
         let towards = rank + fanned(k / 2) + stream.range32(-FAN / 3.0, FAN / 3.0);
         let axis = direction(lerp(stream.range32(SPREAD.0, SPREAD.1), UPRIGHT, grown), towards);
         let base = direction(FRAC_PI_2, towards) * (lerp(APART.0, APART.1, grown) * growth.stem);
@@ -69,7 +69,7 @@ pub(super) fn grow(growth: &Growth<'_>) -> Vec<Organ> {
 /// Returns the angle of the k-th tiller of a rank in its fan, radians from the centre: first the centre, then
 /// alternating sides.
 fn fanned(k: usize) -> f32 {
-    let steps = k.div_ceil(2) as f32;
+    let steps = k.div_ceil(2).to_f32();
     FAN * if k.is_multiple_of(2) { -steps } else { steps }
 }
 
@@ -89,10 +89,10 @@ pub(super) fn shoot<'a>(
     base: Vec3,
     leaves: impl ExactSizeIterator<Item = LeafState<'a>>,
 ) {
-    let count = leaves.len().max(1) as f32;
+    let count = leaves.len().max(1).to_f32();
     let foot = ROOT / axis.z.max(0.3);
     for (k, leaf) in leaves.enumerate() {
-        let radius = width * lerp(1.0, taper, k as f32 / count);
+        let radius = width * lerp(1.0, taper, k.to_f32() / count);
         let out = direction(FRAC_PI_2, leaf.azimuth);
         let out = (out - axis * out.dot(axis)).normalize_or(Vec3::X);
         // The sheath continues into the soil; its length is measured from the surface up.

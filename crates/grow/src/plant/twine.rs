@@ -12,7 +12,7 @@
 //! hangs. Source: Darwin 1875, "The Movements and Habits of Climbing Plants", ch. 1 (*Convolvulus* moves against the
 //! sun).
 
-use furrow_base::math::{Vec2, Vec3, lerp, smoothstep};
+use furrow_base::math::{RoundTo, Vec2, Vec3, lerp, smoothstep};
 use furrow_base::ron_file::{Fraction, Num, Positive, Vary};
 use furrow_base::sampling::Stream;
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,7 @@ impl Helix {
 
     /// Returns the number of steps for an internode of this length, metres.
     pub(super) fn steps(&self, length: f32) -> usize {
-        (length / self.step).ceil().clamp(1.0, 24.0) as usize
+        (length / self.step).ceil().clamp(1.0, 24.0).trunc_to::<usize>()
     }
 
     /// Returns the direction of the next `step` from `point`. `along` is the direction of the shoot before it winds,

@@ -4,7 +4,7 @@
 //! distribution with standard deviation 1/ℓ. Source: Rahimi & Recht 2007, "Random features"; as a spectral simulation,
 //! Shinozuka 1971.
 
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{ToFloat, Vec2, vec2};
 use furrow_base::sampling::Stream;
 
 /// Number of waves. The field's fourth moment is within 1.5/n of that of a normal distribution.
@@ -19,7 +19,7 @@ impl GaussianField {
         Self(
             (0..WAVES)
                 .map(|_| {
-                    let w = vec2(stream.normal() as f32, stream.normal() as f32) / range_m;
+                    let w = vec2(stream.normal().to_f32(), stream.normal().to_f32()) / range_m;
                     (w, stream.range32(0.0, std::f32::consts::TAU))
                 })
                 .collect(),
@@ -27,7 +27,7 @@ impl GaussianField {
     }
 
     pub(super) fn at(&self, p: Vec2) -> f32 {
-        self.0.iter().map(|(w, phase)| (w.dot(p) + phase).cos()).sum::<f32>() * (2.0 / WAVES as f32).sqrt()
+        self.0.iter().map(|(w, phase)| (w.dot(p) + phase).cos()).sum::<f32>() * (2.0 / WAVES.to_f32()).sqrt()
     }
 }
 
@@ -46,7 +46,7 @@ mod tests {
             square += a * a;
             product += a * b;
         }
-        let (square, product) = (square / n as f32, product / n as f32);
+        let (square, product) = (square / n.to_f32(), product / n.to_f32());
         assert!((square - 1.0).abs() < 0.11, "{square}");
         assert!((product - (-0.5f32).exp()).abs() < 0.11, "{product}");
     }

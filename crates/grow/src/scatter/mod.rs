@@ -13,7 +13,7 @@ pub use record::{RowsRecord, WeedsRecord};
 pub use rows::{Rows, RowsDesc, rows, rows_looked_at};
 pub use weeds::{ClustersDesc, WeedsDesc, weeds, weeds_looked_at};
 
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{ToFloat, Vec2, Vec3};
 use furrow_base::sampling::Stream;
 
 /// Lower left and upper right corner of a piece of ground, metres.
@@ -48,7 +48,7 @@ pub fn axis(normal: Vec3, noise_deg: f32, stream: &mut Stream) -> Vec3 {
     let sd = noise_deg.to_radians();
     let n = normal.normalize_or(Vec3::Z);
     let (a, b) = n.any_orthonormal_pair();
-    (n + a * (stream.normal() as f32 * sd).tan() + b * (stream.normal() as f32 * sd).tan()).normalize_or(n)
+    (n + a * (stream.normal().to_f32() * sd).tan() + b * (stream.normal().to_f32() * sd).tan()).normalize_or(n)
 }
 
 #[cfg(test)]
@@ -63,14 +63,14 @@ mod tests {
         let mut s = Stream::of(1, 0, Purpose::Test, 0);
         let n = 4000;
         let squares: f32 = (0..n).map(|_| axis(normal, 5.0, &mut s).angle_between(normal).powi(2)).sum();
-        let sd = (squares / n as f32 / 2.0).sqrt().to_degrees();
+        let sd = (squares / n.to_f32() / 2.0).sqrt().to_degrees();
         assert!((sd - 5.0).abs() < 0.25, "{sd}");
         assert!(axis(normal, 0.0, &mut s).distance(normal) < 1e-6);
     }
 
     #[test]
     fn nothing_starts_inside_a_stone() {
-        let spots: Vec<Spot> = (0..100).map(|k| Spot { at: vec2(k as f32 * 0.01, 0.0), key: k }).collect();
+        let spots: Vec<Spot> = (0..100).map(|k| Spot { at: vec2(k.to_f32() * 0.01, 0.0), key: k }).collect();
         let left = outside(spots, &[(vec2(0.5, 0.0), 0.1)]);
         assert!(left.len() < 85 && left.iter().all(|s| (s.at.x - 0.5).abs() > 0.1));
     }

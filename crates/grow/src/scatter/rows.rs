@@ -1,7 +1,7 @@
 //! Crops in rows: drilled seeds, some of which do not emerge.
 
 use super::{Area, Disc, Spot, outside, within};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2};
 use furrow_base::ron_file::{Fraction, NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -109,25 +109,28 @@ impl Rows {
         };
         let (left, right) = reach(across, 5.0 * self.jitter.x + DOUBLE_M);
         let (back, front) = reach(along, 5.0 * self.jitter.y + DOUBLE_M);
-        let index = |x: f32, step: f32| (x / step).round().clamp(-1e6, 1e6) as i32;
+        let index = |x: f32, step: f32| (x / step).round().clamp(-1e6, 1e6).trunc_to::<i32>();
         let mut spots = Vec::new();
         for row in index(left - self.offset_m, self.spacing_m)..=index(right - self.offset_m, self.spacing_m) {
-            let row_stream = self.stream.child(Purpose::Scatter, u64::from(row as u32));
+            let row_stream = self.stream.child(Purpose::Scatter, u64::from(row.cast_unsigned()));
             // Each row has its own phase.
             let phase = row_stream.child(Purpose::Page, 0).uniform32() * self.in_row_m;
             for slot in index(back - phase, self.in_row_m)..=index(front - phase, self.in_row_m) {
-                let mut s = row_stream.child(Purpose::Scatter, u64::from(slot as u32));
+                let mut s = row_stream.child(Purpose::Scatter, u64::from(slot.cast_unsigned()));
                 let double = s.chance(self.doubles);
                 for twin in 0..=u64::from(double) {
                     let mut s = s.child(Purpose::Scatter, twin);
                     let emerged = s.chance(self.emergence);
-                    let jitter = vec2(s.normal() as f32, s.normal() as f32).clamp(Vec2::splat(-5.0), Vec2::splat(5.0));
-                    let apart = if double { DOUBLE_M * (twin as f32 - 0.5) } else { 0.0 };
-                    let x = self.offset_m + row as f32 * self.spacing_m + self.jitter.x * jitter.x;
-                    let y = phase + slot as f32 * self.in_row_m + self.jitter.y * jitter.y + apart;
+                    let jitter =
+                        vec2(s.normal().to_f32(), s.normal().to_f32()).clamp(Vec2::splat(-5.0), Vec2::splat(5.0));
+                    let apart = if double { DOUBLE_M * (twin.to_f32() - 0.5) } else { 0.0 };
+                    let x = self.offset_m + row.to_f32() * self.spacing_m + self.jitter.x * jitter.x;
+                    let y = phase + slot.to_f32() * self.in_row_m + self.jitter.y * jitter.y + apart;
                     let at = across * x + along * y;
                     if emerged && within(area, at) {
-                        let key = (u64::from(row as u32) << 32) | (u64::from(slot as u32) & 0x7fff_ffff) << 1 | twin;
+                        let key = (u64::from(row.cast_unsigned()) << 32)
+                            | (u64::from(slot.cast_unsigned()) & 0x7fff_ffff) << 1
+                            | twin;
                         spots.push(Spot { at, key });
                     }
                 }
@@ -168,7 +171,11 @@ mod tests {
         let area = [vec2(-15.0, -15.0), vec2(15.0, 15.0)];
         let all = rows(&desc(), area, &[], &stream());
         let expected = 900.0 / (0.45 * 0.20) * 0.8;
-        assert!((all.len() as f32 - expected).abs() < 4.0 * (expected * 0.2).sqrt() + 0.01 * expected, "{}", all.len());
+        assert!(
+            (all.len().to_f32() - expected).abs() < 4.0 * (expected * 0.2).sqrt() + 0.01 * expected,
+            "{}",
+            all.len()
+        );
         let (sin, cos) = 20f32.to_radians().sin_cos();
         let off: Vec<f32> = all
             .iter()
@@ -177,7 +184,7 @@ mod tests {
                 (d - d.round()) * 0.45
             })
             .collect();
-        let n = off.len() as f32;
+        let n = off.len().to_f32();
         let mean = off.iter().sum::<f32>() / n;
         let sd = (off.iter().map(|d| (d - mean).powi(2)).sum::<f32>() / n).sqrt();
         assert!(mean.abs() < 0.0005 && (sd - 0.008).abs() < 0.0004, "{mean} {sd}");
@@ -198,11 +205,11 @@ mod tests {
         let page = RowsDesc { doubles: Vary::fixed(1.0), emergence: Vary::fixed(1.0), ..desc() };
         let area = [vec2(0.0, 0.0), vec2(5.0, 5.0)];
         let (one, two) = (
-            rows(&RowsDesc { emergence: Vary::fixed(1.0), ..desc() }, area, &[], &stream()).len() as f32,
-            rows(&page, area, &[], &stream()).len() as f32,
+            rows(&RowsDesc { emergence: Vary::fixed(1.0), ..desc() }, area, &[], &stream()).len().to_f32(),
+            rows(&page, area, &[], &stream()).len().to_f32(),
         );
         assert!((two / one - 2.0).abs() < 0.1, "{one} {two}");
         let keys: std::collections::BTreeSet<u64> = rows(&page, area, &[], &stream()).iter().map(|s| s.key).collect();
-        assert_eq!(keys.len() as f32, two);
+        assert_eq!(keys.len().to_f32(), two);
     }
 }

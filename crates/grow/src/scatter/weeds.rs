@@ -8,7 +8,7 @@
 use super::field::GaussianField;
 use super::record::WeedsRecord;
 use super::{Area, Disc, Spot, outside, within};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2};
 use furrow_base::ron_file::{Fraction, NonNegative, Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -114,10 +114,10 @@ pub fn weeds(desc: &WeedsDesc, area: Area, discs: &[Disc], stream: &Stream) -> V
     let mut all = Vec::new();
     for (i, j) in cells(wide) {
         let mut cell = stream.child(Purpose::Scatter, address(i, j));
-        let middle = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
+        let middle = (vec2(i.to_f32(), j.to_f32()) + 0.5) * CELL_M;
         for k in 0..cell.poisson(f64::from((1.0 - share) * intensity(middle) * CELL_M * CELL_M)) {
             let mut s = cell.child(Purpose::Plant, k);
-            let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+            let at = (vec2(i.to_f32(), j.to_f32()) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
             all.push(Spot { at, key: key(i, j, 0, k) });
         }
     }
@@ -126,12 +126,12 @@ pub fn weeds(desc: &WeedsDesc, area: Area, discs: &[Disc], stream: &Stream) -> V
         let mothers = stream.child(Purpose::Page, 8);
         for (i, j) in cells([wide[0] - reach, wide[1] + reach]) {
             let mut cell = mothers.child(Purpose::Scatter, address(i, j));
-            let middle = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
+            let middle = (vec2(i.to_f32(), j.to_f32()) + 0.5) * CELL_M;
             for k in 0..cell.poisson(f64::from(share / plants * intensity(middle) * CELL_M * CELL_M)) {
                 let mut s = cell.child(Purpose::Plant, k);
-                let centre = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+                let centre = (vec2(i.to_f32(), j.to_f32()) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
                 for n in 0..s.poisson(f64::from(plants)) {
-                    let d = vec2(s.normal() as f32, s.normal() as f32).clamp_length_max(4.0);
+                    let d = vec2(s.normal().to_f32(), s.normal().to_f32()).clamp_length_max(4.0);
                     all.push(Spot { at: centre + d * sd, key: key(i, j, k + 1, n) });
                 }
             }
@@ -162,13 +162,13 @@ fn thin(all: &[Spot], apart: f32) -> Vec<Spot> {
 }
 
 fn cells(area: Area) -> impl Iterator<Item = (i32, i32)> {
-    let index = |x: f32| (x / CELL_M).floor().clamp(-1e6, 1e6) as i32;
+    let index = |x: f32| (x / CELL_M).floor().clamp(-1e6, 1e6).trunc_to::<i32>();
     let (lo, hi) = ((index(area[0].x), index(area[0].y)), (index(area[1].x), index(area[1].y)));
     (lo.1..=hi.1).flat_map(move |j| (lo.0..=hi.0).map(move |i| (i, j)))
 }
 
 fn address(i: i32, j: i32) -> u64 {
-    (u64::from(i as u32) << 32) | u64::from(j as u32)
+    (u64::from(i.cast_unsigned()) << 32) | u64::from(j.cast_unsigned())
 }
 
 /// Returns a plant's address from its cell, its mother (0 for none) and its number.
@@ -201,11 +201,11 @@ mod tests {
             let all = weeds(desc, [vec2(0.0, 0.0), vec2(4.0, 4.0)], &[], &stream(seed));
             let mut field = [0.0f64; 64];
             for s in all {
-                field[(s.at.y * 2.0) as usize * 8 + (s.at.x * 2.0) as usize] += 1.0;
+                field[(s.at.y * 2.0).trunc_to::<usize>() * 8 + (s.at.x * 2.0).trunc_to::<usize>()] += 1.0;
             }
             counts.extend(field);
         }
-        let n = counts.len() as f64;
+        let n = counts.len().to_f64();
         let mean = counts.iter().sum::<f64>() / n;
         (mean, counts.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / n)
     }

@@ -4,7 +4,7 @@ use super::blend::Weights;
 use super::crumb::Raster;
 use super::ground::blur;
 use super::{Ground, LayerMaps, MAX_LAYERS};
-use furrow_base::math::{Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, Vec3, vec2};
 use furrow_optics::optics::UnmeshedRelief;
 use furrow_optics::texture::ground::GroundMaps;
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ impl UnshadedMaps {
     /// texture lookup.
     pub(super) fn at(&self, p: Vec2) -> (usize, Vec2) {
         let GroundMaps { slope, width, height, origin, texel_m, .. } = &self.maps;
-        let index = |x: f32, count: usize| (x.max(0.0) as usize).min(count - 1);
+        let index = |x: f32, count: usize| x.max(0.0).trunc_to::<usize>().min(count - 1);
         let q = (p - *origin) / *texel_m;
         let nearest = index(q.y, *height) * width + index(q.x, *width);
         let (floor, t) = ((q - 0.5).floor(), (q - 0.5).fract());
@@ -89,8 +89,8 @@ impl Ground {
     pub(super) fn paint<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, laid: f32) -> UnshadedMaps {
         let area = self.area();
         // Texels divide the grid's steps evenly, so that the area consists of whole texels and each is in one cell.
-        let split = ((self.step / texel_m.max(2e-5) - 1e-3).ceil() as usize).max(1);
-        let texel = self.step / split as f32;
+        let split = (self.step / texel_m.max(2e-5) - 1e-3).ceil_to::<usize>().max(1);
+        let texel = self.step / split.to_f32();
         let (width, height) = (self.grid.x.steps * split, self.grid.y.steps * split);
         let raster = Raster { origin: area.corners()[0] + 0.5 * texel, step: texel, width, height };
         let n = width * height;
@@ -118,7 +118,7 @@ impl Ground {
         );
         rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints))| {
             for i in 0..width {
-                let p = raster.origin + vec2(i as f32, j as f32) * texel;
+                let p = raster.origin + vec2(i.to_f32(), j.to_f32()) * texel;
                 let cell = self.texel_cell(i, j, split);
                 let mut noise = [0.0; MAX_LAYERS];
                 for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
@@ -133,7 +133,7 @@ impl Ground {
                 };
                 let tone = tint * cell.mix(|v| look.tone[v]);
                 albedo[i] = GroundMaps::encode(self.dry(maps, share, p).map(|a| a * tone));
-                weights[i] = share.map(|w| (w * 255.0 + 0.5) as u8);
+                weights[i] = share.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>());
             }
         });
         self.bake_slopes(raster, split, &detail, &mut baked);
@@ -143,8 +143,8 @@ impl Ground {
     /// Bakes the material of clods: a square of 12 cm of the ground's soil without crumbs or relief and with uniform
     /// `moisture`, 0..1. Each clod samples it at its own offset.
     pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> GroundMaps {
-        let side = ((FABRIC_M / texel_m) as usize).clamp(16, 1024);
-        let texel = FABRIC_M / side as f32;
+        let side = (FABRIC_M / texel_m).trunc_to::<usize>().clamp(16, 1024);
+        let texel = FABRIC_M / side.to_f32();
         let n = side * side;
         let rest = |p: Vec2| {
             let mut noise = [0.0; MAX_LAYERS];
@@ -153,11 +153,11 @@ impl Ground {
             }
             (p, self.blend.weights(noise, self.blend.heights(maps, p)))
         };
-        let place = |k: usize| vec2((k % side) as f32 + 0.5, (k / side) as f32 + 0.5) * texel;
+        let place = |k: usize| vec2((k % side).to_f32() + 0.5, (k / side).to_f32() + 0.5) * texel;
         let (albedo, weights) = (0..n)
             .into_par_iter()
             .map(|k| rest(place(k)))
-            .map(|(p, w)| (GroundMaps::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5) as u8)))
+            .map(|(p, w)| (GroundMaps::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>())))
             .unzip();
         GroundMaps {
             width: side,
@@ -166,7 +166,7 @@ impl Ground {
             texel_m: texel,
             albedo,
             weights,
-            moisture: vec![(moisture.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; n],
+            moisture: vec![(moisture.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>(); n],
             slope: vec![[0; 2]; n],
             ao: vec![255; n],
             like: self.color.like,
@@ -200,7 +200,7 @@ impl Ground {
             let cell = self.texel_cell(k % raster.width, k / raster.width, split);
             let mesh = vec2(cell.mix(|v| coarse[v].x), cell.mix(|v| coarse[v].y));
             let rest = (fine - mesh).clamp_length_max(2.0) * GroundMaps::SLOPE_STEPS;
-            [rest.x as i8, rest.y as i8]
+            [rest.x.trunc_to::<i8>(), rest.y.trunc_to::<i8>()]
         };
         baked.slope = differences(detail, raster).into_par_iter().enumerate().map(slope).collect();
     }
@@ -209,7 +209,7 @@ impl Ground {
     fn pits(&self, raster: Raster, split: usize, mut detail: Vec<f32>) -> Vec<f32> {
         let cell = |k: usize| self.texel_cell(k % raster.width, k / raster.width, split);
         detail.par_iter_mut().enumerate().for_each(|(k, d)| *d -= cell(k).mix(|v| self.fine.detail[v]));
-        let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil() as usize);
+        let around = blur(&detail, raster.width, (0.0008 / raster.step).ceil_to::<usize>());
         detail.par_iter_mut().zip(around).for_each(|(d, around)| *d = (around - *d).max(0.0));
         detail
     }
@@ -219,11 +219,11 @@ impl Ground {
         let Shade { sky, wet: full, lost } = shade;
         let moistures = &self.appearance().moisture;
         let width = painted.maps.width;
-        let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5) as u8;
+        let shade = |k: usize| (255.0 / closing(painted.pits[k], sky) + 0.5).trunc_to::<u8>();
         let moisture = |k: usize| {
             let cell = self.texel_cell(k % width, k / width, painted.split);
             let wet = cell.mix(|v| moistures[v]) + PIT_WETTING * wet(painted.pits[k], full);
-            ((wet * painted.left(k)).clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+            ((wet * painted.left(k)).clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>()
         };
         let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
         GroundMaps { moisture, ao, lost, ..painted.maps }
@@ -238,8 +238,8 @@ fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {
         let (west, east) = (i.saturating_sub(1), (i + 1).min(w - 1));
         let v = |i: usize, j: usize| values[j * w + i];
         let d = vec2(
-            (v(east, j) - v(west, j)) / (east - west).max(1) as f32,
-            (v(i, north) - v(i, south)) / (north - south).max(1) as f32,
+            (v(east, j) - v(west, j)) / (east - west).max(1).to_f32(),
+            (v(i, north) - v(i, south)) / (north - south).max(1).to_f32(),
         );
         d / raster.step
     };

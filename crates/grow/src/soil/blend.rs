@@ -8,7 +8,7 @@
 //! transparent. The same weights are used for the vertices and for the texture.
 
 use super::{BlendDesc, LayerDesc, LayerMaps, MAX_LAYERS};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::texture::noise::Perlin;
 
@@ -49,7 +49,7 @@ impl Blend {
             .iter()
             .enumerate()
             .map(|(i, layer)| {
-                let mut s = child(16 + i as u64);
+                let mut s = child(16 + i.to_u64());
                 let (low, high) = (layer.height_mm.0.f32() * 1e-3, layer.height_mm.1.f32() * 1e-3);
                 Tile {
                     noise: Perlin::new(s.seed32()),
@@ -66,7 +66,7 @@ impl Blend {
         Self {
             tiles,
             frequency: 1.0 / desc.scale_m.draw(&mut child(0)),
-            octaves: (desc.octaves.get() as u32).min(MOST_OCTAVES),
+            octaves: desc.octaves.get().trunc_to::<u32>().min(MOST_OCTAVES),
             sharpness: desc.sharpness.draw32(&mut child(1)),
             height: desc.height.f32(),
         }
@@ -85,7 +85,7 @@ impl Blend {
     pub(super) fn noise(&self, i: usize, p: Vec2) -> f32 {
         let (x, y) = (f64::from(p.x) * self.frequency, f64::from(p.y) * self.frequency);
         // Shifted off the lattice, where all noises are zero at the same points.
-        self.tiles[i].noise.fbm2(x + 0.37 + i as f64, y + 0.61, self.octaves, 0.5) as f32
+        self.tiles[i].noise.fbm2(x + 0.37 + i.to_f64(), y + 0.61, self.octaves, 0.5).to_f32()
     }
 
     /// Returns the tile coordinates of layer `i`.

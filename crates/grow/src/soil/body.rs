@@ -5,7 +5,7 @@
 //! along such planes and were rounded by the harrow; stones are more worn (small p, little noise).
 
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Mat3, Quat, Vec2, Vec3, vec3};
+use furrow_base::math::{Mat3, Quat, ToFloat, ToInt, Vec2, Vec3, vec3};
 use furrow_base::sampling::Stream;
 use furrow_optics::texture::noise::Perlin;
 use std::collections::BTreeMap;
@@ -50,8 +50,8 @@ fn sphere(level: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         for [a, b, c] in triangles {
             let mut middle = |i: u32, j: u32| {
                 *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                    corners.push((corners[i as usize] + corners[j as usize]).normalize());
-                    corners.len() as u32 - 1
+                    corners.push((corners[i.to_usize()] + corners[j.to_usize()]).normalize());
+                    corners.len().to_u32() - 1
                 })
             };
             let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
@@ -101,9 +101,9 @@ impl Shape {
         for v in &mut positions {
             let polytope: f32 = planes.iter().map(|n| n.dot(*v).max(0.0).powf(p)).sum();
             let q = v.as_dvec3();
-            let lumps = noise.at3(q.x * 1.3 + 3.1, q.y * 1.3, q.z * 1.3) as f32;
+            let lumps = noise.at3(q.x * 1.3 + 3.1, q.y * 1.3, q.z * 1.3).to_f32();
             let q = q * 2.9;
-            let rough = noise.fbm3([q.x, q.y + 7.7, q.z], 1 + level as u32, 0.6) as f32;
+            let rough = noise.fbm3([q.x, q.y + 7.7, q.z], 1 + level.to_u32(), 0.6).to_f32();
             *v *= (1.0 + polytope).powf(-1.0 / p) * (1.0 + cut.lumps * lumps + cut.rough * rough);
         }
         let uvs = vec![Vec2::ZERO; positions.len()];
@@ -143,7 +143,7 @@ impl Pose {
     /// (standard deviation, radians).
     pub(super) fn lying(shape: &Shape, axes: Vec3, tilt: f32, stream: &mut Stream) -> Self {
         let turn = Vec2::from_angle(stream.range32(0.0, std::f32::consts::TAU));
-        let tip = stream.normal() as f32 * tilt;
+        let tip = stream.normal().to_f32() * tilt;
         let side = Vec2::from_angle(stream.range32(0.0, std::f32::consts::TAU));
         let basis = Mat3::from_axis_angle(side.extend(0.0), tip)
             * Mat3::from_cols(turn.extend(0.0), turn.perp().extend(0.0), Vec3::Z)
@@ -173,15 +173,15 @@ pub(super) fn emit(
     let world: Vec<Vec3> = shape.positions.iter().map(|p| centre + pose.basis * *p).collect();
     let mut index = vec![u32::MAX; world.len()];
     for t in &shape.triangles {
-        let corners = t.map(|i| world[i as usize]);
+        let corners = t.map(|i| world[i.to_usize()]);
         let up = (corners[1] - corners[0]).cross(corners[2] - corners[0]).z;
         if hidden(corners, up) {
             continue;
         }
         mesh.triangles.push(t.map(|i| {
-            let i = i as usize;
+            let i = i.to_usize();
             if index[i] == u32::MAX {
-                index[i] = mesh.positions.len() as u32;
+                index[i] = mesh.positions.len().to_u32();
                 mesh.positions.push(world[i]);
                 mesh.normals.push((normals * shape.normals[i]).normalize_or(Vec3::Z));
                 mesh.uvs.push(uv(shape.positions[i], world[i]));
@@ -207,7 +207,7 @@ mod tests {
                     .triangles
                     .iter()
                     .map(|t| {
-                        let [a, b, c] = t.map(|i| shape.positions[i as usize]);
+                        let [a, b, c] = t.map(|i| shape.positions[i.to_usize()]);
                         a.cross(b).dot(c) / 6.0
                     })
                     .sum();

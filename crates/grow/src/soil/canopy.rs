@@ -3,7 +3,7 @@
 use super::Ground;
 use super::crumb::Raster;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3};
 use std::ops::Range;
 
 /// Relative enlargement of cells, so that rounding cannot put a point outside its cell.
@@ -33,7 +33,7 @@ impl Canopy {
         let [mut strip, mut piece, mut spare] = [const { Vec::new() }; 3];
         for t in &mesh.triangles {
             let corners = t.map(|i| {
-                let p = mesh.positions[i as usize];
+                let p = mesh.positions[i.to_usize()];
                 ((p.truncate() - raster.origin) / raster.step).extend(p.z)
             });
             for y in cells(&corners, |p| p.y, raster.height) {
@@ -63,12 +63,12 @@ fn cells(points: &[Vec3], along: impl Fn(&Vec3) -> f32, count: usize) -> Range<u
     let (low, high) =
         points.iter().map(along).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     let end = (high + SLACK).floor() + 1.0;
-    ((low - SLACK).floor().max(0.0) as usize)..(end.clamp(0.0, count as f32) as usize)
+    (low - SLACK).floor().max(0.0).trunc_to::<usize>()..end.clamp(0.0, count.to_f32()).trunc_to::<usize>()
 }
 
 /// Clips a convex polygon to the cells with one index along an axis.
 fn between(polygon: &[Vec3], along: impl Fn(&Vec3) -> f32, cell: usize, spare: &mut Vec<Vec3>, inside: &mut Vec<Vec3>) {
-    let (low, high) = (cell as f32 - SLACK, (cell + 1) as f32 + SLACK);
+    let (low, high) = (cell.to_f32() - SLACK, (cell + 1).to_f32() + SLACK);
     cut(polygon, |p| along(p) - low, spare);
     cut(spare, |p| high - along(p), inside);
 }
@@ -98,8 +98,8 @@ mod tests {
 
     fn place(p: Vec2) -> Option<usize> {
         let cell = ((p - RASTER.origin) / RASTER.step).floor();
-        let inside = cell.cmpge(Vec2::ZERO).all() && cell.x < RASTER.width as f32 && cell.y < RASTER.height as f32;
-        inside.then(|| cell.y as usize * RASTER.width + cell.x as usize)
+        let inside = cell.cmpge(Vec2::ZERO).all() && cell.x < RASTER.width.to_f32() && cell.y < RASTER.height.to_f32();
+        inside.then(|| cell.y.trunc_to::<usize>() * RASTER.width + cell.x.trunc_to::<usize>())
     }
 
     /// Rationale: if the height of a leaf is overestimated, a clod pierces it; if it is underestimated, the clod is
@@ -140,7 +140,7 @@ mod tests {
             let floor = corners.iter().map(|c| c.z).fold(f32::INFINITY, f32::min);
             for (cell, lowest) in canopy.lowest.iter().enumerate() {
                 let corner =
-                    RASTER.origin + vec2((cell % RASTER.width) as f32, (cell / RASTER.width) as f32) * RASTER.step;
+                    RASTER.origin + vec2((cell % RASTER.width).to_f32(), (cell / RASTER.width).to_f32()) * RASTER.step;
                 let in_box = corner.cmple(high).all() && (corner + RASTER.step).cmpge(low).all();
                 boxed += i32::from(in_box);
                 if lowest.is_finite() {

@@ -8,7 +8,7 @@ use super::body::{self, LEVELS, Pose, Shape, ShapeParameters};
 use super::crumb::{LOOSE_GAIN, Local, loose_gain, sink};
 use super::{Canopy, Ground, InView, Pile, Rect};
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{Spectrum, Vec2, vec2, vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of broken aggregates.
@@ -91,13 +91,13 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let level = level(clod.mm, scale);
         let k = s.index(SHAPES);
         let shape = shapes[level][k]
-            .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k as u64)));
+            .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k.to_u64())));
         let half = 0.5e-3 * clod.mm;
-        let mut vary = |mean: f32| (mean * (1.0 + 0.2 * s.normal() as f32)).clamp(0.5 * mean, 1.0);
+        let mut vary = |mean: f32| (mean * (1.0 + 0.2 * s.normal().to_f32())).clamp(0.5 * mean, 1.0);
         let axes = vec3(1.0, vary(AXES.0), vary(AXES.1)) * half;
         let pose = Pose::lying(shape, axes, 0.3, &mut s);
         let sink = sink(clod.mm, s.uniform32());
-        let tint = ground.law.tint_sigma * s.normal() as f32 + loose_gain(sink);
+        let tint = ground.law.tint_sigma * s.normal().to_f32() + loose_gain(sink);
         let sink = sink * (1.0 - ground.law.loose);
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
@@ -150,7 +150,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
 /// Most material has one hue and a small part is much greener or yellower: green over red and blue over green are at
 /// the midpoints of equal parts of an exponential distribution, each in its own random order.
 fn hues(sigma: f32, stream: &mut Stream) -> [Spectrum; HUES] {
-    let beyond_mean = |k: usize| -(1.0 - (k as f32 + 0.5) / HUES as f32).ln() - 1.0;
+    let beyond_mean = |k: usize| -(1.0 - (k.to_f32() + 0.5) / HUES.to_f32()).ln() - 1.0;
     let mut order: [usize; HUES] = std::array::from_fn(|k| k);
     for k in (1..HUES).rev() {
         order.swap(k, stream.index(k + 1));
@@ -165,8 +165,8 @@ fn hues(sigma: f32, stream: &mut Stream) -> [Spectrum; HUES] {
 /// lengths, `step` the grid's spacing; a fraction `made` of `area` is in view and gets meshes.
 pub(super) fn cost(places: &[Local], mm: (f32, f32), step: f32, (area, made): (Rect, f64)) -> Cost {
     let scale = (FINE_M / step).min(1.0);
-    let share = f64::from(area.area()) / places.len().max(1) as f64;
-    let ratio = (mm.1 / mm.0).powf(1.0 / BINS as f32);
+    let share = f64::from(area.area()) / places.len().max(1).to_f64();
+    let ratio = (mm.1 / mm.0).powf(1.0 / BINS.to_f32());
     // Largest first, as they are placed: clods that fall on another are shaken off, so fewer stay as more is covered.
     places
         .iter()
@@ -177,7 +177,7 @@ pub(super) fn cost(places: &[Local], mm: (f32, f32), step: f32, (area, made): (R
                 let (number, middle) = (f64::from(law.number(lo, hi)), (lo * hi).sqrt());
                 let free = (-covered).exp();
                 let stay = free + f64::from(STAY) * (1.0 - free);
-                let each = Cost::of(VISIBLE * body::triangles(level(middle, scale)) as f64, 0.0);
+                let each = Cost::of(VISIBLE * body::triangles(level(middle, scale)).to_f64(), 0.0);
                 cost = cost + each * (number * stay * made);
                 cost = cost + Cost::work(number * BYTES_EACH, number * SECONDS_EACH);
                 covered +=
@@ -211,10 +211,10 @@ fn candidates(ground: &Ground, stream: &Stream) -> Vec<Candidate> {
 fn tone(tint: f32, sigma: f32) -> usize {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
     let t = (tint / reach.max(1e-6)).clamp(-1.0, 1.0) * 0.5 + 0.5;
-    ((t * TONES as f32) as usize).min(TONES - 1)
+    (t * TONES.to_f32()).trunc_to::<usize>().min(TONES - 1)
 }
 
 fn tone_tint(tone: usize, sigma: f32) -> f32 {
     let reach = 2.2 * (sigma * sigma + LOOSE_GAIN * LOOSE_GAIN * 0.25).sqrt();
-    (((tone as f32 + 0.5) / TONES as f32 * 2.0 - 1.0) * reach).exp()
+    (((tone.to_f32() + 0.5) / TONES.to_f32() * 2.0 - 1.0) * reach).exp()
 }

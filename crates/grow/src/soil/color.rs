@@ -106,6 +106,7 @@ pub(super) fn mean<L: LayerMaps>(maps: &L) -> [f32; 3] {
 mod tests {
     use super::*;
     use crate::soil::Plain;
+    use furrow_base::math::ToFloat;
     use furrow_base::sampling::Purpose;
 
     #[test]
@@ -127,7 +128,7 @@ mod tests {
         assert_eq!(draw(&[], 0), ColorTransform::NONE);
         let own = |text: &str| {
             let color: SoilColor = ron::from_str(text).unwrap();
-            color.reflectance(&mut |file| Ok(Spectrum::splat(file.len() as f32))).unwrap()
+            color.reflectance(&mut |file| Ok(Spectrum::splat(file.len().to_f32()))).unwrap()
         };
         assert_eq!(own("Rgbn(0.3, 0.2, 0.1, 0.4)"), Spectrum::new(0.3, 0.2, 0.1, 0.4));
         assert_eq!(own("Spectrum(\"a.csv\")"), Spectrum::splat(5.0));

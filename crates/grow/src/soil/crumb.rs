@@ -7,7 +7,7 @@
 //! tint.
 
 use super::{ClodsDesc, Rect, cell_stream, cells};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::texture::noise::Perlin;
 use rayon::prelude::*;
@@ -143,7 +143,7 @@ impl SizeDistribution {
     /// there.
     pub(super) fn at(&self, p: Vec2, share: f32) -> Local {
         let (x, y) = (f64::from(p.x) * self.frequency, f64::from(p.y) * self.frequency);
-        let normal = |shift: f64| (self.noise.fbm2(x + shift, y - shift, 3, 0.5) as f32 / FBM3_SD).clamp(-2.0, 2.0);
+        let normal = |shift: f64| (self.noise.fbm2(x + shift, y - shift, 3, 0.5).to_f32() / FBM3_SD).clamp(-2.0, 2.0);
         let more = if self.clustering > 0.0 { normal(0.43) * self.clustering } else { 0.0 };
         let coarser = if self.sorting > 0.0 { normal(57.91) * self.sorting } else { 0.0 };
         Local {
@@ -156,8 +156,8 @@ impl SizeDistribution {
     fn shade(&self, u: [f32; 3], gain: f32) -> (u8, u8) {
         // The sum of two uniforms less one has standard deviation 0.408.
         let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma + gain).exp();
-        let dry = if u[2] < self.damp { 0 } else { (self.dryness * 255.0) as u8 };
-        ((tint * 128.0).clamp(1.0, 255.0) as u8, dry)
+        let dry = if u[2] < self.damp { 0 } else { (self.dryness * 255.0).trunc_to::<u8>() };
+        ((tint * 128.0).clamp(1.0, 255.0).trunc_to::<u8>(), dry)
     }
 
     /// Calls `each` for every aggregate between two lengths in the cells of `area`, with its position, its length in mm
@@ -172,7 +172,7 @@ impl SizeDistribution {
         mut each: impl FnMut(Vec2, f32, &mut Stream),
     ) {
         for (i, j) in cells(area, CELL_M) {
-            let corner = vec2(i as f32, j as f32) * CELL_M;
+            let corner = vec2(i.to_f32(), j.to_f32()) * CELL_M;
             let mut s = cell_stream(stream, i, j);
             // The distribution is evaluated at the cell's centre, inside the area or not, so that the area does not change it.
             let local = self.at(corner + 0.5 * CELL_M, share(corner + 0.5 * CELL_M));
@@ -212,17 +212,17 @@ pub(super) struct Raster {
 impl Raster {
     /// Returns the area that it covers.
     fn area(self) -> Rect {
-        let far = self.origin + vec2(self.width as f32, self.height as f32) * self.step;
+        let far = self.origin + vec2(self.width.to_f32(), self.height.to_f32()) * self.step;
         Rect::new(self.origin.x, self.origin.y, far.x, far.y)
     }
 
     /// Returns the first column inside cell column `i`; `first_row` likewise.
     fn first_column(self, i: i32) -> usize {
-        ((i as f32 * CELL_M - self.origin.x) / self.step).ceil().clamp(0.0, self.width as f32) as usize
+        ((i.to_f32() * CELL_M - self.origin.x) / self.step).ceil().clamp(0.0, self.width.to_f32()).trunc_to::<usize>()
     }
 
     fn first_row(self, j: i32) -> usize {
-        ((j as f32 * CELL_M - self.origin.y) / self.step).ceil().clamp(0.0, self.height as f32) as usize
+        ((j.to_f32() * CELL_M - self.origin.y) / self.step).ceil().clamp(0.0, self.height.to_f32()).trunc_to::<usize>()
     }
 }
 
@@ -254,7 +254,7 @@ impl Crumbs {
         let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], dry: vec![0; n] };
         crumbs.bands(raster).into_par_iter().for_each(|mut band| {
             for (k, part) in seen.into_iter().enumerate().filter(|(_, part)| part.is_some()) {
-                let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k as u64) };
+                let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k.to_u64()) };
                 law.scatter(
                     band.area().grown(part.mm.1 * 1e-3),
                     part.mm,
@@ -264,7 +264,7 @@ impl Crumbs {
                 );
             }
             if unseen.iter().any(SizeRange::is_some) {
-                band.fill(law, unseen, &stream.child(Purpose::Debris, seen.len() as u64), &share);
+                band.fill(law, unseen, &stream.child(Purpose::Debris, seen.len().to_u64()), &share);
             }
         });
         crumbs
@@ -273,9 +273,9 @@ impl Crumbs {
     /// Splits the raster into bands of rows that contain whole cells and can be processed in parallel.
     fn bands(&mut self, raster: Raster) -> Vec<Band<'_>> {
         let Rect { y0, y1, .. } = raster.area();
-        let mut cells = (y0 / CELL_M).floor() as i32..(y1 / CELL_M).ceil() as i32;
+        let mut cells = (y0 / CELL_M).floor_to::<i32>()..(y1 / CELL_M).ceil_to::<i32>();
         let mut left = (self.height.as_mut_slice(), self.tint.as_mut_slice(), self.dry.as_mut_slice());
-        let many = (cells.len() as i32 / BANDS).max(LEAST_CELLS);
+        let many = (cells.len().to_i32() / BANDS).max(LEAST_CELLS);
         let mut bands = Vec::new();
         let mut first = 0;
         while !cells.is_empty() {
@@ -298,7 +298,7 @@ impl Crumbs {
 impl Band<'_> {
     /// Returns the area that it covers.
     fn area(&self) -> Rect {
-        let row = |j: usize| self.raster.origin.y + j as f32 * self.raster.step;
+        let row = |j: usize| self.raster.origin.y + j.to_f32() * self.raster.step;
         Rect { y0: row(self.rows.start), y1: row(self.rows.end), ..self.raster.area() }
     }
 
@@ -306,7 +306,7 @@ impl Band<'_> {
     fn fill(&mut self, law: &SizeDistribution, parts: [SizeRange; 2], stream: &Stream, share: impl Fn(Vec2) -> f32) {
         let Raster { width, .. } = self.raster;
         for (i, j) in cells(self.area(), CELL_M).filter(|(_, j)| self.cells.contains(j)) {
-            let centre = (vec2(i as f32, j as f32) + 0.5) * CELL_M;
+            let centre = (vec2(i.to_f32(), j.to_f32()) + 0.5) * CELL_M;
             let local = law.at(centre, share(centre));
             let cover = parts.map(|part| if part.is_some() { part.amount * local.cover(part.mm) } else { 0.0 });
             let [bare, first] = [(-cover[0] - cover[1]).exp(), cover[0] / (cover[0] + cover[1]).max(f32::MIN_POSITIVE)];
@@ -339,19 +339,19 @@ impl Band<'_> {
         let (tint, dry) = law.shade([u[8], u[9], u[10]], gain(length_mm));
         // The outline is an ellipse cut by straight breaks, so that crumbs are angular and all different.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
-            let at = (k as f32 + 0.8 * u[11 + k]) / BREAKS as f32;
+            let at = (k.to_f32() + 0.8 * u[11 + k]) / BREAKS.to_f32();
             Vec2::from_angle((at + u[17]) * std::f32::consts::TAU) * (1.02 + 0.38 * u[11 + (k + 2) % BREAKS])
         });
 
         let Self { raster, rows, .. } = self;
         let q = (p - raster.origin) / raster.step;
         let reach = a / raster.step;
-        let lo = (q - reach).ceil().max(vec2(0.0, rows.start as f32));
-        let hi = (q + reach).floor().min(vec2(raster.width as f32, rows.end as f32) - 1.0);
+        let lo = (q - reach).ceil().max(vec2(0.0, rows.start.to_f32()));
+        let hi = (q + reach).floor().min(vec2(raster.width.to_f32(), rows.end.to_f32()) - 1.0);
         let scale = vec2(raster.step / a.max(1e-9), raster.step / b.max(1e-9));
-        for y in lo.y as i32..=hi.y as i32 {
-            for x in lo.x as i32..=hi.x as i32 {
-                let d = turn.rotate(vec2(x as f32, y as f32) - q) * scale;
+        for y in lo.y.trunc_to::<i32>()..=hi.y.trunc_to::<i32>() {
+            for x in lo.x.trunc_to::<i32>()..=hi.x.trunc_to::<i32>() {
+                let d = turn.rotate(vec2(x.to_f32(), y.to_f32()) - q) * scale;
                 let cut = breaks.iter().fold(0.0f32, |most, b| most.max(b.dot(d)));
                 let inside = 1.0 - d.length_squared().max(cut * cut);
                 if inside <= 0.0 {
@@ -360,7 +360,7 @@ impl Band<'_> {
                 // Steeper at the rim and flatter on top than an ellipsoid.
                 let dome = inside.sqrt() * (1.35 - 0.35 * inside);
                 let z = centre + top * dome.min(0.75 + f.dot(d)).min(0.85 + g.dot(d));
-                let k = (y as usize - rows.start) * raster.width + x as usize;
+                let k = (y.to_usize() - rows.start) * raster.width + x.to_usize();
                 if z > self.height[k] {
                     self.height[k] = z;
                     self.tint[k] = tint;
@@ -407,10 +407,10 @@ mod tests {
     fn sizes_follow_the_power_law_that_was_asked_for() {
         let all = lengths(&law(0.0), Rect::new(-1.0, -0.5, 1.0, 0.5));
         // Maximum likelihood exponent of a Pareto law (Hill 1975); its standard error is D/√n.
-        let n = all.len() as f32;
+        let n = all.len().to_f32();
         let d = n / all.iter().map(|(_, mm)| (mm / 2.5).ln()).sum::<f32>();
         assert!((d - 3.8).abs() < 4.0 * 3.8 / n.sqrt(), "{d} from {n}");
-        let over5 = all.iter().filter(|(_, mm)| *mm > 5.0).count() as f32;
+        let over5 = all.iter().filter(|(_, mm)| *mm > 5.0).count().to_f32();
         assert!((over5 / 2.0 - 9400.0).abs() < 4.0 * (9400f32 / 2.0).sqrt(), "{over5}");
     }
 
@@ -420,7 +420,7 @@ mod tests {
         let count = |clustering| {
             let mut quadrats = vec![0.0f32; 400];
             for (p, _) in lengths(&law(clustering), area) {
-                quadrats[(p.y * 10.0) as usize * 20 + (p.x * 10.0) as usize] += 1.0;
+                quadrats[(p.y * 10.0).trunc_to::<usize>() * 20 + (p.x * 10.0).trunc_to::<usize>()] += 1.0;
             }
             let mean = quadrats.iter().sum::<f32>() / 400.0;
             (mean, quadrats.iter().map(|q| (q - mean).powi(2)).sum::<f32>() / 400.0 / mean)
@@ -443,7 +443,7 @@ mod tests {
             let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };
             let stream = Stream::of(9, 0, Purpose::Test, 0);
             let crumbs = Crumbs::draw(raster, &law, [seen, none], [unseen, none], &stream, |_| 1.0);
-            crumbs.tint.iter().filter(|tint| **tint > 0).count() as f32 / crumbs.tint.len() as f32
+            crumbs.tint.iter().filter(|tint| **tint > 0).count().to_f32() / crumbs.tint.len().to_f32()
         };
         let cover = 0.2 * law.at(Vec2::ZERO, 1.0).cover(mm);
         let expected = 1.0 - (-cover).exp();

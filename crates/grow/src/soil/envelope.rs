@@ -44,7 +44,7 @@ impl Envelope {
 mod tests {
     use super::*;
     use crate::soil::{Ground, Plain};
-    use furrow_base::math::vec2;
+    use furrow_base::math::{ToFloat, ToInt, vec2};
     use furrow_base::sampling::Purpose;
 
     /// Rationale: the area that a camera sees is determined before the ground's heights are known. Expected: 98 % of
@@ -65,7 +65,7 @@ mod tests {
             let layers = r#"layers: [(albedo: "a", height: "b", size_m: 0.3, height_mm: (-3, 5))]"#;
             let text = format!("({layers}, relief: ({relief}), clods: (over_5mm_per_m2: 0))");
             let desc: SoilDesc = ron::from_str(&text).unwrap();
-            let stream = Stream::of(6, k as u64, Purpose::Soil, 0);
+            let stream = Stream::of(6, k.to_u64(), Purpose::Soil, 0);
             let site = Site {
                 area: Rect::new(-3.0, -3.0, 3.0, 3.0),
                 grid_m: 0.02,
@@ -78,7 +78,7 @@ mod tests {
             let maps = [Plain { albedo: [0.2; 3], height: 0.5 }];
             let ground = Ground::new(&desc, &[], &maps, &site, &stream).unwrap();
             let Envelope { tilt, below_m, above_m } = Envelope::of(&desc, rows, &stream);
-            let places = (0..14_400).map(|k| vec2((k % 120) as f32 - 59.5, (k / 120) as f32 - 59.5) / 20.0);
+            let places = (0..14_400).map(|k| vec2((k % 120).to_f32() - 59.5, (k / 120).to_f32() - 59.5) / 20.0);
             let departs: Vec<f32> = places.map(|p| ground.height(p.x, p.y) - tilt.dot(p)).collect();
             let outside = departs.iter().filter(|h| **h < -below_m || **h > above_m).count();
             assert!(outside * 50 < departs.len(), "{relief}: {outside} of {}", departs.len());

@@ -7,7 +7,7 @@ use super::openness::Squares;
 use super::site::{FULL_CELL_M, Sizes};
 use super::{InView, MAX_LAYERS, Rect, Site, SoilDesc, clod, litter, stone, stone_cover, surface};
 use furrow_base::geometry::Cost;
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{ToFloat, Vec2, vec2};
 use furrow_base::ron_file::Step;
 use furrow_base::sampling::{Purpose, Stream};
 
@@ -46,11 +46,11 @@ pub fn expected(
     let area = site.area;
     let square = f64::from(area.area());
     let grid = Grid::new(site);
-    let (vertices, texels) = ((grid.columns() * grid.rows()) as f64, square / f64::from(texel_m).powi(2));
+    let (vertices, texels) = ((grid.columns() * grid.rows()).to_f64(), square / f64::from(texel_m).powi(2));
     let maps =
         Cost::work(vertices * BYTES_PER_VERTEX + texels * BYTES_PER_TEXEL, (vertices + texels) * SECONDS_PER_CELL);
     let made = seen.share();
-    let joined = (1.0 - made) * (grid.x.steps * grid.y.steps) as f64;
+    let joined = (1.0 - made) * (grid.x.steps * grid.y.steps).to_f64();
     let bare = Cost::of(2.0 * vertices - surface::spared(joined), 1.0) + maps;
     let law = SizeDistribution::new(&desc.clods, ground);
     let places = places(desc, site, &law, ground);
@@ -64,7 +64,7 @@ pub fn expected(
     }
     let amount = f64::from(desc.crumbs.amount.draw32(&mut ground.child(Purpose::Soil, 20)));
     let mean =
-        |of: &dyn Fn(&Local) -> f32| places.iter().map(|law| f64::from(of(law))).sum::<f64>() / places.len() as f64;
+        |of: &dyn Fn(&Local) -> f32| places.iter().map(|law| f64::from(of(law))).sum::<f64>() / places.len().to_f64();
     let number = |(min, max): (f32, f32)| square * mean(&|law| law.number(min, max));
     let crumbs = amount * number(sizes.crumbs) + number(sizes.drawn);
     add(
@@ -92,9 +92,9 @@ fn reckoned(places: &[Local], sizes: &Sizes, area: Rect) -> Cost {
     if sizes.resolved_mm <= 0.0 || shortest >= longest {
         return Cost::default();
     }
-    let per_m2 = places.iter().map(|law| law.number(shortest, longest)).sum::<f32>() / places.len().max(1) as f32;
+    let per_m2 = places.iter().map(|law| law.number(shortest, longest)).sum::<f32>() / places.len().max(1).to_f32();
     let Squares { many, side } = Squares::of(area.size(), per_m2, longest);
-    let side = side * many as f32;
+    let side = side * many.to_f32();
     clod::cost(places, (shortest, longest), FULL_CELL_M, (Rect::new(0.0, 0.0, side, side), 1.0))
 }
 
@@ -109,7 +109,7 @@ fn places(desc: &SoilDesc, site: &Site, law: &SizeDistribution, stream: &Stream)
         blend.clods(blend.weights(noise, [0.5; MAX_LAYERS]))
     };
     let at = |i: usize, j: usize| {
-        site.area.corners()[0] + site.area.size() * vec2(i as f32 + 0.5, j as f32 + 0.5) / PLACES as f32
+        site.area.corners()[0] + site.area.size() * vec2(i.to_f32() + 0.5, j.to_f32() + 0.5) / PLACES.to_f32()
     };
     let all = (0..PLACES * PLACES).map(|k| at(k % PLACES, k / PLACES));
     all.map(|p| law.at(p, share(p))).collect()

@@ -4,7 +4,7 @@
 //! and no crack can open.
 
 use super::{Rect, Site};
-use furrow_base::math::Vec2;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2};
 
 /// Grid lines of one axis.
 #[derive(Clone, Debug)]
@@ -23,8 +23,8 @@ impl Axis {
     /// Builds lines at multiples of `step` from at or below `lo` to at or above `hi`, continued for `margin` on both
     /// sides with steps that each are `growth` times as long as the one before.
     pub(super) fn new((lo, hi): (f32, f32), step: f32, margin: f32, growth: f32) -> Self {
-        let from = (lo / step + 1e-3).floor() as i32;
-        let to = ((hi / step - 1e-3).ceil() as i32).max(from + 1);
+        let from = (lo / step + 1e-3).floor_to::<i32>();
+        let to = (hi / step - 1e-3).ceil_to::<i32>().max(from + 1);
         let outside: Vec<f32> =
             std::iter::successors(Some((0.0, step)), |(at, by)| Some((at + by * growth, by * growth)))
                 .skip(1)
@@ -32,20 +32,20 @@ impl Axis {
                 .scan(true, |more, at| std::mem::replace(more, at < margin).then_some(at))
                 .take(if margin > 0.0 { usize::MAX } else { 0 })
                 .collect();
-        let line = |i: i32| i as f32 * step;
+        let line = |i: i32| i.to_f32() * step;
         let at = (outside.iter().rev().map(|d| line(from) - d))
             .chain((from..=to).map(line))
             .chain(outside.iter().map(|d| line(to) + d))
             .collect();
-        Self { at, first: outside.len(), steps: (to - from) as usize, start: line(from), step }
+        Self { at, first: outside.len(), steps: (to - from).to_usize(), start: line(from), step }
     }
 
     /// Returns the step that contains `x` and the position within it, 0..1; values outside are clamped.
     pub(super) fn locate(&self, x: f32) -> (usize, f32) {
         let even = (x - self.start) / self.step;
-        if even >= 0.0 && even < self.steps as f32 {
-            let i = even as usize;
-            return (self.first + i, even - i as f32);
+        if even >= 0.0 && even < self.steps.to_f32() {
+            let i = even.trunc_to::<usize>();
+            return (self.first + i, even - i.to_f32());
         }
         let i = self.at.partition_point(|a| *a <= x).clamp(1, self.at.len() - 1) - 1;
         (i, ((x - self.at[i]) / (self.at[i + 1] - self.at[i])).clamp(0.0, 1.0))
@@ -111,11 +111,11 @@ impl Grid {
 
     /// Returns two triangles for each cell (i, j) that is `wanted`, counter-clockwise seen from above.
     pub(super) fn triangles(&self, wanted: impl Fn(usize, usize) -> bool) -> Vec<[u32; 3]> {
-        let n = self.columns() as u32;
+        let n = self.columns().to_u32();
         let cells = (self.columns() - 1) * (self.rows() - 1);
         let mut triangles = Vec::with_capacity(2 * cells);
-        for j in 0..self.rows() as u32 - 1 {
-            for i in (0..n - 1).filter(|i| wanted(*i as usize, j as usize)) {
+        for j in 0..self.rows().to_u32() - 1 {
+            for i in (0..n - 1).filter(|i| wanted(i.to_usize(), j.to_usize())) {
                 let a = j * n + i;
                 triangles.push([a, a + 1, a + n + 1]);
                 triangles.push([a, a + n + 1, a + n]);

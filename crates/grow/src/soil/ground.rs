@@ -10,7 +10,7 @@ use super::site::{FULL_CELL_M, Site, Sizes};
 use super::stone_cover;
 use super::{LayerMaps, MAX_LAYERS, Rect, SoilDesc};
 use furrow_base::error::{Error, Result};
-use furrow_base::math::{Spectrum, Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::optics::soil::at;
 use furrow_optics::texture::noise::Perlin;
@@ -240,15 +240,15 @@ impl Ground {
             .map(|(i, j)| self.heights[self.index(i, j)])
             .collect();
         // Soil that protrudes from its surroundings within 2 cm dries first.
-        let around = blur(&heights, raster.width, (0.01 / self.step).ceil() as usize);
+        let around = blur(&heights, raster.width, (0.01 / self.step).ceil_to::<usize>());
         let out: Vec<f32> = heights.iter().zip(&around).map(|(h, a)| h - a).collect();
-        let sd = (out.iter().map(|x| x * x).sum::<f32>() / out.len() as f32).sqrt().max(1e-6);
+        let sd = (out.iter().map(|x| x * x).sum::<f32>() / out.len().to_f32()).sqrt().max(1e-6);
         let patches = slowly(raster, self.every(), |p| {
             let (x, y) = (f64::from(p.x) * frequency, f64::from(p.y) * frequency);
-            patches.fbm2(x + 0.5, y + 0.5, 4, 0.6) as f32 / FBM4_SD
+            patches.fbm2(x + 0.5, y + 0.5, 4, 0.6).to_f32() / FBM4_SD
         });
         let tone = slowly(raster, self.every(), |p| {
-            let tone = tones.fbm2(f64::from(p.x) / 0.03 + 0.5, f64::from(p.y) / 0.03 + 0.5, 3, 0.6) as f32 / FBM4_SD;
+            let tone = tones.fbm2(f64::from(p.x) / 0.03 + 0.5, f64::from(p.y) / 0.03 + 0.5, 3, 0.6).to_f32() / FBM4_SD;
             1.0 + 0.06 * tone.clamp(-2.5, 2.5)
         });
         let moisture = (patches.iter().zip(&out))
@@ -298,7 +298,7 @@ impl Ground {
 
     /// Returns the number of grid steps between samples of slowly varying noise, about 4 mm.
     fn every(&self) -> usize {
-        ((0.004 / self.step) as usize).max(1)
+        (0.004 / self.step).trunc_to::<usize>().max(1)
     }
 
     /// Returns the central differences of the heights.
@@ -413,16 +413,16 @@ impl Ground {
         let origin = vec2(self.grid.x.at[self.grid.x.first], self.grid.y.at[self.grid.y.first]);
         let q = (p - origin) / self.step;
         let (nx, ny) = (self.grid.x.steps, self.grid.y.steps);
-        let q = q.clamp(Vec2::ZERO, vec2(nx as f32, ny as f32));
-        let (i, j) = ((q.x as usize).min(nx - 1), (q.y as usize).min(ny - 1));
-        FineCell { k: j * (nx + 1) + i, n: nx + 1, t: q - vec2(i as f32, j as f32) }
+        let q = q.clamp(Vec2::ZERO, vec2(nx.to_f32(), ny.to_f32()));
+        let (i, j) = (q.x.trunc_to::<usize>().min(nx - 1), q.y.trunc_to::<usize>().min(ny - 1));
+        FineCell { k: j * (nx + 1) + i, n: nx + 1, t: q - vec2(i.to_f32(), j.to_f32()) }
     }
 
     /// Returns the position of texel (i, j) if each step of the grid is split into `split` texels.
     #[inline]
     pub(super) fn texel_cell(&self, i: usize, j: usize, split: usize) -> FineCell {
         let n = self.grid.x.steps + 1;
-        let t = |i: usize| ((i % split) as f32 + 0.5) / split as f32;
+        let t = |i: usize| ((i % split).to_f32() + 0.5) / split.to_f32();
         FineCell { k: j / split * n + i / split, n, t: vec2(t(i), t(j)) }
     }
 
@@ -503,13 +503,13 @@ fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f
     let lines = |n: usize| (n - 1).div_ceil(every) + 1;
     let (w, h) = (lines(raster.width), lines(raster.height));
     // The last line may be beyond the raster, so that all are evenly spaced.
-    let place = |i: usize, j: usize| raster.origin + vec2((i * every) as f32, (j * every) as f32) * raster.step;
+    let place = |i: usize, j: usize| raster.origin + vec2((i * every).to_f32(), (j * every).to_f32()) * raster.step;
     let coarse: Vec<f32> = (0..w * h).into_par_iter().map(|k| f(place(k % w, k / w))).collect();
     let mut out = Vec::with_capacity(raster.width * raster.height);
     for j in 0..raster.height {
         for i in 0..raster.width {
             let (a, b) = (i / every, j / every);
-            let t = vec2((i % every) as f32, (j % every) as f32) / every as f32;
+            let t = vec2((i % every).to_f32(), (j % every).to_f32()) / every.to_f32();
             // A sample on a line uses that line only, because the next one may not exist.
             let (east, north) = (usize::from(t.x > 0.0), w * usize::from(t.y > 0.0));
             let k = b * w + a;
@@ -523,9 +523,9 @@ fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f
 /// Returns the mean over a square of ±`reach` samples, with clamping at the borders.
 pub(super) fn blur(values: &[f32], width: usize, reach: usize) -> Vec<f32> {
     let height = values.len() / width;
-    let r = reach as i64;
-    let held = |i: i64, count: usize| i.clamp(0, count as i64 - 1) as usize;
-    let mean = |sum: f64| (sum / (2 * r + 1) as f64) as f32;
+    let r = reach.to_i64();
+    let held = |i: i64, count: usize| i.clamp(0, count.to_i64() - 1).to_usize();
+    let mean = |sum: f64| (sum / (2 * r + 1).to_f64()).to_f32();
     let mut rows = vec![0.0; values.len()];
     rows.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
         let at = |i: i64| f64::from(from[held(i, width)]);

@@ -4,7 +4,7 @@
 //! on the view. Meshes of bodies and small triangles are built only where they are in view.
 
 use super::Rect;
-use furrow_base::math::{Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, Vec3, vec2};
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -43,10 +43,10 @@ impl InView {
         let cell_m = CELL_M.max((area.area() / MOST_CELLS).sqrt());
         let [corner, _] = area.corners();
         let cells = (area.size() / cell_m).ceil().max(Vec2::ONE);
-        let (columns, rows) = (cells.x as usize, cells.y as usize);
+        let (columns, rows) = (cells.x.trunc_to::<usize>(), cells.y.trunc_to::<usize>());
         let of = |k: usize| {
-            let middle = corner + (vec2((k % columns) as f32, (k / columns) as f32) + 0.5) * cell_m;
-            let within = (0..9).map(|n| middle + (vec2((n % 3) as f32, (n / 3) as f32) - 1.0) * (0.5 * cell_m));
+            let middle = corner + (vec2((k % columns).to_f32(), (k / columns).to_f32()) + 0.5) * cell_m;
+            let within = (0..9).map(|n| middle + (vec2((n % 3).to_f32(), (n / 3).to_f32()) - 1.0) * (0.5 * cell_m));
             let (lo, hi) =
                 within.map(&height).fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), h| (lo.min(h), hi.max(h)));
             // Between the mean height and the highest or lowest one, rays move horizontally by `run` times the difference.
@@ -62,9 +62,9 @@ impl InView {
         if rows == 0 {
             return true;
         }
-        let last = vec2((self.columns - 1) as f32, (rows - 1) as f32);
+        let last = vec2((self.columns - 1).to_f32(), (rows - 1).to_f32());
         let cell = ((at - self.corner) / self.cell_m).floor().clamp(Vec2::ZERO, last);
-        let distance = self.distance[cell.y as usize * self.columns + cell.x as usize];
+        let distance = self.distance[cell.y.trunc_to::<usize>() * self.columns + cell.x.trunc_to::<usize>()];
         // A point is at most half a diagonal from its cell's centre, and a tall body is visible before the ground below it.
         distance <= BESIDE_M + radius * (1.0 + self.run) + FRAC_1_SQRT_2 * self.cell_m
     }
@@ -72,7 +72,7 @@ impl InView {
     /// Returns the fraction of the area where meshes are built.
     pub(super) fn share(&self) -> f64 {
         let made = self.distance.iter().filter(|distance| **distance <= BESIDE_M).count();
-        if self.distance.is_empty() { 1.0 } else { made as f64 / self.distance.len() as f64 }
+        if self.distance.is_empty() { 1.0 } else { made.to_f64() / self.distance.len().to_f64() }
     }
 }
 
@@ -90,7 +90,7 @@ mod tests {
         let seen = InView::of(area, 0.0, |_| 0.0, |p| strip(p.truncate()));
         let cell = 0.03;
         for k in 0..4000 {
-            let p = area.corners()[0] + area.size() * (vec2(0.754_877_7, 0.569_840_3) * k as f32).fract();
+            let p = area.corners()[0] + area.size() * (vec2(0.754_877_7, 0.569_840_3) * k.to_f32()).fract();
             for radius in [0.0, 0.2] {
                 let beyond = strip(p) - BESIDE_M - radius;
                 let held = seen.holds(p, radius);

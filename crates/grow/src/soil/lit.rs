@@ -7,7 +7,7 @@
 
 use super::Rect;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3};
 use furrow_optics::optics::shadowing::{PAIRS, SLANTS, Shadowing, TURNS, TWELFTHS, Table};
 use furrow_optics::optics::soil::facets;
 use std::f32::consts::TAU;
@@ -55,7 +55,7 @@ struct Directions {
 }
 
 static DIRECTIONS: LazyLock<Directions> = LazyLock::new(|| {
-    let way = |a: usize| Vec2::from_angle((a as f32 + 0.5) / AZIMUTHS as f32 * TAU);
+    let way = |a: usize| Vec2::from_angle((a.to_f32() + 0.5) / AZIMUTHS.to_f32() * TAU);
     let at = |a: usize, k: usize| {
         let cos = Shadowing::cosine(k);
         (way(a) * (1.0 - cos * cos).max(0.0).sqrt()).extend(cos)
@@ -87,14 +87,14 @@ impl ReflectedLight {
         // Cosine of each direction to the normal; 0 for hidden directions.
         let mut seen = [[0.0; AZIMUTHS]; SLANTS];
         for a in 0..AZIMUTHS {
-            let way = Vec2::from_angle((a as f32 + 0.5) / AZIMUTHS as f32 * TAU);
+            let way = Vec2::from_angle((a.to_f32() + 0.5) / AZIMUTHS.to_f32() * TAU);
             let distances =
                 std::iter::successors(Some(reach.from), |d| Some(d * FARTHER)).take_while(|d| *d <= reach.to);
             let horizon = distances.map(|d| rise(way * d) / d).fold(0.0, f32::max);
             // For a whole sky, 2 (n·ω) sin θ dθ averaged over azimuths is 1 on level ground.
-            let step = (1.0 / horizon.max(1e-6)).atan() / HEIGHTS as f32;
+            let step = (1.0 / horizon.max(1e-6)).atan() / HEIGHTS.to_f32();
             for i in 0..HEIGHTS {
-                let (sin, cos) = ((i as f32 + 0.5) * step).sin_cos();
+                let (sin, cos) = ((i.to_f32() + 0.5) * step).sin_cos();
                 let incident = normal.dot((way * sin).extend(cos)).max(0.0);
                 reaching += incident * 2.0 * sin * step;
                 sky += facet(shape, normal.z, incident, cos) * incident * 2.0 * sin * step;
@@ -105,7 +105,7 @@ impl ReflectedLight {
                 }
             }
         }
-        let n = AZIMUTHS as f32;
+        let n = AZIMUTHS.to_f32();
         let slope = normal.truncate() / normal.z.max(1.0 / STEEPEST);
         let shown = |k: usize| seen[k].iter().sum::<f32>() / (n * normal.z * Shadowing::cosine(k));
         Self {
@@ -138,7 +138,7 @@ fn sent(shape: [f32; 2], normal: Vec3, seen: &[[f32; AZIMUTHS]; SLANTS]) -> Tabl
                 let terms: [f32; AZIMUTHS] =
                     std::array::from_fn(|a| both(seen[j][a], turned[k][a]) + both(seen[k][a], turned[j][a]));
                 let level = both(Shadowing::cosine(j), Shadowing::cosine(k));
-                sent[pair][turn] = terms.iter().sum::<f32>() / (2.0 * AZIMUTHS as f32 * normal.z * level);
+                sent[pair][turn] = terms.iter().sum::<f32>() / (2.0 * AZIMUTHS.to_f32() * normal.z * level);
             }
         }
     }
@@ -155,12 +155,12 @@ pub(super) struct Heights {
 impl Heights {
     /// Rasterizes the highest of the meshes at each of `side` × `side` samples of a square, 0 where there is none.
     pub(super) fn over<'a>(area: Rect, side: usize, meshes: impl Iterator<Item = &'a Mesh>) -> Self {
-        let step = area.size().x / side as f32;
+        let step = area.size().x / side.to_f32();
         let mut heights = Self { values: vec![0.0; side * side], side, step };
         let place = |p: Vec3| ((p.truncate() - area.corners()[0]) / step).extend(p.z);
         for mesh in meshes {
             for triangle in &mesh.triangles {
-                heights.raise(triangle.map(|v| place(mesh.positions[v as usize])));
+                heights.raise(triangle.map(|v| place(mesh.positions[v.to_usize()])));
             }
         }
         heights
@@ -170,15 +170,15 @@ impl Heights {
     fn raise(&mut self, [a, b, c]: [Vec3; 3]) {
         let area = (b - a).truncate().perp_dot((c - a).truncate());
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-        let last = self.side as f32 - 1.0;
-        for y in lo.y.ceil().max(0.0) as i32..=hi.y.floor().min(last) as i32 {
-            for x in lo.x.ceil().max(0.0) as i32..=hi.x.floor().min(last) as i32 {
-                let d = Vec2::new(x as f32, y as f32) - a.truncate();
+        let last = self.side.to_f32() - 1.0;
+        for y in lo.y.ceil().max(0.0).trunc_to::<i32>()..=hi.y.floor().min(last).trunc_to::<i32>() {
+            for x in lo.x.ceil().max(0.0).trunc_to::<i32>()..=hi.x.floor().min(last).trunc_to::<i32>() {
+                let d = Vec2::new(x.to_f32(), y.to_f32()) - a.truncate();
                 let u = d.perp_dot((c - a).truncate()) / area;
                 let v = (b - a).truncate().perp_dot(d) / area;
                 if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
                     let z = a.z + u * (b.z - a.z) + v * (c.z - a.z);
-                    let height = &mut self.values[y as usize * self.side + x as usize];
+                    let height = &mut self.values[y.to_usize() * self.side + x.to_usize()];
                     *height = height.max(z);
                 }
             }
@@ -187,7 +187,7 @@ impl Heights {
 
     /// Returns the fraction of the square that is covered by meshes.
     pub(super) fn cover(&self) -> f32 {
-        self.values.iter().filter(|height| **height > 0.0).count() as f32 / self.values.len() as f32
+        self.values.iter().filter(|height| **height > 0.0).count().to_f32() / self.values.len().to_f32()
     }
 
     /// Returns `true` if a sample is covered by a mesh.
@@ -201,9 +201,9 @@ impl Heights {
 
     /// Returns the bilinear height at a point in metres from the first sample; the square repeats periodically.
     fn at(&self, p: Vec2) -> f32 {
-        let q = (p / self.step).rem_euclid(Vec2::splat(self.side as f32));
-        let (i, j) = (q.x as usize, q.y as usize);
-        let t = q - Vec2::new(i as f32, j as f32);
+        let q = (p / self.step).rem_euclid(Vec2::splat(self.side.to_f32()));
+        let (i, j) = (q.x.trunc_to::<usize>(), q.y.trunc_to::<usize>());
+        let t = q - Vec2::new(i.to_f32(), j.to_f32());
         let row = |j: usize| self.sample(i, j) + t.x * (self.sample(i + 1, j) - self.sample(i, j));
         row(j) + t.y * (row(j + 1) - row(j))
     }
@@ -212,9 +212,9 @@ impl Heights {
     pub(super) fn lit(&self, i: usize, j: usize, sigma: f32) -> ReflectedLight {
         let x = self.sample(i + 1, j) - self.sample(i + self.side - 1, j);
         let y = self.sample(i, j + 1) - self.sample(i, j + self.side - 1);
-        let p = Vec2::new(i as f32, j as f32) * self.step;
+        let p = Vec2::new(i.to_f32(), j.to_f32()) * self.step;
         let own = self.sample(i, j);
-        let reach = HorizonRange { from: self.step, to: self.step * self.side as f32 };
+        let reach = HorizonRange { from: self.step, to: self.step * self.side.to_f32() };
         ReflectedLight::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, reach, |d| self.at(p + d) - own)
     }
 }

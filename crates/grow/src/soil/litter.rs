@@ -7,7 +7,7 @@
 use super::record::LitterRecord;
 use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells, residue};
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{Spectrum, Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use std::f32::consts::{PI, TAU};
@@ -40,12 +40,12 @@ const HEAP_SECONDS: f64 = 4e-9;
 
 /// Returns the number of points along the path of a straw of `length` metres.
 fn straw_points(length: f32) -> usize {
-    ((length / 0.004) as usize).clamp(6, 24)
+    (length / 0.004).trunc_to::<usize>().clamp(6, 24)
 }
 
 /// Returns the number of points along the path of a stick of `length` metres.
 fn stick_points(length: f32) -> usize {
-    ((length / 0.005) as usize).clamp(8, 32)
+    (length / 0.005).trunc_to::<usize>().clamp(8, 32)
 }
 
 /// Level of detail of sweeps.
@@ -137,7 +137,7 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
     let drawn = LitterRecord::draw(desc, stream);
     let s = own(stream, 8);
     let mean = |of: &dyn Fn(&mut Stream) -> usize| {
-        (0..256).map(|k| of(&mut s.child(Purpose::Debris, k))).sum::<usize>() as f64 / 256.0
+        (0..256).map(|k| of(&mut s.child(Purpose::Debris, k))).sum::<usize>().to_f64() / 256.0
     };
     let straw = mean(&|s| {
         let points = straw_points(desc.straw_mm.draw32(s) * 1e-3);
@@ -149,7 +149,7 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
         let detail = Detail::of(desc.stick_width_mm.draw32(s), resolved_mm);
         swept(detail.points(points), detail.corners(ROUND).into())
     });
-    let stubs = mean(&|s| desc.stubs.draw(s) as usize) * swept(STUB_POINTS, STUB.into()) as f64;
+    let stubs = mean(&|s| desc.stubs.draw(s).trunc_to::<usize>()) * swept(STUB_POINTS, STUB.into()).to_f64();
     let bit = mean(&|s| {
         let detail = Detail::of(0.3 * desc.bit_mm.draw32(s), resolved_mm);
         swept(detail.points(BIT_POINTS), detail.arc())
@@ -157,7 +157,7 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
     // Each piece raises the pile along its path.
     let heaps = |width_mm: f64, points: usize, number: f64| {
         let cells = (width_mm * 1e-3 / 1e-3).powi(2).min(f64::from(area.area()) / 1e-6);
-        Cost::work(0.0, HEAP_SECONDS * cells * points as f64 * number)
+        Cost::work(0.0, HEAP_SECONDS * cells * points.to_f64() * number)
     };
     let on_it = f64::from(area.area());
     let [straws, sticks, bits] =
@@ -193,7 +193,7 @@ fn places(area: Rect, per_m2: f32, stream: &Stream) -> Vec<(Vec2, Stream)> {
         let mut cell = cell_stream(stream, i, j);
         for k in 0..cell.poisson(f64::from(per_m2 * CELL_M * CELL_M)) {
             let mut s = cell.child(Purpose::Debris, k);
-            let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+            let at = (vec2(i.to_f32(), j.to_f32()) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
             if area.contains(at) {
                 all.push((at, s));
             }
@@ -205,25 +205,25 @@ fn places(area: Rect, per_m2: f32, stream: &Stream) -> Vec<(Vec2, Stream)> {
 /// Draws a path of `n` points and length `length` through `at`, bent in the plane by about `bend` radians in total.
 fn path(at: Vec2, length: f32, bend: f32, n: usize, s: &mut Stream) -> Vec<Vec2> {
     let mut heading = s.range32(0.0, TAU);
-    let turn = bend * s.normal() as f32 / n as f32;
-    let kink = (s.index(n), bend * s.normal() as f32);
+    let turn = bend * s.normal().to_f32() / n.to_f32();
+    let kink = (s.index(n), bend * s.normal().to_f32());
     let mut points = vec![Vec2::ZERO];
     for i in 1..n {
         heading += turn + if i == kink.0 { kink.1 } else { 0.0 };
-        points.push(points[i - 1] + Vec2::from_angle(heading) * (length / (n - 1) as f32));
+        points.push(points[i - 1] + Vec2::from_angle(heading) * (length / (n - 1).to_f32()));
     }
-    let middle = points.iter().sum::<Vec2>() / n as f32;
+    let middle = points.iter().sum::<Vec2>() / n.to_f32();
     points.iter().map(|p| *p - middle + at).collect()
 }
 
 /// Places a path of half-thickness `half` on the pile. With `stiff` = 1 it bridges hollows, with 0 it follows the
 /// ground.
 fn lay(points: &[Vec2], half: f32, stiff: f32, pile: &Pile) -> Vec<Vec3> {
-    let n = points.len() as f32;
+    let n = points.len().to_f32();
     let under: Vec<f32> = points.iter().map(|p| pile.at(*p)).collect();
     // Straight line fitted to the surface below, raised until a quarter of its points touch.
     let mean = under.iter().sum::<f32>() / n;
-    let t = |i: usize| i as f32 - 0.5 * (n - 1.0);
+    let t = |i: usize| i.to_f32() - 0.5 * (n - 1.0);
     let spread: f32 = (0..points.len()).map(|i| t(i).powi(2)).sum();
     let slope = under.iter().enumerate().map(|(i, h)| t(i) * (h - mean)).sum::<f32>() / spread.max(1e-9);
     let mut gaps: Vec<f32> = under.iter().enumerate().map(|(i, h)| h - mean - slope * t(i)).collect();
@@ -248,24 +248,24 @@ fn sweep(path: &[Vec3], section: &[Vec2], size: impl Fn(f32) -> Vec2, twist: f32
         let along = (path[(i + 1).min(n - 1)] - path[i.saturating_sub(1)]).normalize_or(Vec3::X);
         let side = Vec3::Z.cross(along).normalize_or(Vec3::Y);
         let up = along.cross(side);
-        let t = i as f32 / (n - 1) as f32;
+        let t = i.to_f32() / (n - 1).to_f32();
         let turn = Vec2::from_angle(twist * (t - 0.5));
         for k in 0..=m {
             let c = turn.rotate(section[k % m] * size(t));
             positions.push(path[i] + side * c.x + up * c.y);
-            uvs.push(vec2(k as f32 / m as f32, t));
+            uvs.push(vec2(k.to_f32() / m.to_f32(), t));
         }
     }
-    let (w, rows) = (m as u32 + 1, n as u32);
+    let (w, rows) = (m.to_u32() + 1, n.to_u32());
     for i in 0..rows - 1 {
-        for k in 0..m as u32 {
+        for k in 0..m.to_u32() {
             let a = i * w + k;
             triangles.push([a, a + 1, a + w + 1]);
             triangles.push([a, a + w + 1, a + w]);
         }
     }
     for (row, flip) in [(0, true), (rows - 1, false)] {
-        for k in 1..m as u32 - 1 {
+        for k in 1..m.to_u32() - 1 {
             let [a, b, c] = [row * w, row * w + k, row * w + k + 1];
             triangles.push(if flip { [a, c, b] } else { [a, b, c] });
         }
@@ -292,7 +292,7 @@ fn arc(opening: f32, wall: f32, n: u8) -> Vec<Vec2> {
 fn debris(kind: DebrisKind, mesh: Mesh, albedo: Spectrum, path: &[Vec3], s: &mut Stream) -> Debris {
     let centre = path[path.len() / 2];
     let radius = mesh.positions.iter().map(|p| p.truncate().distance(centre.truncate())).fold(0.0, f32::max);
-    let tint = (0.22 * s.normal() as f32).exp();
+    let tint = (0.22 * s.normal().to_f32()).exp();
     Debris { kind, mesh, albedo, tint, dust: 0.0, hue: s.uniform32(), centre, radius }
 }
 
@@ -317,7 +317,7 @@ fn straw(
         &detail.thinned(&path),
         &section,
         |t| Vec2::splat(0.5 * width * (1.0 - (1.0 - frayed) * t.powi(3))),
-        0.5 * s.normal() as f32,
+        0.5 * s.normal().to_f32(),
     );
     raise(pile, &path, 0.5 * width);
     debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s)
@@ -334,14 +334,14 @@ fn stick(desc: &LitterDesc, resolved_mm: f32, pile: &mut Pile, at: Vec2, s: &mut
     let taper = s.range32(0.35, 0.75);
     let size = |t: f32| Vec2::splat(half * (1.0 - (1.0 - taper) * t) * (1.0 + 0.08 * (knots.0 + knots.1 * t).sin()));
     let mut mesh = sweep(&detail.thinned(&path), &round(detail.corners(ROUND)), size, 0.0);
-    for _ in 0..desc.stubs.draw(s) as u32 {
+    for _ in 0..desc.stubs.draw(s).trunc_to::<u32>() {
         let i = 1 + s.index(n - 2);
         let along = (path[i + 1] - path[i]).normalize_or(Vec3::X);
         let side = along.cross(Vec3::Z).normalize_or(Vec3::Y) * if s.chance(0.5) { 1.0 } else { -1.0 };
         let to = (along + side * s.range32(0.6, 1.4) + Vec3::Z * s.range32(-0.1, 0.5)).normalize_or(Vec3::X);
         let long = half * s.range32(2.5, 9.0);
-        let stub: Vec<Vec3> = (0..STUB_POINTS as u8).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
-        let thick = size(i as f32 / n as f32).x * s.range32(0.35, 0.65);
+        let stub: Vec<Vec3> = (0..STUB_POINTS.to_u8()).map(|k| path[i] + to * (long * f32::from(k) / 3.0)).collect();
+        let thick = size(i.to_f32() / n.to_f32()).x * s.range32(0.35, 0.65);
         mesh.append(&sweep(&stub, &round(detail.corners(STUB)), |t| Vec2::splat(thick * (1.0 - 0.5 * t)), 0.0));
     }
     raise(pile, &path, half);
@@ -357,7 +357,7 @@ fn bit(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &mut Pile
     // Dry leaves curl up at both ends.
     let curl = length * s.range32(0.0, 0.25);
     for (i, p) in path.iter_mut().enumerate() {
-        p.z += curl * (i as f32 / 2.5 - 1.0).powi(2);
+        p.z += curl * (i.to_f32() / 2.5 - 1.0).powi(2);
     }
     let (from, to) = (s.range32(0.1, 0.6), s.range32(0.05, 0.4));
     let wide = |t: f32| ((1.0 - t) * from + t * to) + (1.0 - 0.5 * (from + to)) * (PI * t).sin();
@@ -367,7 +367,7 @@ fn bit(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &mut Pile
         &detail.thinned(&path),
         &section,
         |t| vec2(half * wide(t), (half * wide(t)).max(thick)),
-        0.8 * s.normal() as f32,
+        0.8 * s.normal().to_f32(),
     );
     let stalk = s.chance(0.3);
     debris(DebrisKind::Bit, mesh, if stalk { tone(weathering, s) } else { ROTTEN }, &path, s)
@@ -394,7 +394,7 @@ mod tests {
         for section in [round(8), round(4), arc(1.2, 0.2, 6), arc(4.0, 0.2, 6), arc(1.2, 0.2, 2), arc(4.0, 0.2, 2)] {
             let mesh = sweep(&path, &section, |_| Vec2::splat(0.05), 0.3);
             assert_eq!(mesh.fault(), None);
-            let volume: f32 = (0..mesh.triangles.len() as u32)
+            let volume: f32 = (0..mesh.triangles.len().to_u32())
                 .map(|i| {
                     let [a, b, c] = mesh.corners(i);
                     a.cross(b).dot(c) / 6.0

@@ -61,7 +61,7 @@ pub use wheel::WheelDesc;
 
 pub use furrow_optics::texture::ground::MAX_LAYERS;
 
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, Vec2, vec2};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Textures of one layer, sampled at tile coordinates: one tile is 0..1, and both textures repeat.
@@ -165,12 +165,12 @@ impl Rect {
 
 /// Returns the random stream of cell (i, j), which does not depend on the area.
 fn cell_stream(stream: &Stream, i: i32, j: i32) -> Stream {
-    stream.child(Purpose::Debris, (u64::from(i as u32) << 32) | u64::from(j as u32))
+    stream.child(Purpose::Debris, (u64::from(i.cast_unsigned()) << 32) | u64::from(j.cast_unsigned()))
 }
 
 /// Iterates over the cells of side `cell` that touch a rectangle.
 fn cells(area: Rect, cell: f32) -> impl Iterator<Item = (i32, i32)> {
-    let range = |lo: f32, hi: f32| (lo / cell).floor() as i32..(hi / cell).ceil() as i32;
+    let range = |lo: f32, hi: f32| (lo / cell).floor_to::<i32>()..(hi / cell).ceil_to::<i32>();
     let columns = range(area.x0, area.x1);
     range(area.y0, area.y1).flat_map(move |j| columns.clone().map(move |i| (i, j)))
 }

@@ -16,7 +16,7 @@ use super::lit::{Heights, HorizonRange, ReflectedLight};
 use super::pile::Pile;
 use super::site::{FULL_CELL_M, FULL_TEXEL_M, Sizes};
 use super::{Canopy, InView, LayerMaps, Rect};
-use furrow_base::math::{Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, Vec3, vec2};
 use furrow_optics::optics::UnmeshedRelief;
 use furrow_optics::optics::shadowing::{PAIRS, SLANTS, Shadowing, TURNS, Table};
 use furrow_optics::optics::soil::FACETS;
@@ -97,9 +97,9 @@ impl Squares {
         let longest = 1e-3 * longest_mm;
         let few = (MOST_CLODS / per_m2.max(f32::MIN_POSITIVE)).sqrt().max(LEAST_CLODS * longest);
         let side = (LONGEST_CLODS * longest).max(LEAST_CLOD_M).min(few);
-        let many = ((CLODS_M / side) as usize).clamp(CLOD_SQUARES.0, CLOD_SQUARES.1);
+        let many = (CLODS_M / side).trunc_to::<usize>().clamp(CLOD_SQUARES.0, CLOD_SQUARES.1);
         // More squares would overlap and contain the same clods.
-        Self { many: many.min((size.max_element() / side).ceil().max(1.0) as usize), side }
+        Self { many: many.min((size.max_element() / side).ceil().max(1.0).trunc_to::<usize>()), side }
     }
 }
 
@@ -135,7 +135,7 @@ impl Ground {
         let damp = (1.0 - cover) * wetness(&fine, full.wet);
         let sky = solve(|half| {
             let (sky, level) = Light::sky(&coarse, half, reflectance);
-            ((sky / level) as f32) < bright
+            (sky / level).to_f32() < bright
         });
         let made = Light::of(&coarse, sky, reflectance);
         let target = bright * clod_light.sky;
@@ -179,8 +179,8 @@ impl Ground {
         let (corner, size) = (self.area().corners()[0], self.area().size());
         let side = size.min(Vec2::splat(PATCH_M));
         // On a small ground more patches would overlap.
-        let many = ((size.max_element() / PATCH_M).ceil() as usize).clamp(1, PATCHES);
-        let at = |k: usize| (k as f32 + 0.5) / many as f32;
+        let many = (size.max_element() / PATCH_M).ceil_to::<usize>().clamp(1, PATCHES);
+        let at = |k: usize| (k.to_f32() + 0.5) / many.to_f32();
         let place = |k: usize| corner + (size - side) * vec2(at(k % many), at(k / many));
         let square = |lo: Vec2| Rect::new(lo.x, lo.y, lo.x + side.x, lo.y + side.y);
         (0..many * many).map(place).map(square).collect()
@@ -216,7 +216,7 @@ impl Ground {
             let middle = 0.5 * (patch.corners()[0] + patch.corners()[1]);
             self.law.at(middle, self.share(middle)).number(shortest, longest)
         };
-        let per_m2 = patches.iter().map(here).sum::<f32>() / patches.len() as f32;
+        let per_m2 = patches.iter().map(here).sum::<f32>() / patches.len().to_f32();
         let Squares { many, side } = Squares::of(size, per_m2, longest);
         let none = (shortest, shortest);
         let clods = (shortest, longest);
@@ -237,11 +237,11 @@ impl Ground {
             };
             (places.iter().copied().map(sample).collect::<Vec<Sample>>(), heights.cover())
         };
-        let at = |k: usize| (k as f32 + 0.5) / many as f32;
+        let at = |k: usize| (k.to_f32() + 0.5) / many.to_f32();
         let middle = |k: usize| corner + size * vec2(at(k % many), at(k / many));
         let middles: Vec<Vec2> = (0..many * many).map(middle).collect();
         let (samples, covers): (Vec<Vec<Sample>>, Vec<f32>) = middles.par_iter().map(|p| square(*p)).unzip();
-        let over_squares = |sum: f32| sum / middles.len() as f32;
+        let over_squares = |sum: f32| sum / middles.len().to_f32();
         let cover = over_squares(covers.iter().sum());
         let law = |mm| over_squares(middles.iter().map(|p| self.law.at(*p, self.share(*p)).cover(mm)).sum());
         // Resolved clods have the density of the size distribution and may overlap.
@@ -252,7 +252,8 @@ impl Ground {
 
     /// Samples a patch, at the same points on every ground: the R₂ sequence (Roberts 2018).
     fn samples(&self, painted: &UnshadedMaps, patch: Rect) -> Vec<Sample> {
-        let place = |k: usize| patch.corners()[0] + patch.size() * (vec2(0.754_877_7, 0.569_840_3) * k as f32).fract();
+        let place =
+            |k: usize| patch.corners()[0] + patch.size() * (vec2(0.754_877_7, 0.569_840_3) * k.to_f32()).fract();
         (0..SAMPLES).into_par_iter().map(|k| self.sample(painted, place(k))).collect()
     }
 
@@ -304,7 +305,7 @@ impl Light {
             }
         }
         // The horizon search is finite, so projected areas may not add up to that of level ground: they are normalised.
-        let shown = shown.map(|sum| (sum / samples.len().max(1) as f64).max(f64::MIN_POSITIVE));
+        let shown = shown.map(|sum| (sum / samples.len().max(1).to_f64()).max(f64::MIN_POSITIVE));
         let mut sent = [[0.0; TURNS]; PAIRS];
         for k in 0..SLANTS {
             for j in 0..=k {
@@ -313,11 +314,11 @@ impl Light {
                 let upright = |k: usize| sums[Shadowing::pair(k, SLANTS - 1)][0];
                 let both = upright(j) * upright(k) / upright(SLANTS - 1).max(f64::MIN_POSITIVE);
                 let bounced = (1.0 / level - 1.0 / albedos) * both;
-                sent[pair] = sums[pair].map(|sum: f64| ((sum / albedos + bounced) / seen) as f32);
+                sent[pair] = sums[pair].map(|sum: f64| ((sum / albedos + bounced) / seen).to_f32());
             }
         }
         // Both must agree for a uniform sky seen from above.
-        let sky = (sky / level) as f32;
+        let sky = (sky / level).to_f32();
         let from_above = Shadowing::under_even_sky(|k| sent[Shadowing::pair(k, SLANTS - 1)][0]);
         let scale = sky / from_above.max(f32::MIN_POSITIVE);
         Self { sky, sent: sent.map(|row| row.map(|factor| factor * scale)) }
@@ -347,7 +348,7 @@ fn raised(clods: &[Sample]) -> [f32; SLANTS] {
 }
 
 fn mean(samples: &[Sample], of: impl Fn(&Sample) -> f32) -> f32 {
-    (samples.iter().map(|s| f64::from(of(s))).sum::<f64>() / samples.len().max(1) as f64) as f32
+    (samples.iter().map(|s| f64::from(of(s))).sum::<f64>() / samples.len().max(1).to_f64()).to_f32()
 }
 
 /// Returns the mean wetness of the pits.

@@ -2,7 +2,7 @@
 
 use super::crumb::Raster;
 use super::{Ground, Rect};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -39,16 +39,16 @@ impl Pile {
     /// Returns the area that it covers.
     pub fn area(&self) -> Rect {
         let r = self.raster;
-        let far = r.origin + vec2((r.width - 1) as f32, (r.height - 1) as f32) * r.step;
+        let far = r.origin + vec2((r.width - 1).to_f32(), (r.height - 1).to_f32()) * r.step;
         Rect::new(r.origin.x, r.origin.y, far.x, far.y)
     }
 
     /// Returns the height at a point, metres; beyond the area, that of its border.
     pub fn at(&self, p: Vec2) -> f32 {
         let r = self.raster;
-        let q = ((p - r.origin) / r.step).clamp(Vec2::ZERO, vec2(r.width as f32 - 1.001, r.height as f32 - 1.001));
-        let (i, j) = (q.x as usize, q.y as usize);
-        let t = q - vec2(i as f32, j as f32);
+        let q = ((p - r.origin) / r.step).clamp(Vec2::ZERO, vec2(r.width.to_f32() - 1.001, r.height.to_f32() - 1.001));
+        let (i, j) = (q.x.trunc_to::<usize>(), q.y.trunc_to::<usize>());
+        let t = q - vec2(i.to_f32(), j.to_f32());
         let k = j * r.width + i;
         let south = self.height[k] + t.x * (self.height[k + 1] - self.height[k]);
         let north = self.height[k + r.width] + t.x * (self.height[k + r.width + 1] - self.height[k + r.width]);
@@ -90,14 +90,14 @@ impl Pile {
         let q = (centre - r.origin) / r.step;
         let reach = a.max(b) / r.step;
         let lo = (q - reach).ceil().max(Vec2::ZERO);
-        let hi = (q + reach).floor().min(vec2(r.width as f32 - 1.0, r.height as f32 - 1.0));
-        for y in lo.y as i32..=hi.y as i32 {
-            for x in lo.x as i32..=hi.x as i32 {
-                let d = vec2(x as f32, y as f32) - q;
+        let hi = (q + reach).floor().min(vec2(r.width.to_f32() - 1.0, r.height.to_f32() - 1.0));
+        for y in lo.y.trunc_to::<i32>()..=hi.y.trunc_to::<i32>() {
+            for x in lo.x.trunc_to::<i32>()..=hi.x.trunc_to::<i32>() {
+                let d = vec2(x.to_f32(), y.to_f32()) - q;
                 let d = vec2(d.dot(turn) / a, d.perp_dot(turn) / b) * r.step;
                 let inside = 1.0 - d.length_squared();
                 if inside > 0.0 {
-                    let h = &mut self.height[y as usize * r.width + x as usize];
+                    let h = &mut self.height[y.to_usize() * r.width + x.to_usize()];
                     *h = h.max(rim + (top - rim) * inside.sqrt());
                 }
             }

@@ -6,7 +6,7 @@
 use super::record::{ReliefRecord, RowReliefRecord};
 use super::wheel::Wheel;
 use super::{ReliefDesc, Site};
-use furrow_base::math::{Vec2, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, smoothstep, vec2};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::texture::noise::Perlin;
 
@@ -62,7 +62,7 @@ impl Relief {
         let hurst = desc.hurst.draw32(&mut child(1));
         let gain = 2f32.powf(-hurst);
         let longest = desc.longest_m.draw32(&mut child(2));
-        let octaves = (longest / SHORTEST_M).log2().max(0.0) as i32 + 1;
+        let octaves = (longest / SHORTEST_M).log2().max(0.0).trunc_to::<i32>() + 1;
         let energy: f32 = (0..octaves).map(|k| gain.powi(2 * k)).sum();
         let mut side = child(3);
         let tilt_deg = desc.tilt_deg.draw32(&mut side);
@@ -76,7 +76,7 @@ impl Relief {
         });
         let (across, offset) = rows.map_or((Vec2::X, 0.0), |r| (vec2(r.azimuth.cos(), -r.azimuth.sin()), r.offset_m));
         let wheels: Vec<Wheel> = (desc.wheels.iter().enumerate())
-            .map(|(k, wheel)| Wheel::draw(wheel, across, offset, &mut child(50 + k as u64)))
+            .map(|(k, wheel)| Wheel::draw(wheel, across, offset, &mut child(50 + k.to_u64())))
             .collect();
         Self {
             noise: Perlin::new(child(0).seed32()),
@@ -146,7 +146,7 @@ impl Relief {
         let (mut sum, mut amplitude, mut wavelength, mut shift) = (0.0, self.amplitude, self.longest, 0.31);
         while wavelength >= shortest {
             let at = |c: f32, by: f64| f64::from(c) / f64::from(wavelength) + by;
-            sum += amplitude * self.noise.at2(at(p.x, shift), at(p.y, -shift)) as f32;
+            sum += amplitude * self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32();
             amplitude *= self.gain;
             wavelength *= 0.5;
             shift += 17.31;
@@ -159,7 +159,7 @@ impl Relief {
         // The edges wander by a few millimetres and the depth varies along the row.
         let wander = |wavelength: f32, shift: f64| {
             let at = |c: f32, by: f64| f64::from(c / wavelength) + by;
-            self.noise.at2(at(p.x, shift), at(p.y, -shift)) as f32
+            self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32()
         };
         let d = (p.dot(rows.across) - rows.offset
             + rows.wander * (0.012 * wander(0.07, 201.7) + 0.006 * wander(0.025, 307.1)))
@@ -200,11 +200,11 @@ mod tests {
         for (seed, rms) in [(1, 4.0), (2, 9.0), (3, 30.0)] {
             let relief = Relief::new(&desc(rms), site(None), &Stream::of(seed, 0, Purpose::Test, 0));
             let heights: Vec<f32> = (0..40_000)
-                .map(|k| relief.height(vec2((k % 200) as f32 * 0.0437, (k / 200) as f32 * 0.0391), 0.0005))
+                .map(|k| relief.height(vec2((k % 200).to_f32() * 0.0437, (k / 200).to_f32() * 0.0391), 0.0005))
                 .collect();
-            let mean = heights.iter().sum::<f32>() / heights.len() as f32;
-            let sd = (heights.iter().map(|h| (h - mean).powi(2)).sum::<f32>() / heights.len() as f32).sqrt();
-            assert!((sd * 1e3 / rms as f32 - 1.0).abs() < 0.06, "{} mm for {rms}", sd * 1e3);
+            let mean = heights.iter().sum::<f32>() / heights.len().to_f32();
+            let sd = (heights.iter().map(|h| (h - mean).powi(2)).sum::<f32>() / heights.len().to_f32()).sqrt();
+            assert!((sd * 1e3 / rms.to_f32() - 1.0).abs() < 0.06, "{} mm for {rms}", sd * 1e3);
         }
     }
 
@@ -215,7 +215,7 @@ mod tests {
         relief.rows.iter_mut().for_each(|r| r.wander = 0.0);
         let across = vec2(rows.azimuth.cos(), -rows.azimuth.sin());
         for row in -3..3 {
-            let centre = across * (rows.offset_m + row as f32 * rows.spacing_m);
+            let centre = across * (rows.offset_m + row.to_f32() * rows.spacing_m);
             assert!((relief.height(centre, 0.001) + 0.010).abs() < 1e-4);
             assert!(relief.height(centre + across * 0.06, 0.001) > -0.001);
             assert!(relief.height(centre + across * 0.25, 0.001).abs() < 1e-4);

@@ -13,7 +13,7 @@
 //! "Photographs": colours of pieces in images of SugarBeets2016 (Chebrolu et al. 2017) relative to the soil around
 //! them, whose reflectance is assumed to be 0.15, 0.11, 0.075: an estimate, accurate to about a third.
 
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use furrow_base::sampling::Stream;
 
 const FRESH: Spectrum = Spectrum::new(0.42, 0.35, 0.20, 0.57);
@@ -28,7 +28,7 @@ const SPREAD: f32 = 0.25;
 
 /// Draws the reflectance of a piece; `mean` is the mean weathering (0 fresh, 1 almost soil).
 pub(super) fn straw(mean: f32, s: &mut Stream) -> Spectrum {
-    let weathering = mean + SPREAD * s.normal() as f32;
+    let weathering = mean + SPREAD * s.normal().to_f32();
     // Most pieces lie in the shade on the ground, few in the light.
     let leached = s.uniform32().powi(2);
     tone(weathering.clamp(0.0, 1.0), leached)
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn straw_darkens_as_it_weathers_and_red_falls_before_near_infrared() {
         for leached in [0.0, 0.5, 1.0] {
-            let steps: Vec<[f32; 4]> = (0..=20).map(|i| tone(i as f32 / 20.0, leached).to_array()).collect();
+            let steps: Vec<[f32; 4]> = (0..=20).map(|i| tone(i.to_f32() / 20.0, leached).to_array()).collect();
             for w in steps.windows(2) {
                 assert!((0..4).all(|k| w[1][k] < w[0][k]), "{w:?}");
                 assert!(w[1][3] / w[1][0] > w[0][3] / w[0][0], "{w:?}");
@@ -67,7 +67,7 @@ mod tests {
     fn pieces_of_one_field_differ() {
         let mut s = Stream::of(7, 0, Purpose::Test, 0);
         let all: Vec<[f32; 4]> = (0..2000).map(|_| straw(0.5, &mut s).to_array()).collect();
-        let share = |like: &dyn Fn(&[f32; 4]) -> bool| all.iter().filter(|t| like(t)).count() as f32 / 2000.0;
+        let share = |like: &dyn Fn(&[f32; 4]) -> bool| all.iter().filter(|t| like(t)).count().to_f32() / 2000.0;
         let most = share(&|[r, _, _, n]| (0.2..0.35).contains(r) && (0.3..0.5).contains(n));
         assert!(most > 0.55, "{most}");
         assert!((0.03..0.2).contains(&share(&|t| t[0] > 0.36)) && (0.05..0.3).contains(&share(&|t| t[0] < 0.19)));

@@ -4,7 +4,7 @@ use super::body::{self, Pose, Shape, ShapeParameters};
 use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{Vec2, vec2, vec3};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of stones.
@@ -43,7 +43,7 @@ pub fn stones(desc: &[StonesDesc], ground: &Ground, pile: &mut Pile, stream: &St
 fn length(desc: &StonesDesc, stream: &mut Stream) -> f32 {
     let (min, max) = (desc.min_mm.f32(), desc.max_mm.f32());
     for _ in 0..50 {
-        let mm = desc.median_mm.f32() * (desc.sigma.f32() * stream.normal() as f32).exp();
+        let mm = desc.median_mm.f32() * (desc.sigma.f32() * stream.normal().to_f32()).exp();
         if mm >= min && mm <= max {
             return mm;
         }
@@ -53,7 +53,7 @@ fn length(desc: &StonesDesc, stream: &mut Stream) -> f32 {
 
 /// Returns the number of pieces of a group; `s` is the group's random stream.
 fn together(desc: &StonesDesc, s: &Stream) -> u64 {
-    desc.together.draw32(&mut s.child(Purpose::Page, 0)) as u64
+    desc.together.draw32(&mut s.child(Purpose::Page, 0)).trunc_to::<u64>()
 }
 
 /// Returns the number of groups of a population, m⁻², and the mean number of stones in one.
@@ -62,7 +62,7 @@ fn density(desc: &StonesDesc, stream: &Stream) -> (f32, f32) {
     // Mean covered area of one stone, from 512 stones.
     let mut s = stream.child(Purpose::Page, 1);
     let disc = (0..512).map(|_| disc_m2(length(desc, &mut s))).sum::<f32>() / 512.0;
-    let group = (0..512).map(|k| together(desc, &s.child(Purpose::Debris, k))).sum::<u64>() as f32 / 512.0;
+    let group = (0..512).map(|k| together(desc, &s.child(Purpose::Debris, k))).sum::<u64>().to_f32() / 512.0;
     // Discs fall independently: 1 − exp(−λ·disc) of the ground is covered. Stones of a group are assumed not to overlap.
     (-(1.0 - cover.min(0.98)).ln() / (disc * group), group)
 }
@@ -74,7 +74,7 @@ pub(super) fn cost(desc: &StonesDesc, (area, made): (Rect, f64), resolved_mm: f3
     let number = f64::from(area.area()) * f64::from(per_m2) * f64::from(group);
     let mut s = stream.child(Purpose::Page, 2);
     let triangles =
-        (0..512).map(|_| body::triangles(level(length(desc, &mut s), resolved_mm))).sum::<usize>() as f64 / 512.0;
+        (0..512).map(|_| body::triangles(level(length(desc, &mut s), resolved_mm))).sum::<usize>().to_f64() / 512.0;
     // Each stone builds its whole shape; triangles below the ground are then left out of the mesh.
     Cost::of(0.75 * triangles, 1.0) * (number * made) + Cost::work(0.0, SHAPE_SECONDS * triangles * number)
 }
@@ -87,11 +87,11 @@ fn sizes(desc: &StonesDesc, area: Rect, stream: &Stream) -> Vec<(Vec2, f32, Stre
         let mut cell = cell_stream(stream, i, j);
         for k in 0..cell.poisson(f64::from(per_m2 * CELL_M * CELL_M)) {
             let mut s = cell.child(Purpose::Debris, k);
-            let at = (vec2(i as f32, j as f32) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
+            let at = (vec2(i.to_f32(), j.to_f32()) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
             let mm = length(desc, &mut s);
             for piece in 1..together(desc, &s) {
                 let mut s = s.child(Purpose::Debris, piece);
-                let apart = vec2(s.normal() as f32, s.normal() as f32) * (APART * 1e-3 * mm);
+                let apart = vec2(s.normal().to_f32(), s.normal().to_f32()) * (APART * 1e-3 * mm);
                 let mm = length(desc, &mut s);
                 if area.contains(at + apart) {
                     all.push((at + apart, mm, s));
@@ -132,7 +132,7 @@ fn level(mm: f32, resolved_mm: f32) -> usize {
 
 fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32, s: &mut Stream) -> Debris {
     let shape = Shape::new(level(mm, ground.sizes.resolved_mm), CUT, s);
-    let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal() as f32)).clamp(0.6 * mean, 1.0);
+    let mut vary = |mean: f32| (mean * (1.0 + 0.12 * s.normal().to_f32())).clamp(0.6 * mean, 1.0);
     let middle = vary(AXES.0);
     let axes = vec3(1.0, middle, middle * vary(AXES.1)) * (0.5e-3 * mm);
     let pose = Pose::lying(&shape, axes, 0.2, s);
@@ -156,7 +156,7 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
         kind: DebrisKind::Stone,
         mesh,
         albedo: desc.albedo,
-        tint: (desc.tint_sigma.f32() * s.normal() as f32).exp(),
+        tint: (desc.tint_sigma.f32() * s.normal().to_f32()).exp(),
         hue: s.uniform32(),
         dust: desc.dust.draw32(s),
         centre,

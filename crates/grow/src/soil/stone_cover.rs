@@ -1,6 +1,7 @@
 //! Fraction of the ground covered by stones. Drawn separately from their placement, because the record needs it.
 
 use super::StonesDesc;
+use furrow_base::math::ToInt;
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Returns the fraction of the ground covered by each population.
@@ -10,7 +11,7 @@ pub(super) fn covers(desc: &[StonesDesc], stream: &Stream) -> Vec<f32> {
 
 /// Returns the random stream of a population.
 pub(super) fn own(stream: &Stream, i: usize) -> Stream {
-    stream.child(Purpose::Debris, 200 + i as u64)
+    stream.child(Purpose::Debris, 200 + i.to_u64())
 }
 
 /// Draws the fraction of the ground covered by a population.

@@ -7,7 +7,7 @@ use super::grid::Grid;
 use super::ground::up;
 use super::{Ground, InView};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec3, vec2};
+use furrow_base::math::{ToFloat, ToInt, Vec3, vec2};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Number of cells along each side of a block; even, so that a vertex is at its centre.
@@ -15,7 +15,7 @@ const BLOCK: usize = 16;
 
 /// Returns the number of triangles saved by merging `cells` cells.
 pub(super) fn spared(cells: f64) -> f64 {
-    cells * (2.0 - 4.0 / BLOCK as f64)
+    cells * (2.0 - 4.0 / BLOCK.to_f64())
 }
 
 /// Blocks of the fine cells of a grid.
@@ -59,7 +59,7 @@ impl Blocks {
 /// Iterates over the triangles of the fan of the block with its south-west vertex at (i, j), counter-clockwise from
 /// above. `columns` is the grid's number of vertices along x.
 fn fan(columns: usize, i: usize, j: usize) -> impl Iterator<Item = [u32; 3]> {
-    let vertex = move |i: usize, j: usize| (j * columns + i) as u32;
+    let vertex = move |i: usize, j: usize| (j * columns + i).to_u32();
     let around = move |k: usize| {
         let along = k % BLOCK;
         match k / BLOCK {
@@ -85,7 +85,7 @@ impl Ground {
         triangles.extend(blocks.fans(grid));
         let mut used = vec![false; columns * grid.rows()];
         for vertex in triangles.iter().flatten() {
-            used[*vertex as usize] = true;
+            used[vertex.to_usize()] = true;
         }
         let count = used.iter().filter(|used| **used).count();
         let mut mesh = Mesh {
@@ -100,7 +100,7 @@ impl Ground {
             for (i, x) in grid.x.at.iter().enumerate() {
                 let vertex = j * columns + i;
                 if used[vertex] {
-                    places[vertex] = mesh.positions.len() as u32;
+                    places[vertex] = mesh.positions.len().to_u32();
                     mesh.positions.push(Vec3::new(*x, *y, self.heights[vertex]));
                     mesh.normals.push(up(self.slopes[vertex]));
                     mesh.uvs.push(self.uv(*x, *y));
@@ -108,7 +108,7 @@ impl Ground {
             }
         }
         if count < used.len() {
-            mesh.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|v| places[v as usize]));
+            mesh.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|v| places[v.to_usize()]));
             mesh.triangles.shrink_to_fit();
         }
         mesh

@@ -2,7 +2,7 @@
 
 use super::*;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, ToInt, Vec3};
 use furrow_base::ron_file::{Num, Vary};
 use furrow_optics::texture::ground::GroundMaps;
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,7 +65,7 @@ fn root(parent: &mut [usize], mut i: usize) -> usize {
 fn bodies(mesh: &Mesh) -> Vec<Vec<Vec3>> {
     let mut parent: Vec<usize> = (0..mesh.positions.len()).collect();
     for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| root(&mut parent, i as usize));
+        let [a, b, c] = t.map(|i| root(&mut parent, i.to_usize()));
         parent[b] = a;
         parent[c] = a;
     }
@@ -83,7 +83,7 @@ fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
     let mesh = ground.mesh(&InView::ALL);
     assert_eq!(mesh.fault(), None);
     for t in mesh.triangles.iter().step_by(97) {
-        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        let [a, b, c] = t.map(|i| mesh.positions[i.to_usize()]);
         assert!((b - a).cross(c - a).z > 0.0);
         let p = a * 0.2 + b * 0.5 + c * 0.3;
         assert!((ground.height(p.x, p.y) - p.z).abs() < 2e-5, "{p} {}", ground.height(p.x, p.y));
@@ -99,7 +99,7 @@ fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
     assert_eq!(edges.values().filter(|n| **n == 1).count(), border);
     assert!(edges.values().all(|n| *n <= 2));
     for k in 0..200 {
-        let y = -0.07 + 0.0007 * k as f32;
+        let y = -0.07 + 0.0007 * k.to_f32();
         for x in [-0.06, 0.06] {
             assert!((ground.height(x - 1e-5, y) - ground.height(x + 1e-5, y)).abs() < 1e-4);
         }
@@ -111,7 +111,7 @@ fn heights_are_those_of_the_mesh_and_continuous_over_the_seam() {
 /// Returns the vertices of all triangles of some meshes, as bits.
 fn triangles<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> BTreeSet<[[u32; 3]; 3]> {
     let bits = |corner: Vec3| corner.to_array().map(f32::to_bits);
-    meshes.flat_map(|mesh| (0..mesh.triangles.len() as u32).map(move |i| mesh.corners(i).map(bits))).collect()
+    meshes.flat_map(|mesh| (0..mesh.triangles.len().to_u32()).map(move |i| mesh.corners(i).map(bits))).collect()
 }
 
 /// Returns the triangles west of a line.
@@ -135,7 +135,7 @@ fn ground_out_of_view_has_few_triangles_and_no_crack() {
     assert!(some.iter().flatten().all(|corner| corners.contains(corner)));
     let mut edges = BTreeMap::new();
     for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        let [a, b, c] = t.map(|i| mesh.positions[i.to_usize()]);
         assert!((b - a).cross(c - a).z > 0.0);
         for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
             *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
@@ -159,7 +159,7 @@ fn clods_out_of_view_are_laid_and_not_made() {
     let (all, whole) = lay(&InView::ALL);
     let (some, pile) = lay(&InView::of(ground.area(), 0.0, |_| 0.0, |p| (p.x + 0.15).max(0.0)));
     for k in 0..400 {
-        let p = vec2(-0.2 + 0.02 * (k % 20) as f32, -0.2 + 0.02 * (k / 20) as f32);
+        let p = vec2(-0.2 + 0.02 * (k % 20).to_f32(), -0.2 + 0.02 * (k / 20).to_f32());
         assert_eq!(pile.at(p), whole.at(p), "{p}");
     }
     assert!(some.len() * 10 < all.len() * 7, "{} of {}", some.len(), all.len());
@@ -186,7 +186,7 @@ fn one_blend_drives_colour_and_height_and_sums_to_one() {
             let [r, g, _] = GroundMaps::decode(baked.albedo[k]);
             let second = f32::from(baked.weights[k][1]) / 255.0;
             assert!((g / (r + g) - second).abs() < 0.02);
-            let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
+            let p = baked.origin + (vec2(i.to_f32(), j.to_f32()) + 0.5) * baked.texel_m;
             let h = ground.height(p.x, p.y) * 1e3;
             assert!(h > -1.1 * (1.0 - second) + 3.8 * second - 0.6 && h < 1.1 * (1.0 - second) + 8.2 * second + 0.6);
             low += i32::from(second < 0.1);
@@ -217,7 +217,7 @@ fn the_baked_maps_and_the_mesh_together_have_the_slopes_of_the_whole_relief() {
         if !inner(i, baked.width) || !inner(j, baked.height) {
             continue;
         }
-        let p = baked.origin + (vec2(i as f32, j as f32) + 0.5) * baked.texel_m;
+        let p = baked.origin + (vec2(i.to_f32(), j.to_f32()) + 0.5) * baked.texel_m;
         let d = 1e-4;
         let exact = (height(p + vec2(d, 0.0)) - height(p - vec2(d, 0.0))) / (2.0 * d);
         let normal = ground.normal(p.x, p.y);
@@ -236,7 +236,7 @@ fn the_same_address_gives_the_same_ground_and_a_larger_area_holds_it() {
     assert_eq!(a.bake(&MAPS, 0.0005), b.bake(&MAPS, 0.0005));
     let large = ground(&page, 0.08);
     for k in 0..400 {
-        let (x, y) = (-0.04 + 0.004 * (k % 20) as f32, -0.04 + 0.004 * (k / 20) as f32);
+        let (x, y) = (-0.04 + 0.004 * (k % 20).to_f32(), -0.04 + 0.004 * (k / 20).to_f32());
         assert!((a.height(x, y) - large.height(x, y)).abs() < 2e-4);
     }
     let other = Ground::new(&page, &[], &MAPS, &site(0.05), &Stream::of(21, 5, Purpose::Soil, 0)).unwrap();
@@ -261,10 +261,10 @@ fn clods_differ_in_hue_as_much_as_their_page_says() {
     };
     assert!(ratios(0.0).iter().all(|(green, yellow, _)| green.abs() < 1e-5 && yellow.abs() < 1e-5));
     let drawn = ratios(0.05);
-    let number: f32 = drawn.iter().map(|r| r.2 as f32).sum();
+    let number: f32 = drawn.iter().map(|r| r.2.to_f32()).sum();
     for of in [|r: &(f32, f32, usize)| r.0, |r: &(f32, f32, usize)| r.1] {
-        let mean = drawn.iter().map(|r| of(r) * r.2 as f32).sum::<f32>() / number;
-        let sd = (drawn.iter().map(|r| (of(r) - mean).powi(2) * r.2 as f32).sum::<f32>() / number).sqrt();
+        let mean = drawn.iter().map(|r| of(r) * r.2.to_f32()).sum::<f32>() / number;
+        let sd = (drawn.iter().map(|r| (of(r) - mean).powi(2) * r.2.to_f32()).sum::<f32>() / number).sqrt();
         assert!(mean.abs() < 0.02 && (0.03..0.06).contains(&sd), "{mean} ± {sd}");
     }
 }
@@ -350,7 +350,7 @@ fn a_seedbed_stays_within_its_budget_and_keeps_stems_clear() {
     canopy.add(&sheet(stem - 0.004, stem + 0.004, ground.height(stem.x, stem.y)));
     let groups = clods(&ground, &mut Pile::new(&ground), &canopy, &InView::ALL);
     let triangles: usize = groups.iter().map(|g| g.mesh.triangles.len()).sum();
-    let per_view = triangles as f32 / 0.06 * 0.325;
+    let per_view = triangles.to_f32() / 0.06 * 0.325;
     assert!(per_view > 3e5 && per_view < 1.5e6, "{per_view}");
     assert!(groups.len() >= 5);
     for Clods { mesh, .. } in &groups {
@@ -388,7 +388,7 @@ fn clods_are_damp_and_dry_as_the_page_says_and_pierce_no_leaf() {
         for body in bodies(&group.mesh).into_iter().filter(|b| b.len() > 6) {
             all += 1;
             wet += i32::from(group.damp);
-            let middle = body.iter().sum::<Vec3>().truncate() / body.len() as f32;
+            let middle = body.iter().sum::<Vec3>().truncate() / body.len().to_f32();
             let top = body.iter().map(|p| p.z).fold(f32::MIN, f32::max);
             if middle.abs().max_element() < 0.03 {
                 under += 1;

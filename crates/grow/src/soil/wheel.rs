@@ -130,6 +130,7 @@ impl Wheel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
     use furrow_base::sampling::Purpose;
 
     #[test]
@@ -154,7 +155,7 @@ mod tests {
         let desc: WheelDesc = ron::from_str(desc).unwrap();
         let wheel = Wheel::draw(&desc, Vec2::X, 0.1, &mut Stream::of(1, 0, Purpose::Test, 0));
         for pass in -40..40 {
-            let middle = 0.4 + 2.4 * pass as f32;
+            let middle = 0.4 + 2.4 * pass.to_f32();
             assert!((wheel.height(vec2(middle, 0.2)) + 0.030).abs() < 1e-6, "{pass}");
             assert!(wheel.height(vec2(middle + 1.2, 0.2)).abs() < 1e-6 && wheel.left(vec2(middle + 1.1, 0.0)) == 1.0);
         }
@@ -164,12 +165,12 @@ mod tests {
     fn lugs_print_as_often_as_asked() {
         let desc: WheelDesc = ron::from_str("(offset_m: 0, width_mm: 300, depth_mm: 20, lugs_mm: 125)").unwrap();
         let wheel = Wheel::draw(&desc, Vec2::X, 0.0, &mut Stream::of(1, 0, Purpose::Test, 0));
-        let deep = |k: i32| wheel.height(vec2(0.05, 1e-3 * k as f32)) < -0.025;
+        let deep = |k: i32| wheel.height(vec2(0.05, 1e-3 * k.to_f32())) < -0.025;
         let starts = (0..1000).filter(|k| deep(k + 1) && !deep(*k)).count();
         assert_eq!(starts, 8);
         // No step at the centre.
         let jump =
-            |k: i32| (wheel.height(vec2(-1e-4, 1e-3 * k as f32)) - wheel.height(vec2(1e-4, 1e-3 * k as f32))).abs();
+            |k: i32| (wheel.height(vec2(-1e-4, 1e-3 * k.to_f32())) - wheel.height(vec2(1e-4, 1e-3 * k.to_f32()))).abs();
         assert!((0..1000).all(|k| jump(k) < 1e-5));
     }
 }

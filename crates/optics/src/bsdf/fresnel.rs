@@ -1,5 +1,7 @@
 //! Unpolarised Fresnel reflectance of a smooth dielectric.
 
+use furrow_base::math::ToFloat;
+
 /// Returns the reflectance for light that arrives from outside at `cos_i` ≥ 0 on a dielectric of relative index `ior` >
 /// 1.
 /// Source: Fresnel's equations, e.g. Born & Wolf §1.5.
@@ -17,11 +19,12 @@ pub fn hemispherical(ior: f32) -> f32 {
     const N: u32 = 2048;
     (0..N)
         .map(|i| {
-            let mu = (i as f32 + 0.5) / N as f32;
+            let mu = (i.to_f32() + 0.5) / N.to_f32();
             f64::from(2.0 * dielectric(mu, ior) * mu)
         })
-        .sum::<f64>() as f32
-        / N as f32
+        .sum::<f64>()
+        .to_f32()
+        / N.to_f32()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! 2014. Sampling of visible normals: Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
 
 use super::fresnel;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, Vec3};
 
 /// Rough dielectric interface seen from outside, single scattering only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,14 +101,14 @@ impl Ggx {
         let mut sum = 0.0_f64;
         for i in 0..azimuths {
             for j in 0..N {
-                let wi = self.sample(wo, (i as f32 + 0.5) / N as f32, (j as f32 + 0.5) / N as f32);
+                let wi = self.sample(wo, (i.to_f32() + 0.5) / N.to_f32(), (j.to_f32() + 0.5) / N.to_f32());
                 let pdf = self.pdf(wo, wi);
                 if pdf > 0.0 {
                     sum += f64::from(self.eval(wo, wi) / pdf);
                 }
             }
         }
-        (sum / f64::from(azimuths * N)) as f32
+        (sum / f64::from(azimuths * N)).to_f32()
     }
 }
 

@@ -4,7 +4,7 @@ use super::form::{Form, Portable};
 use super::sample::{BsdfSample, Scatter};
 use super::{OrenNayar, Wet};
 use crate::optics::Shadowing;
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{Spectrum, ToFloat, Vec3};
 
 /// BRDF of the surface below the relief.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +87,7 @@ impl Portable for Shadowed {
         let soil = Spectrum::new(0.22, 0.14, 0.09, 0.27);
         let shadowed = |base: Rough| {
             // The factor grows with the elevation of both directions and shrinks with the azimuth between them.
-            let factor = |pair: usize, turn: usize| 0.6 + 0.02 * pair as f32 - 0.05 * turn as f32;
+            let factor = |pair: usize, turn: usize| 0.6 + 0.02 * pair.to_f32() - 0.05 * turn.to_f32();
             let factors = std::array::from_fn(|pair| std::array::from_fn(|turn| factor(pair, turn)));
             Self::new(base, Vec3::new(0.28, 0.0, 0.96), Shadowing::new(&factors))
         };

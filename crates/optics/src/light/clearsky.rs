@@ -14,7 +14,7 @@
 //! at T = 1, the pure molecular sky, and matching the diffuse light of Hosek & Wilkie at T = 3 (τ 0.10) and T = 6 (τ
 //! 0.33).
 
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 
 /// Aerosol optical depths at 500 nm of the table.
 const DEPTHS: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
@@ -121,9 +121,9 @@ pub fn clear_sky(zenith_deg: f64, optical_depth: f64) -> ClearSky {
             sky[band] * air_mass(ZENITHS_DEG[z]) / (OUTSIDE[band] - beam[band])
         };
         let beam = bilinear(log_beam, d, z, along_depth, along_mass).exp();
-        direct[band] = beam as f32;
+        direct[band] = beam.to_f32();
         let share = bilinear(share, d, z, along_log_depth, along_log_mass);
-        diffuse[band] = (share * (OUTSIDE[band] - beam) / mass) as f32;
+        diffuse[band] = (share * (OUTSIDE[band] - beam) / mass).to_f32();
     }
     ClearSky { direct_normal: direct.into(), diffuse_horizontal: diffuse.into() }
 }

@@ -13,7 +13,7 @@ use super::hosek::HosekWilkie;
 use super::position::{SunPosition, Utc, sun_position};
 use super::sky::{Dome, Sky};
 use super::sun::Sun;
-use furrow_base::math::{Spectrum, Vec3, direction, vec3};
+use furrow_base::math::{Spectrum, ToFloat, Vec3, direction, vec3};
 use furrow_base::ron_file::{Bound, Fraction, Pick, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
@@ -202,10 +202,10 @@ impl SunDesc {
 /// turbidity of 1.7 to 10 and a cloud cover of 0 to 1. A black sun or sky is `None`.
 pub fn daylight(elevation_deg: f64, azimuth_deg: f64, turbidity: f64, cloud: f32) -> (Option<Sun>, Option<Sky>) {
     let zenith_deg = 90.0 - elevation_deg;
-    let towards = direction(zenith_deg.to_radians() as f32, azimuth_deg.to_radians() as f32).normalize();
+    let towards = direction(zenith_deg.to_radians().to_f32(), azimuth_deg.to_radians().to_f32()).normalize();
     let clear = clear_sky(zenith_deg, optical_depth(turbidity));
     let (beam, clear_part, cloud_part) = clouded(clear, towards, cloud);
-    let mut dome = Dome::clear(HosekWilkie::new(towards, turbidity as f32)).with_irradiance(clear_part);
+    let mut dome = Dome::clear(HosekWilkie::new(towards, turbidity.to_f32())).with_irradiance(clear_part);
     if cloud > 0.0 {
         dome = dome.plus(&Dome::overcast(cloud_part));
     }

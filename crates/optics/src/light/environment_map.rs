@@ -14,7 +14,7 @@
 use super::form::{Form, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
 use crate::texture::panorama::Panorama;
-use furrow_base::math::{Spectrum, Vec3, vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec3, vec3};
 use furrow_base::sampling::distribution::Distribution2D;
 use furrow_base::{Error, Result};
 use std::f32::consts::{PI, TAU};
@@ -73,10 +73,10 @@ impl Table {
             Spectrum::new(*r, *g, *b, near)
         };
         let cells: Vec<Spectrum> = picture.rgb.iter().enumerate().map(cell).collect();
-        let edge = |row: usize| 2.0 * (0.5 * std::f64::consts::PI * row as f64 / height as f64).sin().powi(2);
+        let edge = |row: usize| 2.0 * (0.5 * std::f64::consts::PI * row.to_f64() / height.to_f64()).sin().powi(2);
         let edges: Vec<f64> = (0..=height).map(edge).collect();
-        let solid = |row: usize| f64::from(TAU) / width as f64 * (edges[row + 1] - edges[row]);
-        let weights: Vec<f32> = cells.iter().enumerate().map(|(k, l)| l.mean() * solid(k / width) as f32).collect();
+        let solid = |row: usize| f64::from(TAU) / width.to_f64() * (edges[row + 1] - edges[row]);
+        let weights: Vec<f32> = cells.iter().enumerate().map(|(k, l)| l.mean() * solid(k / width).to_f32()).collect();
         let distribution = Distribution2D::new(&weights, width).ok_or("it is black")?;
         let mut sums = [[0.0_f64; Spectrum::BANDS]; 6];
         for (k, radiance) in cells.iter().enumerate() {
@@ -86,19 +86,19 @@ impl Table {
                 }
             }
         }
-        let faces = sums.map(|sum| Spectrum::from(sum.map(|v| v as f32)));
+        let faces = sums.map(|sum| Spectrum::from(sum.map(ToFloat::to_f32)));
         Ok(Self { width, height, cells, distribution, edges, faces })
     }
 
     fn cell(&self, [u, v]: [f32; 2]) -> usize {
-        let index = |x: f32, n: usize| ((x * n as f32) as usize).min(n - 1);
+        let index = |x: f32, n: usize| (x * n.to_f32()).trunc_to::<usize>().min(n - 1);
         index(v, self.height) * self.width + index(u, self.width)
     }
 
     /// Converts a density on the unit square to a density per solid angle for a texel of `row`.
     fn per_solid_angle(&self, density: f32, row: usize) -> f32 {
-        let share = density / self.height as f32;
-        share / (TAU * (self.edges[row + 1] - self.edges[row]) as f32)
+        let share = density / self.height.to_f32();
+        share / (TAU * (self.edges[row + 1] - self.edges[row]).to_f32())
     }
 }
 
@@ -116,7 +116,7 @@ fn of_sky(red: f32, blue: f32) -> f32 {
 /// four parts for columns.
 fn cosines(column: usize, row: usize, (width, height): (usize, usize)) -> [f64; 6] {
     use std::f64::consts::{PI, TAU};
-    let theta = |row: usize| PI * row as f64 / height as f64;
+    let theta = |row: usize| PI * row.to_f64() / height.to_f64();
     let (a, b) = (theta(row), theta(row + 1));
     // ∫ sin² θ dθ and ∫ sin θ |cos θ| dθ. The image's horizon is an edge between rows, or the middle of a row if their
     // number is odd.
@@ -124,10 +124,10 @@ fn cosines(column: usize, row: usize, (width, height): (usize, usize)) -> [f64; 
     let over = |a: f64, b: f64| 0.5 * (b.sin().powi(2) - a.sin().powi(2));
     let half = 0.5 * PI;
     let (up, down) = (over(a.min(half), b.min(half)), -over(a.max(half), b.max(half)));
-    let part = TAU / width as f64;
+    let part = TAU / width.to_f64();
     let mut all = [0.0, 0.0, 0.0, 0.0, up * part, down * part];
     for k in 0..4 {
-        let phi = (column as f64 + (f64::from(k) + 0.5) / 4.0) * part - PI;
+        let phi = (column.to_f64() + (f64::from(k) + 0.5) / 4.0) * part - PI;
         for (face, cos) in all.iter_mut().zip([phi.sin(), -phi.sin(), phi.cos(), -phi.cos()]) {
             *face += 0.25 * part * across * cos.max(0.0);
         }
@@ -160,7 +160,7 @@ impl EnvironmentMap {
         let (width, height) = (24, 12);
         let color = |k: usize| match (k % width, k / width) {
             (16, 4) => [12.0, 11.0, 9.0],
-            (x, y) => [0.2 + 0.01 * x as f32, 0.3 + 0.02 * y as f32, if y < 6 { 0.9 } else { 0.1 }],
+            (x, y) => [0.2 + 0.01 * x.to_f32(), 0.3 + 0.02 * y.to_f32(), if y < 6 { 0.9 } else { 0.1 }],
         };
         let picture = Panorama { width, height, rgb: (0..width * height).map(color).collect(), nir: None };
         Self::new(Arc::new(Table::new(&picture, Infrared::Sky).ok()?), Spectrum::new(1.0, 1.0, 1.0, 0.8), 36.0)
@@ -188,13 +188,13 @@ impl Emitter for EnvironmentMap {
         let (uv, density) = table.distribution.sample(u);
         let cell = table.cell(uv);
         let row = cell / table.width;
-        let within = (uv[1] * table.height as f32 - row as f32).clamp(0.0, 1.0);
+        let within = (uv[1] * table.height.to_f32() - row.to_f32()).clamp(0.0, 1.0);
         let (low, high) = (table.edges[row], table.edges[row + 1]);
         let t = low + f64::from(within) * (high - low);
-        let sine = (t * (2.0 - t)).max(0.0).sqrt() as f32;
+        let sine = (t * (2.0 - t)).max(0.0).sqrt().to_f32();
         let (x, y) = (TAU * (uv[0] - 0.5)).sin_cos();
         let (sin, cos) = self.turn;
-        let wi = vec3(sine * (x * cos + y * sin), sine * (y * cos - x * sin), (1.0 - t) as f32);
+        let wi = vec3(sine * (x * cos + y * sin), sine * (y * cos - x * sin), (1.0 - t).to_f32());
         let pdf = table.per_solid_angle(density, row);
         let radiance = table.cells[cell] * self.scale;
         (pdf > 0.0).then_some(LightSample { wi, distance: f32::INFINITY, radiance, pdf })
@@ -284,10 +284,11 @@ mod tests {
     #[test]
     fn a_bright_texel_is_drawn_by_its_share() {
         let (width, row, column) = (64, 9, 40);
-        let solid =
-            |row: usize| f64::cos(PI as f64 * row as f64 / 32.0) - f64::cos(PI as f64 * (row + 1) as f64 / 32.0);
-        let others = 2.0 * width as f64 - solid(row);
-        let bright = (others / solid(row)) as f32;
+        let solid = |row: usize| {
+            f64::cos(f64::from(PI) * row.to_f64() / 32.0) - f64::cos(f64::from(PI) * (row + 1).to_f64() / 32.0)
+        };
+        let others = 2.0 * width.to_f64() - solid(row);
+        let bright = (others / solid(row)).to_f32();
         let light =
             map(&picture(width, |x, y| [if (x, y) == (column, row) { bright } else { 1.0 }; 3]), Infrared::Red, 90.0);
         // The middle column faces east; 40° is 8.5 texels of 64 clockwise from it.
@@ -300,7 +301,7 @@ mod tests {
             .filter(|sample| sample.radiance.to_array()[0] > 2.0)
             .inspect(|sample| assert!(sample.wi.dot(dir) > 0.99))
             .count();
-        assert!((hits as f64 / f64::from(drawn) - 0.5).abs() < 0.015, "{hits}");
+        assert!((hits.to_f64() / f64::from(drawn) - 0.5).abs() < 0.015, "{hits}");
     }
 
     #[test]

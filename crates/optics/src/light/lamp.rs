@@ -11,7 +11,7 @@
 use super::described::{Described, Open, Recorded};
 use super::form::{Form, Outline, Portable};
 use super::sample::{Emitter, LampHit, LightSample};
-use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, vec3};
+use furrow_base::math::{Frame, Spectrum, ToFloat, Vec2, Vec3, vec3};
 use furrow_base::ron_file::{NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::sampling::warp;
@@ -69,7 +69,7 @@ impl Lamp {
         const SIDE: usize = 64;
         let mut sum = 0.0_f64;
         for k in 0..SIDE * SIDE {
-            let at = |i: usize| (i as f32 + 0.5) / SIDE as f32;
+            let at = |i: usize| (i.to_f32() + 0.5) / SIDE.to_f32();
             let to = self.point([at(k % SIDE), at(k / SIDE)]) - p;
             let d2 = to.length_squared();
             let cosines = to.dot(n).max(0.0) * (-to.dot(self.frame.z)).max(0.0);
@@ -77,7 +77,7 @@ impl Lamp {
                 sum += f64::from(cosines / (d2 * d2));
             }
         }
-        (sum * f64::from(self.area) / (SIDE * SIDE) as f64) as f32
+        (sum * f64::from(self.area) / (SIDE * SIDE).to_f64()).to_f32()
     }
 }
 

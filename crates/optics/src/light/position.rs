@@ -1,6 +1,7 @@
 //! Position of the sun, by NREL's algorithm (Reda & Andreas 2004, "Solar position algorithm for solar radiation
 //! applications") in `solar-positioning`, and the only time format of scene files: `2016-05-27T14:30:00Z`.
 
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::{from_raw, parse_in, whole};
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -44,7 +45,7 @@ impl Utc {
         }
         let number = |from: usize, to: usize| text[from..to].parse::<u32>().map_err(|_| form());
         let time = Self {
-            year: number(0, 4)? as i32,
+            year: number(0, 4)?.to_i32(),
             month: number(5, 7)?,
             day: number(8, 10)?,
             hour: number(11, 13)?,

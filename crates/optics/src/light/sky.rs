@@ -16,7 +16,7 @@
 use super::form::{Form, Portable};
 use super::hosek::HosekWilkie;
 use super::sample::{Emitter, LampHit, LightSample};
-use furrow_base::math::{Spectrum, Vec3, vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec3, vec3};
 use furrow_base::sampling::distribution::Distribution2D;
 
 /// Cells along a side of the square.
@@ -124,7 +124,7 @@ impl Dome {
                 *sum += f64::from(l) * f64::from(cosine);
             }
         }
-        Spectrum::from(sum.map(|x| x as f32))
+        Spectrum::from(sum.map(ToFloat::to_f32))
     }
 }
 
@@ -238,16 +238,16 @@ fn inverse_stretch(d: Vec3) -> f32 {
 
 #[inline]
 fn cell_of([s, t]: [f32; 2]) -> usize {
-    let index = |v: f32| ((v * SIDE as f32) as usize).min(SIDE - 1);
+    let index = |v: f32| (v * SIDE.to_f32()).trunc_to::<usize>().min(SIDE - 1);
     index(t) * SIDE + index(s)
 }
 
 /// Returns the points over which a cell is averaged, with their solid angles.
 fn points(cell: usize) -> impl Iterator<Item = (Vec3, f32)> {
-    let n = (SIDE * SUB) as f32;
+    let n = (SIDE * SUB).to_f32();
     let (row, column) = (cell / SIDE * SUB, cell % SIDE * SUB);
     (0..SUB * SUB).map(move |k| {
-        let st = [((column + k % SUB) as f32 + 0.5) / n, ((row + k / SUB) as f32 + 0.5) / n];
+        let st = [((column + k % SUB).to_f32() + 0.5) / n, ((row + k / SUB).to_f32() + 0.5) / n];
         let d = to_direction(st);
         (d, 1.0 / (inverse_stretch(d) * n * n))
     })

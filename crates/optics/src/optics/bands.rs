@@ -7,7 +7,7 @@
 //! ASTM G173-03 global tilt. The quantum efficiency is an estimate for a Sony ICX445-class sensor behind the camera's
 //! prism.
 
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat, ToInt};
 use std::sync::LazyLock;
 
 /// Relative power of D65 every 10 nm from 400 to 780 nm.
@@ -80,7 +80,7 @@ pub(super) fn rec709([x, y, z]: [f64; 3]) -> [f64; 3] {
 
 fn daylight(wavelength_nm: u32) -> f64 {
     let offset = wavelength_nm.clamp(400, 780) - 400;
-    let (i, part) = ((offset / 10) as usize, f64::from(offset % 10) / 10.0);
+    let (i, part) = ((offset / 10).to_usize(), f64::from(offset % 10) / 10.0);
     D65[i] + part * (D65[(i + 1).min(D65.len() - 1)] - D65[i])
 }
 
@@ -88,7 +88,7 @@ fn daylight(wavelength_nm: u32) -> f64 {
 /// 1).
 static VISIBLE: LazyLock<Vec<(u32, [f64; 3])>> = LazyLock::new(|| {
     let mut weights: Vec<(u32, [f64; 3])> = (400..=780)
-        .step_by(STEP_NM as usize)
+        .step_by(STEP_NM.to_usize())
         .map(|nm| (nm, rec709(observer(f64::from(nm)).map(|x| x * daylight(nm)))))
         .collect();
     let sums = weights.iter().fold([0.0; 3], |s, (_, w)| std::array::from_fn(|i| s[i] + w[i]));
@@ -117,8 +117,9 @@ pub fn weigh2(spectra: impl Fn(u32) -> (f64, f64)) -> (Spectrum, Spectrum) {
         sum[1][3] += w * b;
         total += w;
     }
-    let band =
-        |s: [f64; 4]| Spectrum::new(s[0] as f32, s[1] as f32, s[2] as f32, (s[3] / total) as f32).clamp(0.0, 1.0);
+    let band = |s: [f64; 4]| {
+        Spectrum::new(s[0].to_f32(), s[1].to_f32(), s[2].to_f32(), (s[3] / total).to_f32()).clamp(0.0, 1.0)
+    };
     (band(sum[0]), band(sum[1]))
 }
 

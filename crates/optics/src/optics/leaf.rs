@@ -9,7 +9,7 @@
 
 use super::pigments::{LeafBands, Pigments, safe};
 use super::prospect::Inputs;
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec3};
 
 /// Reflectance and transmittance at one point of a leaf, per band; their sum never exceeds 0.99.
 pub type Leaf = LeafBands;
@@ -48,7 +48,7 @@ impl LeafOptics {
         let nodes: Vec<Leaf> = (0..NODES).map(|i| node(&inputs, content(i))).collect();
         let mut entries = Box::new([Entry::default(); ENTRIES]);
         for (i, entry) in entries.iter_mut().enumerate() {
-            *entry = invert(&nodes, position_to_luminance(i as f32));
+            *entry = invert(&nodes, position_to_luminance(i.to_f32()));
         }
         Self { plain: base.bands(), nodes, entries }
     }
@@ -62,9 +62,9 @@ impl LeafOptics {
     /// Returns the leaf at another chlorophyll content in µg/cm², clamped to 0..100. Texture synthesis paints with
     /// these values.
     pub fn with_chlorophyll(&self, chlorophyll: f32) -> Leaf {
-        let place = (f64::from(chlorophyll).clamp(0.0, MOST) / MOST).sqrt() * (NODES - 1) as f64;
-        let i = (place as usize).min(NODES - 2);
-        blend(self.nodes[i], self.nodes[i + 1], (place - i as f64) as f32)
+        let place = (f64::from(chlorophyll).clamp(0.0, MOST) / MOST).sqrt() * (NODES - 1).to_f64();
+        let i = place.trunc_to::<usize>().min(NODES - 2);
+        blend(self.nodes[i], self.nodes[i + 1], (place - i.to_f64()).to_f32())
     }
 
     /// Converts a texel's linear Rec.709 colour. R, G, B reflectance are the texel's own; NIR reflectance and
@@ -73,9 +73,9 @@ impl LeafOptics {
     pub fn at(&self, rgb: [f32; 3]) -> Leaf {
         let own = Vec3::from(rgb).clamp(Vec3::ZERO, Vec3::splat(0.99));
         let luminance = own.dot(Vec3::new(0.2126, 0.7152, 0.0722));
-        let place = luminance.sqrt() * (ENTRIES - 1) as f32;
-        let i = (place as usize).min(ENTRIES - 2);
-        let part = place - i as f32;
+        let place = luminance.sqrt() * (ENTRIES - 1).to_f32();
+        let i = place.trunc_to::<usize>().min(ENTRIES - 2);
+        let part = place - i.to_f32();
         let (a, b) = (&self.entries[i], &self.entries[i + 1]);
         let inverse = a.inverse.lerp(b.inverse, part);
         let tint = (own * inverse).clamp(Vec3::splat(0.25), Vec3::splat(4.0));
@@ -89,7 +89,7 @@ impl LeafOptics {
 /// Returns the chlorophyll content of node `i`. Nodes are dense at low contents, where a small change in pigment has a
 /// large effect.
 fn content(i: usize) -> f64 {
-    let x = i as f64 / (NODES - 1) as f64;
+    let x = i.to_f64() / (NODES - 1).to_f64();
     MOST * x * x
 }
 
@@ -104,7 +104,7 @@ fn node(base: &Inputs, chlorophyll: f64) -> Leaf {
         carotenoid: base.carotenoid * (0.06 + 0.94 * share).min(1.5),
         ..*base
     });
-    let transmittance = bands.transmittance * (1.0 - 0.5 * paleness as f32);
+    let transmittance = bands.transmittance * (1.0 - 0.5 * paleness.to_f32());
     Leaf { transmittance, ..bands }
 }
 
@@ -113,7 +113,7 @@ fn blend(a: Leaf, b: Leaf, t: f32) -> Leaf {
 }
 
 fn position_to_luminance(i: f32) -> f32 {
-    let x = i / (ENTRIES - 1) as f32;
+    let x = i / (ENTRIES - 1).to_f32();
     x * x
 }
 

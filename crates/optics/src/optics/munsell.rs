@@ -9,7 +9,7 @@
 //! not include near infrared: NIR is red times the NIR/R ratio of the measured soil with the most similar colour.
 
 use super::{bands, soil};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{RoundTo, Spectrum, ToFloat};
 use furrow_base::ron_file::{from_raw, parse_in, whole};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ static TABLE: LazyLock<BTreeMap<(u32, u32, u32), [f64; 2]>> = LazyLock::new(|| {
     rows.map(|row| {
         let (name, value, chroma, x, y) = row.expect("the embedded table is a hue and four numbers");
         let hue = hue(&name).expect("a hue of the table");
-        ((((hue - FIRST_HUE) / STEP) as u32, value, chroma / 2), [x, y])
+        ((((hue - FIRST_HUE) / STEP).trunc_to::<u32>(), value, chroma / 2), [x, y])
     })
     .collect()
 });
@@ -82,7 +82,7 @@ impl Munsell {
         let [x, y, luminance] = self.xyy;
         let under_c = [x, y, 1.0 - x - y].map(|part| part * luminance / y);
         let under_d65 = ADAPT.map(|row| row.iter().zip(under_c).map(|(a, b)| a * b).sum());
-        let rgb = bands::rec709(under_d65).map(|band| band.clamp(0.0, 1.0) as f32);
+        let rgb = bands::rec709(under_d65).map(|band| band.clamp(0.0, 1.0).to_f32());
         soil::at(rgb, soil::most_similar(rgb))
     }
 }
@@ -115,7 +115,11 @@ fn chromaticity(hue: f64, value: f64, chroma: f64) -> Option<[f64; 2]> {
             for (c, of_chroma) in ends(chroma / 2.0) {
                 let weight = of_hue * of_value * of_chroma;
                 if weight > 0.0 {
-                    let xy = if c == 0.0 { WHITE } else { *TABLE.get(&(h as u32, v as u32, c as u32))? };
+                    let xy = if c == 0.0 {
+                        WHITE
+                    } else {
+                        *TABLE.get(&(h.trunc_to::<u32>(), v.trunc_to::<u32>(), c.trunc_to::<u32>()))?
+                    };
                     sum.iter_mut().zip(xy).for_each(|(sum, part)| *sum += weight * part);
                 }
             }

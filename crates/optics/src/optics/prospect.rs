@@ -8,6 +8,7 @@
 //! Everything is computed in f64, because the pile's formulas subtract nearly equal numbers where absorption is weak.
 
 use super::interface::transmissivity;
+use furrow_base::math::ToInt;
 use std::sync::LazyLock;
 
 /// First wavelength of the table, nm.
@@ -59,7 +60,7 @@ static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
 /// Returns reflectance and transmittance (directional-hemispherical near normal incidence, surface reflection included)
 /// at an integer wavelength in nm, clamped to [`FIRST_NM`]..=[`LAST_NM`].
 pub fn at(inputs: &Inputs, wavelength_nm: u32) -> (f64, f64) {
-    let row = &TABLE[(wavelength_nm.clamp(FIRST_NM, LAST_NM) - FIRST_NM) as usize];
+    let row = &TABLE[(wavelength_nm.clamp(FIRST_NM, LAST_NM) - FIRST_NM).to_usize()];
     let amounts =
         [inputs.chlorophyll, inputs.carotenoid, inputs.anthocyanin, inputs.brown, inputs.water, inputs.dry_matter];
     let k = row.k.iter().zip(amounts).map(|(k, c)| k * c).sum::<f64>() / inputs.n;
@@ -147,6 +148,7 @@ fn exponential_integral(k: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::RoundTo;
 
     /// Source: values of the published Python port of PROSPECT-D.
     #[test]
@@ -182,7 +184,7 @@ mod tests {
                 water: v[5],
                 dry_matter: v[6],
             };
-            let (r, t) = at(&inputs, v[7] as u32);
+            let (r, t) = at(&inputs, v[7].trunc_to::<u32>());
             assert!((r - v[8]).abs() < 1e-5 && (t - v[9]).abs() < 1e-5, "{line}: {r} {t}");
             rows += 1;
         }

@@ -9,6 +9,8 @@
 //! microfacet-based BRDFs") is the same model for facets of independent heights; here the heights are those of the
 //! surface.
 
+use furrow_base::math::{RoundTo, ToFloat};
+
 /// Number of zenith angles in the table.
 pub const SLANTS: usize = 6;
 /// Number of relative azimuths of the two directions in the table.
@@ -25,6 +27,7 @@ const HALF_SINES: [f32; TURNS] = [0.0, 0.258_819_04, std::f32::consts::FRAC_1_SQ
 
 /// Square root of the table's lowest cosine, and the step between the square roots.
 const LOWEST_ROOT: f32 = 0.3;
+#[expect(clippy::cast_precision_loss, reason = "a small constant")]
 const ROOT_STEP: f32 = (1.0 - LOWEST_ROOT) / (SLANTS - 1) as f32;
 
 /// Smallest and largest factor in a table, then the scale of the stored integers. Factors are stored as `u16` because
@@ -70,7 +73,7 @@ pub struct Shadowing {
 impl Shadowing {
     /// Returns the cosine of the table's zenith angle `k`: 0.09 for the first, 1 for the last.
     pub fn cosine(k: usize) -> f32 {
-        (LOWEST_ROOT + k as f32 * ROOT_STEP).powi(2)
+        (LOWEST_ROOT + k.to_f32() * ROOT_STEP).powi(2)
     }
 
     /// Returns the table row of the pair of zenith angles `j` and `k`.
@@ -83,7 +86,7 @@ impl Shadowing {
     /// Creates the factor from a table, with values clamped to 0.05–4. Where one direction is the zenith, the first
     /// azimuth's value is used.
     pub fn new(factors: &Table) -> Self {
-        let stored = |f: f32| (f.clamp(FACTORS.0, FACTORS.1) * STORED + 0.5) as u16;
+        let stored = |f: f32| (f.clamp(FACTORS.0, FACTORS.1) * STORED + 0.5).trunc_to::<u16>();
         let (slanted, zenith) = factors.split_at(SLANTED);
         let all = slanted.as_flattened().iter().chain(zenith.iter().map(|row| &row[0]));
         let mut factors = [0; STORED_FACTORS];
@@ -130,25 +133,25 @@ impl Shadowing {
     /// angles.
     pub fn under_even_sky(value_at: impl Fn(usize) -> f32) -> f32 {
         const STEPS: usize = 64;
-        let cosine = |step: usize| (step as f32 + 0.5) / STEPS as f32;
+        let cosine = |step: usize| (step.to_f32() + 0.5) / STEPS.to_f32();
         let at = |cos: f32| {
             let (k, t) = place(cos);
             2.0 * cos * ((1.0 - t) * value_at(k) + t * value_at(k + 1))
         };
-        (0..STEPS).map(|step| at(cosine(step))).sum::<f32>() / STEPS as f32
+        (0..STEPS).map(|step| at(cosine(step))).sum::<f32>() / STEPS.to_f32()
     }
 
     /// Returns the largest directional albedo, over the table's zenith angles, of a white Lambertian surface multiplied
     /// by the factor.
     pub fn most(&self) -> f32 {
         const STEPS: usize = 24;
-        let middle = |k: usize| (k as f32 + 0.5) / STEPS as f32;
+        let middle = |k: usize| (k.to_f32() + 0.5) / STEPS.to_f32();
         let sent = |cos_i: f32| -> f32 {
             let of = |k: usize| {
                 let cos = middle(k);
                 let turned = |l: usize| (middle(l) * std::f32::consts::FRAC_PI_2).sin();
                 let around: f32 = (0..STEPS).map(|l| self.at(cos_i, cos, turned(l))).sum();
-                2.0 * cos * around / (STEPS * STEPS) as f32
+                2.0 * cos * around / (STEPS * STEPS).to_f32()
             };
             (0..STEPS).map(of).sum()
         };
@@ -160,9 +163,9 @@ impl Shadowing {
 /// are clamped.
 #[inline]
 fn place(cos: f32) -> (usize, f32) {
-    let place = ((cos.clamp(0.0, 1.0).sqrt() - LOWEST_ROOT) / ROOT_STEP).clamp(0.0, (SLANTS - 1) as f32);
-    let k = (place as usize).min(SLANTS - 2);
-    (k, place - k as f32)
+    let place = ((cos.clamp(0.0, 1.0).sqrt() - LOWEST_ROOT) / ROOT_STEP).clamp(0.0, (SLANTS - 1).to_f32());
+    let k = place.trunc_to::<usize>().min(SLANTS - 2);
+    (k, place - k.to_f32())
 }
 
 #[cfg(test)]
@@ -171,7 +174,7 @@ mod tests {
     use std::f32::consts::TAU;
 
     fn table() -> Table {
-        std::array::from_fn(|row| std::array::from_fn(|turn| 0.5 + 0.02 * row as f32 + 0.03 * turn as f32))
+        std::array::from_fn(|row| std::array::from_fn(|turn| 0.5 + 0.02 * row.to_f32() + 0.03 * turn.to_f32()))
     }
 
     /// Expected: the table's factors at its angles and azimuths, within rounding; the mean of two factors halfway
@@ -187,7 +190,7 @@ mod tests {
             for k in 0..SLANTS - 1 {
                 let (i, o) = (Shadowing::cosine(j), Shadowing::cosine(k));
                 for (turn, twelfths) in TWELFTHS.into_iter().enumerate() {
-                    let angle = twelfths as f32 / 12.0 * TAU;
+                    let angle = twelfths.to_f32() / 12.0 * TAU;
                     let expected = table()[Shadowing::pair(j, k)][turn];
                     assert!((factor(i, o, angle) - expected).abs() < 2e-3, "{j} {k} {turn}");
                     assert_eq!(factor(i, o, angle), factor(o, i, angle));

@@ -10,7 +10,7 @@
 //! Verhoef et al. 2018 (Remote Sens. Environ. 204:942).
 
 use super::interface::transmissivity;
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
@@ -108,9 +108,9 @@ struct Film {
 }
 
 static FILM: LazyLock<Film> = LazyLock::new(|| Film {
-    outer: (1.0 - transmissivity(40f64.to_radians(), WATER_INDEX)) as f32,
-    inner: (1.0 - transmissivity(FRAC_PI_2, WATER_INDEX) / (WATER_INDEX * WATER_INDEX)) as f32,
-    entry: (transmissivity(FRAC_PI_2, SOIL_INDEX / WATER_INDEX) / transmissivity(FRAC_PI_2, SOIL_INDEX)) as f32,
+    outer: (1.0 - transmissivity(40f64.to_radians(), WATER_INDEX)).to_f32(),
+    inner: (1.0 - transmissivity(FRAC_PI_2, WATER_INDEX) / (WATER_INDEX * WATER_INDEX)).to_f32(),
+    entry: (transmissivity(FRAC_PI_2, SOIL_INDEX / WATER_INDEX) / transmissivity(FRAC_PI_2, SOIL_INDEX)).to_f32(),
 });
 
 /// Returns the reflectance of soil of reflectance `r` under a film of water; `through` is the transmission of two

@@ -19,7 +19,7 @@
 use super::chip::{Adc, CLIP, Exposure, Mosaic, MosaicDesc, Noise, RESPONSE};
 use super::develop::{Jpeg, Sharpen, Tone, WhiteBalance, apply_matrix};
 use super::lens::{Camera, Psf};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt};
 use furrow_base::sampling::rng::Stream;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
@@ -106,8 +106,8 @@ impl Sensor {
     /// the whole image.
     pub fn expose(&self, film: Linear, camera: &Camera, illuminant: Spectrum, stream: &Stream) -> Photograph {
         let width = film.width.max(1);
-        let height = (film.pixels.len() / width as usize) as u32;
-        let place = |i: usize| (film.left + i as u32 % width, film.top + i as u32 / width);
+        let height = (film.pixels.len() / width.to_usize()).to_u32();
+        let place = |i: usize| (film.left + i.to_u32() % width, film.top + i.to_u32() / width);
         // Electrons per unit of exposure, before any clipping.
         let known = |r: &Spectrum| if r.is_finite() { r.clamp(0.0, f32::MAX) } else { Spectrum::ZERO };
         let mut signals: Vec<Spectrum> = film.pixels.par_iter().map(known).collect();
@@ -153,7 +153,7 @@ impl Sensor {
         self.sharpen.apply(&mut values, width);
 
         // Values are clipped to 0..255 here.
-        let (mut rgb, nir) = split(&values, |v| (v * 255.0 + 0.5) as u8);
+        let (mut rgb, nir) = split(&values, |v| (v * 255.0 + 0.5).trunc_to::<u8>());
         if let Some(jpeg) = self.jpeg {
             jpeg.pass(&mut rgb, width);
         }
@@ -169,7 +169,7 @@ impl Sensor {
         let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
         let (dx, dy) = (px[0] - w / 2.0, px[1] - h / 2.0);
         let share = (dx * dx + dy * dy) / ((w * w + h * h) / 4.0);
-        natural * (1.0 - self.corner_shading * share as f32)
+        natural * (1.0 - self.corner_shading * share.to_f32())
     }
 
     /// Returns the levels as read out: with noise, limited by the full well, quantised. Levels below black are clamped
@@ -190,7 +190,7 @@ impl Sensor {
     fn interpolate(&self, levels: &mut [Spectrum], width: u32, corner: (u32, u32)) {
         let MosaicDesc::Bayer { pattern, demosaic } = self.mosaic else { return };
         let seen = |(i, level): (usize, &Spectrum)| {
-            level.to_array()[pattern.color(corner.0 + i as u32 % width, corner.1 + i as u32 / width)]
+            level.to_array()[pattern.color(corner.0 + i.to_u32() % width, corner.1 + i.to_u32() / width)]
         };
         let values: Vec<f32> = levels.par_iter().enumerate().map(seen).collect();
         let colors = Mosaic { values: &values, width, corner, pattern }.interpolate(demosaic);
@@ -203,8 +203,8 @@ impl Sensor {
 impl Deep {
     /// Quantises the output values to `bits` bits.
     fn of(values: &[Spectrum], bits: u32) -> Self {
-        let top = ((1_u32 << bits.min(16)) - 1) as f32;
-        let step = |v: f32| ((v * top + 0.5).floor().clamp(0.0, top) * (65535.0 / top) + 0.5) as u16;
+        let top = ((1_u32 << bits.min(16)) - 1).to_f32();
+        let step = |v: f32| ((v * top + 0.5).floor().clamp(0.0, top) * (65535.0 / top) + 0.5).trunc_to::<u16>();
         let (rgb, nir) = split(values, step);
         Self { rgb, nir }
     }

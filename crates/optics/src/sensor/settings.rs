@@ -5,6 +5,7 @@ use super::chip::{AdcDesc, Depth, ExposureDesc, MosaicDesc, NoiseDesc, NoiseWrit
 use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, SharpenWritten, Tone, WhiteBalanceDesc};
 use super::given::{Given, layered};
 use super::lens::{PsfDesc, PsfWritten};
+use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Fraction, Num, Vary};
 use furrow_base::sampling::rng::{Purpose, Stream};
 use serde::Serialize;
@@ -121,7 +122,7 @@ impl SensorDesc {
             matrix: self.matrix.draw(&mut later),
             tone: self.tone,
             sharpen: self.sharpen.draw(&mut later),
-            bits: self.bits.get() as u32,
+            bits: self.bits.get().trunc_to::<u32>(),
             jpeg: self.jpeg.draw(&mut later),
         }
     }

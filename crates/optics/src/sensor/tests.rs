@@ -1,7 +1,7 @@
 //! Tests of the sensor with synthetic cards and images.
 
 use super::*;
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use furrow_base::sampling::{Purpose, Stream};
 
 fn sensor(page: &str) -> Sensor {
@@ -41,7 +41,7 @@ fn a_smaller_image_is_blurred_by_the_same_lens() {
         let film = Linear { pixels: &pixels, width: 48, left: 0, top: 0 };
         let shot = page(more).expose(film, camera, Spectrum::ONE, &Stream::of(3, 0, Purpose::Sensor, 0));
         let green: Vec<f64> = shot.deep.unwrap().rgb.chunks(3).map(|c| f64::from(c[1])).collect();
-        let of = |i: usize| green[i] * ((i % 48) as f64 - 24.0).powi(2);
+        let of = |i: usize| green[i] * ((i % 48).to_f64() - 24.0).powi(2);
         ((0..green.len()).map(of).sum::<f64>() / green.iter().sum::<f64>()).sqrt()
     };
     let half = few(2);
@@ -82,7 +82,7 @@ fn more_light_never_gives_a_darker_pixel() {
             "(noise: (on: false), natural_vignetting: false, corner_shading: 0, tone: {tone}, exposure: Fixed(gain: 1), \
              nir_exposure: Fixed(gain: 1))"
         );
-        let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i as f32 / 1000.0)).collect();
+        let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i.to_f32() / 1000.0)).collect();
         let shot = expose(&sensor(&page), &ramp, Spectrum::ONE);
         assert!(shot.nir.is_sorted() && shot.rgb.chunks(3).map(|c| c[1]).is_sorted(), "{tone}");
         assert_eq!((shot.nir[0], shot.nir[1535]), (0, 255));
@@ -91,13 +91,13 @@ fn more_light_never_gives_a_darker_pixel() {
 
 #[test]
 fn automatic_exposure_brings_the_mean_to_its_level() {
-    let scene: Vec<Spectrum> = (0..48 * 32).map(|i| EVENING * (0.05 + (i % 97) as f32 / 400.0)).collect();
+    let scene: Vec<Spectrum> = (0..48 * 32).map(|i| EVENING * (0.05 + (i % 97).to_f32() / 400.0)).collect();
     let auto =
         sensor("(tone: Linear, noise: (on: false), exposure: Auto(level: 0.18), nir_exposure: Auto(level: 0.25))");
     for brightness in [1e-3, 1.0, 500.0] {
         let scene: Vec<Spectrum> = scene.iter().map(|&s| s * brightness).collect();
         let shot = expose(&auto, &scene, EVENING * brightness);
-        let mean = |of: &[u8]| of.iter().map(|&v| f64::from(v)).sum::<f64>() / of.len() as f64 / 255.0;
+        let mean = |of: &[u8]| of.iter().map(|&v| f64::from(v)).sum::<f64>() / of.len().to_f64() / 255.0;
         assert!((mean(&shot.rgb) - 0.18).abs() < 0.004 && (mean(&shot.nir) - 0.25).abs() < 0.004, "{brightness}");
     }
     let median = sensor("(tone: Linear, noise: (on: false), exposure: Percentile(percent: 50, level: 0.4))");
@@ -118,8 +118,8 @@ fn noise_is_counted_in_electrons_and_never_changes() {
     let shot = expose(&noisy, &flat, Spectrum::ONE);
     assert_eq!(shot, expose(&noisy, &flat, Spectrum::ONE));
     let green: Vec<f64> = shot.rgb.chunks(3).map(|c| f64::from(c[1]) / 255.0).collect();
-    let mean = green.iter().sum::<f64>() / green.len() as f64;
-    let variance = green.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / green.len() as f64;
+    let mean = green.iter().sum::<f64>() / green.len().to_f64();
+    let variance = green.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / green.len().to_f64();
     let expected = (0.5 * 450.0 + 100.0) / (450.0 * 450.0);
     assert!((mean - 0.5).abs() < 0.005, "{mean}");
     assert!((variance / expected - 1.0).abs() < 0.15, "{variance} {expected}");
@@ -197,7 +197,7 @@ fn a_mosaic_spreads_noise_in_colour_and_leaves_nir() {
 /// Expected: twelve bits resolve more than eight, in steps of 65535/4095.
 #[test]
 fn a_deep_photograph_has_its_steps() {
-    let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i as f32 / 1536.0)).collect();
+    let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i.to_f32() / 1536.0)).collect();
     let page = "(tone: Linear, noise: (on: false), exposure: Fixed(gain: 1), nir_exposure: Fixed(gain: 1), \
                 natural_vignetting: false, corner_shading: 0, bits: 12)";
     let shot = expose(&sensor(page), &ramp, Spectrum::ONE);
@@ -216,7 +216,7 @@ fn a_deep_photograph_has_its_steps() {
 #[test]
 fn a_grey_world_goes_part_of_the_way_to_a_grey_mean() {
     let scene: Vec<Spectrum> =
-        (0..48 * 32).map(|i| EVENING * Spectrum::new(0.3, 0.2, 0.1, 0.3) * (1.0 + (i % 7) as f32)).collect();
+        (0..48 * 32).map(|i| EVENING * Spectrum::new(0.3, 0.2, 0.1, 0.3) * (1.0 + (i % 7).to_f32())).collect();
     let gains = |strength: f32| {
         let page = format!("(noise: (on: false), white_balance: GreyWorld(strength: {strength}))");
         expose(&sensor(&page), &scene, EVENING).white_balance

@@ -11,7 +11,7 @@ use super::grid::{flood, middle};
 use super::petiole::{self, Petiole};
 use super::srgb::{ColorSpace, decode};
 use furrow_base::error::{Error, Result};
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 
 /// Smallest fraction of the photograph that is accepted as a leaf.
 const LEAST: f64 = 0.002;
@@ -50,17 +50,17 @@ const CUT: f64 = 0.002;
 /// Returns warnings about a photograph, one sentence each, for problems that `cut_out` does not return as errors. `flip`
 /// is that of [`CutoutOptions`].
 pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]], flip: bool) -> Vec<String> {
-    let (width, height) = (width as usize, height as usize);
+    let (width, height) = (width.to_usize(), height.to_usize());
     let mut green = green(rgb);
     let first = largest(&green, width, height);
-    let count = |piece: &[bool]| piece.iter().filter(|inside| **inside).count() as f64;
+    let count = |piece: &[bool]| piece.iter().filter(|inside| **inside).count().to_f64();
     green.iter_mut().zip(&first).for_each(|(green, taken)| *green &= !taken);
     let mut all = Vec::new();
     if count(&largest(&green, width, height)) > ANOTHER * count(&first) {
         all.push("there is more than one leaf: only the largest is extracted; photograph one at a time".to_owned());
     }
     let border = |i: &usize| [0, width - 1].contains(&(i % width)) || [0, height - 1].contains(&(i / width));
-    let beyond = (0..first.len()).filter(|i| first[*i] && border(i)).count() as f64;
+    let beyond = (0..first.len()).filter(|i| first[*i] && border(i)).count().to_f64();
     if beyond > (CUT * count(&first)).max(4.0) {
         all.push(
             "the leaf reaches the photograph's border, so a part of it is missing: leave room around it".to_owned(),
@@ -74,21 +74,21 @@ pub fn doubts(width: u32, height: u32, rgb: &[[u8; 3]], flip: bool) -> Vec<Strin
 
 /// Extracts the leaf of a photograph, upright and with opacity, in sRGB.
 pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &CutoutOptions) -> Result<GeneratedTexture> {
-    let mut leaf = largest(&green(rgb), width as usize, height as usize);
+    let mut leaf = largest(&green(rgb), width.to_usize(), height.to_usize());
     let count = leaf.iter().filter(|in_it| **in_it).count();
-    if (count as f64) < LEAST * rgb.len() as f64 {
+    if count.to_f64() < LEAST * rgb.len().to_f64() {
         return Err(Error::input("no leaf was found: no green area stands out from the background")
             .help("photograph one leaf on white paper or on soil, filling at least a twentieth of the image"));
     }
     if !cutting.holes {
-        fill(&mut leaf, width as usize, height as usize);
+        fill(&mut leaf, width.to_usize(), height.to_usize());
     }
     let gain = gain(width, height, rgb, cutting)?;
-    let petiole = petiole::find(rgb, &leaf, width as usize, height as usize);
+    let petiole = petiole::find(rgb, &leaf, width.to_usize(), height.to_usize());
     for i in petiole.iter().flat_map(|petiole| &petiole.pixels) {
         leaf[*i] = false;
     }
-    let up = upward(&leaf, width as usize, petiole.as_ref(), cutting.flip);
+    let up = upward(&leaf, width.to_usize(), petiole.as_ref(), cutting.flip);
     let mut foot = petiole.as_ref().map(|petiole| petiole.foot);
     if cutting.stalk {
         for i in petiole.iter().flat_map(|petiole| &petiole.pixels) {
@@ -96,24 +96,24 @@ pub fn cut_out(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &CutoutOptions
         }
         foot = None;
     }
-    let stance = LeafPose::of(&leaf, width as usize, up, foot);
+    let stance = LeafPose::of(&leaf, width.to_usize(), up, foot);
     let leaf = leaf;
     let there = |x: i64, y: i64| {
         (0..i64::from(width)).contains(&x)
             && (0..i64::from(height)).contains(&y)
-            && leaf[(y * i64::from(width) + x) as usize]
+            && leaf[(y * i64::from(width) + x).to_usize()]
     };
-    let scale = cutting.height.map_or(1.0, |h| (h as f32 - 1.0) / ((1.0 + 2.0 * ROOM) * stance.length));
-    let side = |length: f32| ((length * scale).ceil() as u32 + 1).max(2);
+    let scale = cutting.height.map_or(1.0, |h| (h.to_f32() - 1.0) / ((1.0 + 2.0 * ROOM) * stance.length));
+    let side = |length: f32| ((length * scale).ceil_to::<u32>() + 1).max(2);
     let (w, h) = (side(2.0 * stance.reach + 2.0 * ROOM * stance.length), side((1.0 + 2.0 * ROOM) * stance.length));
     if u64::from(w) * u64::from(h) > 1 << 26 {
         return Err(Error::misuse(format!("an image of {w} × {h} pixels is too large")).help("use a smaller --height"));
     }
-    let mut rgba = Vec::with_capacity(4 * w as usize * h as usize);
+    let mut rgba = Vec::with_capacity(4 * w.to_usize() * h.to_usize());
     for y in 0..h {
         for x in 0..w {
-            let across = (x as f32 + 0.5 - 0.5 * w as f32) / scale;
-            let up = (h as f32 - (y as f32 + 0.5)) / scale - ROOM * stance.length;
+            let across = (x.to_f32() + 0.5 - 0.5 * w.to_f32()) / scale;
+            let up = (h.to_f32() - (y.to_f32() + 0.5)) / scale - ROOM * stance.length;
             let at = stance.place(across, up);
             rgba.extend(sample(rgb, width, at, &there, gain));
         }
@@ -128,11 +128,11 @@ fn sample(rgb: &[[u8; 3]], width: u32, at: Vec2, there: &dyn Fn(i64, i64) -> boo
     let part = at - 0.5 - corner;
     let (mut sum, mut weight) = ([0.0_f32; 3], 0.0_f32);
     for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let (x, y) = (corner.x as i64 + dx, corner.y as i64 + dy);
+        let (x, y) = (corner.x.trunc_to::<i64>() + dx, corner.y.trunc_to::<i64>() + dy);
         let share = |d: i64, t: f32| if d == 1 { t } else { 1.0 - t };
         if there(x, y) {
             let own = share(dx, part.x) * share(dy, part.y);
-            let texel = rgb[(y * i64::from(width) + x) as usize];
+            let texel = rgb[(y * i64::from(width) + x).to_usize()];
             for k in 0..3 {
                 sum[k] += own * decode(f32::from(texel[k]) / 255.0);
             }
@@ -143,7 +143,7 @@ fn sample(rgb: &[[u8; 3]], width: u32, at: Vec2, there: &dyn Fn(i64, i64) -> boo
         return [0; 4];
     }
     let color = |k: usize| ColorSpace::Srgb.encode((sum[k] / weight * gain[k]).min(1.0));
-    [color(0), color(1), color(2), (weight.min(1.0) * 255.0 + 0.5) as u8]
+    [color(0), color(1), color(2), (weight.min(1.0) * 255.0 + 0.5).trunc_to::<u8>()]
 }
 
 /// Returns the factors on linear R, G, B that map the grey reference to its reflectance.
@@ -156,13 +156,13 @@ fn gain(width: u32, height: u32, rgb: &[[u8; 3]], cutting: &CutoutOptions) -> Re
     let mut sum = [0.0_f64; 3];
     for row in y..y + h {
         for column in x..x + w {
-            let texel = rgb[(row * width + column) as usize];
+            let texel = rgb[(row * width + column).to_usize()];
             for k in 0..3 {
                 sum[k] += f64::from(decode(f32::from(texel[k]) / 255.0));
             }
         }
     }
-    let mean = sum.map(|s| (s / (f64::from(w) * f64::from(h))) as f32);
+    let mean = sum.map(|s| (s / (f64::from(w) * f64::from(h))).to_f32());
     if mean.iter().any(|m| *m < 0.01) {
         return Err(Error::input("the grey area is black").help("choose an area of the paper or of a grey card"));
     }
@@ -176,7 +176,7 @@ fn green(rgb: &[[u8; 3]]) -> Vec<bool> {
         .map(|p| {
             let [r, g, b] = p.map(f32::from);
             let sum = (r + g + b).max(24.0);
-            (((2.0 * g - r - b) / sum + 1.0) / 3.0 * 255.0) as u8
+            (((2.0 * g - r - b) / sum + 1.0) / 3.0 * 255.0).trunc_to::<u8>()
         })
         .collect();
     let mut counts = [0_u64; 256];
@@ -185,24 +185,24 @@ fn green(rgb: &[[u8; 3]]) -> Vec<bool> {
     }
     let threshold = otsu(&counts);
     // A pixel is never green if 2g − r − b is about zero or negative, whatever the threshold is.
-    let grey = (255.0 / 3.0) as u8 + 3;
+    let grey = (255.0 / 3.0).trunc_to::<u8>() + 3;
     excess.into_iter().map(|v| v > threshold.max(grey)).collect()
 }
 
 /// Returns the value that splits a histogram into two classes with the largest between-class variance (Otsu 1979).
 fn otsu(counts: &[u64; 256]) -> u8 {
-    let total: f64 = counts.iter().map(|n| *n as f64).sum();
-    let all: f64 = counts.iter().enumerate().map(|(v, n)| v as f64 * *n as f64).sum();
+    let total: f64 = counts.iter().map(|n| n.to_f64()).sum();
+    let all: f64 = counts.iter().enumerate().map(|(v, n)| v.to_f64() * n.to_f64()).sum();
     let (mut below, mut sum, mut best, mut at) = (0.0, 0.0, -1.0, 0);
     for (v, n) in counts.iter().enumerate() {
-        below += *n as f64;
-        sum += v as f64 * *n as f64;
+        below += n.to_f64();
+        sum += v.to_f64() * n.to_f64();
         let above = total - below;
         if below > 0.0 && above > 0.0 {
             let apart = sum / below - (all - sum) / above;
             let between = below * above * apart * apart;
             if between > best {
-                (best, at) = (between, v as u8);
+                (best, at) = (between, v.to_u8());
             }
         }
     }
@@ -260,9 +260,9 @@ struct LeafPose {
 /// Returns the unit vector from the base to the tip of a blade without its petiole.
 fn upward(blade: &[bool], width: usize, petiole: Option<&Petiole>, flip: bool) -> Vec2 {
     let points = || blade.iter().enumerate().filter(|(_, in_it)| **in_it).map(|(i, _)| middle(i, width));
-    let count = points().count().max(1) as f64;
+    let count = points().count().max(1).to_f64();
     let (sx, sy) = points().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p.x), y + f64::from(p.y)));
-    let centre = vec2((sx / count) as f32, (sy / count) as f32);
+    let centre = vec2((sx / count).to_f32(), (sy / count).to_f32());
     let (mut xx, mut xy, mut yy) = (0.0_f64, 0.0, 0.0);
     for p in points() {
         let d = p - centre;
@@ -271,7 +271,7 @@ fn upward(blade: &[bool], width: usize, petiole: Option<&Petiole>, flip: bool) -
         yy += f64::from(d.y * d.y);
     }
     let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-    let mut axis = vec2(angle.cos() as f32, angle.sin() as f32);
+    let mut axis = vec2(angle.cos().to_f32(), angle.sin().to_f32());
     if let Some(petiole) = petiole {
         let ahead = (centre - petiole.foot).normalize_or(axis);
         let along = axis.dot(ahead);
@@ -279,7 +279,7 @@ fn upward(blade: &[bool], width: usize, petiole: Option<&Petiole>, flip: bool) -
         return if flip { -up } else { up };
     }
     let apart = (4.0 * xy * xy + (xx - yy) * (xx - yy)).sqrt();
-    let ratio = ((xx + yy + apart) / (xx + yy - apart).max(1.0)).sqrt() as f32;
+    let ratio = ((xx + yy + apart) / (xx + yy - apart).max(1.0)).sqrt().to_f32();
     if ratio < ROUND {
         axis = symmetry(blade, width, centre);
     }
@@ -304,11 +304,11 @@ fn symmetry(leaf: &[bool], width: usize, centre: Vec2) -> Vec2 {
         inside.iter().step_by(inside.len() / POINTS + 1).map(|i| middle(*i, width) - centre).collect();
     let height = leaf.len() / width;
     let has = |p: Vec2| {
-        p.x >= 0.0 && p.y >= 0.0 && (p.x as usize) < width && (p.y as usize) < height && {
-            leaf[p.y as usize * width + p.x as usize]
+        p.x >= 0.0 && p.y >= 0.0 && p.x.trunc_to::<usize>() < width && p.y.trunc_to::<usize>() < height && {
+            leaf[p.y.trunc_to::<usize>() * width + p.x.trunc_to::<usize>()]
         }
     };
-    let direction = |k: u32| Vec2::from_angle(k as f32 * std::f32::consts::PI / ANGLES as f32);
+    let direction = |k: u32| Vec2::from_angle(k.to_f32() * std::f32::consts::PI / ANGLES.to_f32());
     let alike = |k: &u32| {
         let axis = direction(*k);
         some.iter().filter(|d| has(centre + 2.0 * d.dot(axis) * axis - **d)).count()
@@ -328,7 +328,7 @@ impl LeafPose {
             || {
                 let slice = points().filter(|p| p.dot(up) < end + (0.02 * length).max(1.5));
                 let (sum, n) = slice.fold((0.0, 0_u32), |(sum, n), p| (sum + p.dot(aside), n + 1));
-                sum / n.max(1) as f32
+                sum / n.max(1).to_f32()
             },
             |foot| foot.dot(aside),
         );
@@ -370,12 +370,12 @@ mod tests {
     #[test]
     fn a_leaf_comes_out_upright_whichever_way_it_lies() {
         for k in 0..8 {
-            let photo = photograph(k as f32 * 0.8);
+            let photo = photograph(k.to_f32() * 0.8);
             let leaf = cut_out(400, 400, &photo, &CutoutOptions { stalk: true, ..CutoutOptions::default() }).unwrap();
             let blade = cut_out(400, 400, &photo, &CutoutOptions::default()).unwrap();
-            assert!((blade.height as f32 - 187.0).abs() < 8.0, "{k}: the petiole is removed: {}", blade.height);
-            let (w, h) = (leaf.width as usize, leaf.height as usize);
-            assert!((h as f32 - 250.0).abs() < 8.0 && (w as f32 - 100.0).abs() < 8.0, "{k}: {w} × {h}");
+            assert!((blade.height.to_f32() - 187.0).abs() < 8.0, "{k}: the petiole is removed: {}", blade.height);
+            let (w, h) = (leaf.width.to_usize(), leaf.height.to_usize());
+            assert!((h.to_f32() - 250.0).abs() < 8.0 && (w.to_f32() - 100.0).abs() < 8.0, "{k}: {w} × {h}");
             let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
             assert!(
                 opaque(w / 2, h - 12) && !opaque(w / 2 - 12, h - 12),
@@ -435,21 +435,21 @@ mod tests {
     #[test]
     fn the_petiole_shows_the_base_of_any_leaf() {
         for (half, k) in [50.0, 100.0, 140.0].into_iter().flat_map(|half| (0..6).map(move |k| (half, k))) {
-            let turn = k as f32 * 1.1 - 0.4;
+            let turn = k.to_f32() * 1.1 - 0.4;
             let photo = ovate(half, turn, 100.0);
             assert_eq!(doubts(600, 600, &photo, false), Vec::<String>::new(), "{half} {turn}");
-            let blade = photo.iter().filter(|p| p[1] == 130).count() as f64;
+            let blade = photo.iter().filter(|p| p[1] == 130).count().to_f64();
             let of = |cutting: CutoutOptions| cut_out(600, 600, &photo, &cutting).unwrap();
             let row = |leaf: &GeneratedTexture, part: f32| {
-                let (w, y) = (leaf.width as usize, (part * leaf.height as f32) as usize);
+                let (w, y) = (leaf.width.to_usize(), (part * leaf.height.to_f32()).trunc_to::<usize>());
                 (0..w).filter(|x| leaf.rgba[4 * (y * w + x) + 3] > 127).count()
             };
             let leaf = of(CutoutOptions::default());
             assert!(row(&leaf, 0.08) < row(&leaf, 0.9), "{half} {turn}: the tip is up");
-            let (w, h) = (leaf.width as usize, leaf.height as usize);
+            let (w, h) = (leaf.width.to_usize(), leaf.height.to_usize());
             let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
-            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
-            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count() as f64;
+            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count().to_f64();
+            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count().to_f64();
             assert!((all / blade - 1.0).abs() < 0.02 && unlike / all < 0.06, "{half} {turn}: {all} {blade} {unlike}");
             let flipped = of(CutoutOptions { flip: true, ..CutoutOptions::default() });
             assert!(row(&flipped, 0.08) > row(&flipped, 0.9), "{half} {turn}: flipped");
@@ -468,10 +468,10 @@ mod tests {
             assert!(messages.len() == 1 && messages[0].contains("no petiole"), "{messages:?}");
             assert_eq!(doubts(600, 600, &photo, true), Vec::<String>::new());
             let leaf = cut_out(600, 600, &photo, &CutoutOptions { flip: true, ..CutoutOptions::default() }).unwrap();
-            let (w, h) = (leaf.width as usize, leaf.height as usize);
+            let (w, h) = (leaf.width.to_usize(), leaf.height.to_usize());
             let opaque = |x: usize, y: usize| leaf.rgba[4 * (y * w + x) + 3] > 127;
-            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count() as f64;
-            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count() as f64;
+            let all = (0..w * h).filter(|i| opaque(i % w, i / w)).count().to_f64();
+            let unlike = (0..w * h).filter(|i| opaque(i % w, i / w) != opaque(w - 1 - i % w, i / w)).count().to_f64();
             assert!(unlike / all < 0.08, "{half}: {unlike} of {all}");
         }
     }
@@ -487,7 +487,7 @@ mod tests {
         };
         let leaf = cut_out(400, 400, &photo, &cutting).unwrap();
         assert!(leaf.height.abs_diff(120) <= 1);
-        let middle = 4 * (leaf.height as usize / 3 * leaf.width as usize + leaf.width as usize / 2);
+        let middle = 4 * (leaf.height.to_usize() / 3 * leaf.width.to_usize() + leaf.width.to_usize() / 2);
         let linear = |v: u8| decode(f32::from(v) / 255.0);
         let wanted = linear(120) * 0.85 / linear(232);
         assert!((linear(leaf.rgba[middle + 1]) - wanted).abs() < 0.01);

@@ -6,6 +6,7 @@
 //! Sources: ITU-T T.81, annex B (JPEG segments); PNG, third edition, 5.3 and 11.3.4.5 (chunks, `eXIf`).
 
 use furrow_base::input::{self, Refusal};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Rgb, RgbImage};
@@ -188,7 +189,7 @@ fn orientation(bytes: &[u8], decoder: &mut impl ImageDecoder) -> Orientation {
 fn exif_chunk(bytes: &[u8]) -> Option<&[u8]> {
     let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
     while let Some(([a, b, c, d, kind @ ..], data)) = rest.split_first_chunk::<8>() {
-        let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+        let length = u32::from_be_bytes([*a, *b, *c, *d]).to_usize();
         if kind == b"eXIf" {
             return data.get(..length);
         }
@@ -261,9 +262,9 @@ pub fn over_white(pixels: DynamicImage) -> (DynamicImage, u64) {
         return (pixels, 0);
     }
     let pixels = pixels.into_rgba8();
-    let transparent = pixels.pixels().filter(|p| p.0[3] < 255).count() as u64;
+    let transparent = pixels.pixels().filter(|p| p.0[3] < 255).count().to_u64();
     let flat = |[r, g, b, a]: [u8; 4]| {
-        [r, g, b].map(|c| ((u32::from(c) * u32::from(a) + 255 * (255 - u32::from(a)) + 127) / 255) as u8)
+        [r, g, b].map(|c| ((u32::from(c) * u32::from(a) + 255 * (255 - u32::from(a)) + 127) / 255).to_u8())
     };
     let (w, h) = pixels.dimensions();
     (RgbImage::from_fn(w, h, |x, y| Rgb(flat(pixels.get_pixel(x, y).0))).into(), transparent)
@@ -310,7 +311,7 @@ mod tests {
         if let Some(orientation) = orientation {
             let mut segment = b"Exif\0\0".to_vec();
             segment.extend(exif(orientation, orientation.is_multiple_of(2)));
-            let length = (segment.len() as u16 + 2).to_be_bytes();
+            let length = (segment.len().to_u16() + 2).to_be_bytes();
             // A fill byte precedes the marker, as T.81 allows.
             let head = [&[0xff, 0xff, 0xe1][..], &length, &segment].concat();
             bytes.splice(2..2, head);
@@ -330,7 +331,7 @@ mod tests {
         let crc = named.iter().fold(u32::MAX, |crc, byte| {
             (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
         });
-        [&(data.len() as u32).to_be_bytes()[..], &named, &(!crc).to_be_bytes()].concat()
+        [&data.len().to_u32().to_be_bytes()[..], &named, &(!crc).to_be_bytes()].concat()
     }
 
     /// Returns the four corners of a picture as letters, row by row.
@@ -365,7 +366,7 @@ mod tests {
                 std::fs::write(&path, bytes).unwrap();
                 let picture = read(&path, MAX).unwrap();
                 assert_eq!(corners(&picture), corners_shown, "{name} {orientation}");
-                assert_eq!((picture.orientation, picture.stored_size()), (orientation as u8, (W, H)), "{name}");
+                assert_eq!((picture.orientation, picture.stored_size()), (orientation.to_u8(), (W, H)), "{name}");
                 assert_eq!((picture.pixels.width(), picture.pixels.height()), size_shown);
                 assert_eq!(size(&path).unwrap(), size_shown);
             }
@@ -417,7 +418,7 @@ mod tests {
             let a = (a + u32::from(*byte)) % 65521;
             (a, (b + a) % 65521)
         });
-        let length = raw.len() as u16;
+        let length = raw.len().to_u16();
         let zlib =
             [&[0x78, 0x01, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), &raw, &(b << 16 | a).to_be_bytes()]
                 .concat();

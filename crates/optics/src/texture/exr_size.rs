@@ -2,6 +2,7 @@
 
 use exr::compression::Compression;
 use exr::meta::MetaData;
+use furrow_base::math::{ToFloat, ToInt};
 use std::io::{Cursor, Read, Seek};
 
 /// Largest size of decoded pixels in bytes.
@@ -23,8 +24,8 @@ pub fn check(bytes: &[u8]) -> Result<(), String> {
         MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| format!("it cannot be read: {e}"))?;
     let (mut all, mut most) = (0u64, 0u64);
     for header in &meta.headers {
-        let (w, h) = (header.layer_size.0 as u64, header.layer_size.1 as u64);
-        all = all.saturating_add(w.saturating_mul(h).saturating_mul(header.channels.bytes_per_pixel as u64));
+        let (w, h) = (header.layer_size.0.to_u64(), header.layer_size.1.to_u64());
+        all = all.saturating_add(w.saturating_mul(h).saturating_mul(header.channels.bytes_per_pixel.to_u64()));
         let ratio = match header.compression {
             Compression::Uncompressed
             | Compression::RLE
@@ -33,7 +34,7 @@ pub fn check(bytes: &[u8]) -> Result<(), String> {
             | Compression::PXR24 => DEFLATED,
             _ => OTHERWISE,
         };
-        most = most.max(ratio.saturating_mul(bytes.len() as u64));
+        most = most.max(ratio.saturating_mul(bytes.len().to_u64()));
     }
     let header_size = meta.headers.first().map_or((0, 0), |header| (header.layer_size.0, header.layer_size.1));
     if all > most.min(LARGEST) {
@@ -41,7 +42,7 @@ pub fn check(bytes: &[u8]) -> Result<(), String> {
             "its header declares {} × {} pixels, {:.1} GiB: more than its {} bytes can hold or above the limit",
             header_size.0,
             header_size.1,
-            all as f64 / f64::from(1 << 30),
+            all.to_f64() / f64::from(1 << 30),
             bytes.len()
         ));
     }

@@ -1,10 +1,10 @@
 //! Pixels of an image by their index, row by row.
 
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{ToFloat, Vec2, vec2};
 
 /// Returns the centre of a pixel.
 pub(super) fn middle(i: usize, width: usize) -> Vec2 {
-    vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5)
+    vec2((i % width).to_f32() + 0.5, (i / width).to_f32() + 0.5)
 }
 
 /// Flood fill: visits the pixels accepted by `enter`, from `start` over shared sides, and returns their number.

@@ -1,7 +1,7 @@
 //! Maps of a ground: reflectance, moisture and fine relief, texel by texel.
 
 use crate::optics::UnmeshedRelief;
-use furrow_base::math::{Spectrum, Vec2};
+use furrow_base::math::{RoundTo, Spectrum, Vec2};
 
 /// Maximum number of layers of a ground.
 pub const MAX_LAYERS: usize = 4;
@@ -45,6 +45,6 @@ impl GroundMaps {
 
     /// Returns the stored form of a reflectance.
     pub fn encode(albedo: [f32; 3]) -> [u8; 3] {
-        albedo.map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0) as u8)
+        albedo.map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0).trunc_to::<u8>())
     }
 }

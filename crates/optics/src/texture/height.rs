@@ -2,7 +2,7 @@
 
 use super::pyramid::Wrap;
 use furrow_base::error::Result;
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{ToFloat, ToInt, Vec2, vec2};
 use std::path::Path;
 
 /// Height map with one f32 per texel. The unit is the caller's choice: [`Height::load`] scales to any; [`super::maps`]
@@ -26,7 +26,7 @@ impl Height {
 
     /// Creates a map from rows of heights, top row first; `values` holds width × height of them.
     pub fn from_values(width: u32, height: u32, values: Vec<f32>) -> Self {
-        assert!(width > 0 && height > 0 && values.len() == width as usize * height as usize);
+        assert!(width > 0 && height > 0 && values.len() == width.to_usize() * height.to_usize());
         Self { width, rows: height, values, wrap: Wrap::Clamp }
     }
 
@@ -73,14 +73,14 @@ impl Height {
         let ([a, b, c, d], fx, fy) = self.corners(uv);
         let right = (b - a) * (1.0 - fy) + (d - c) * fy;
         let down = (c - a) * (1.0 - fx) + (d - b) * fx;
-        vec2(right, -down) * self.rows as f32
+        vec2(right, -down) * self.rows.to_f32()
     }
 
     #[inline]
     fn corners(&self, uv: Vec2) -> ([f32; 4], f32, f32) {
         let (x0, x1, fx) = self.wrap.pair(uv.x, self.width);
         let (y0, y1, fy) = self.wrap.pair(uv.y, self.rows);
-        let get = |x: u32, y: u32| self.values[y as usize * self.width as usize + x as usize];
+        let get = |x: u32, y: u32| self.values[y.to_usize() * self.width.to_usize() + x.to_usize()];
         ([get(x0, y0), get(x1, y0), get(x0, y1), get(x1, y1)], fx, fy)
     }
 }

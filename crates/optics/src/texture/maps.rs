@@ -10,7 +10,7 @@
 use super::Texture;
 use super::height::Height;
 use super::pyramid::{Level, Plane, Pyramid, Wrap, halve};
-use furrow_base::math::Vec2;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2};
 
 /// Parameters for deriving height from a texture's brightness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +46,7 @@ impl Maps {
     /// Derives the maps from a texture's brightness.
     pub fn derive(texture: &Texture, relief: &HeightFromBrightness) -> Self {
         let (width, height) = (texture.width(), texture.height());
-        let mut values = Vec::with_capacity(width as usize * height as usize);
+        let mut values = Vec::with_capacity(width.to_usize() * height.to_usize());
         for y in 0..height {
             for x in 0..width {
                 let [r, g, b, _] = texture.texel(x, y);
@@ -54,22 +54,22 @@ impl Maps {
                 values.push((0.2126 * r + 0.7152 * g + 0.0722 * b).max(0.0).cbrt());
             }
         }
-        let radius = |size: f32| (size * height as f32 * 0.5).round() as usize;
+        let radius = |size: f32| (size * height.to_f32() * 0.5).round_to::<usize>();
         let [wrap, _] = texture.wrap();
-        let size = (width as usize, height as usize);
+        let size = (width.to_usize(), height.to_usize());
         let coarse = soften(&values, size, radius(relief.coarsest), wrap);
         let mut fine = soften(&values, size, radius(relief.finest), wrap);
         let mut power = 0.0;
         let mut weight = 0.0;
         for (i, (f, c)) in fine.iter_mut().zip(&coarse).enumerate() {
             *f -= c;
-            let alpha = texture.texel(i as u32 % width, i as u32 / width)[3];
+            let alpha = texture.texel(i.to_u32() % width, i.to_u32() / width)[3];
             power += f64::from(alpha * *f * *f);
             weight += f64::from(alpha);
         }
         // A strong feature is two standard deviations. Beyond that the height saturates, so a single speck does not
         // become a spike.
-        let strong = 2.0 * (power / weight.max(1.0)).sqrt().max(1e-4) as f32;
+        let strong = 2.0 * (power / weight.max(1.0)).sqrt().max(1e-4).to_f32();
         for f in &mut fine {
             let x = *f / strong;
             *f = relief.amplitude * x / (1.0 + x * x).sqrt();
@@ -97,12 +97,13 @@ impl NormalMap {
         let (width, rows) = height.size();
         let wrap = height.wrap();
         let values = height.values();
-        let get =
-            |x: i32, y: i32| values[wrap.index(y, rows) as usize * width as usize + wrap.index(x, width) as usize];
-        let scale = 0.5 * rows as f32;
+        let get = |x: i32, y: i32| {
+            values[wrap.index(y, rows).to_usize() * width.to_usize() + wrap.index(x, width).to_usize()]
+        };
+        let scale = 0.5 * rows.to_f32();
         let mut plane = Plane { width, height: rows, values: Vec::with_capacity(values.len()) };
-        for y in 0..rows as i32 {
-            for x in 0..width as i32 {
+        for y in 0..rows.to_i32() {
+            for x in 0..width.to_i32() {
                 plane.values.push([(get(x + 1, y) - get(x - 1, y)) * scale, (get(x, y - 1) - get(x, y + 1)) * scale]);
             }
         }
@@ -126,7 +127,7 @@ impl NormalMap {
     #[inline]
     pub fn lod(&self, extent: f32) -> f32 {
         let finest = &self.pyramid.levels[0];
-        (extent * finest.width.max(finest.height) as f32).max(1.0).log2()
+        (extent * finest.width.max(finest.height).to_f32()).max(1.0).log2()
     }
 
     /// Returns the slope (∂h/∂x, ∂h/∂y) at `uv`, with x along +u (right) and y along −v (up the image, towards a leaf's
@@ -157,12 +158,12 @@ impl AmbientOcclusion {
     /// is kept. This is an estimate; ray tracing is more accurate where the relief is geometry.
     fn new(height: &Height) -> Self {
         let (width, rows) = height.size();
-        let size = (width as usize, rows as usize);
-        let texels = rows as f32;
+        let size = (width.to_usize(), rows.to_usize());
+        let texels = rows.to_f32();
         let mut open = vec![[1.0f32]; height.values().len()];
         for radius in [1, 2, 4, 8, 16] {
             let mean = blur(height.values(), size, radius, height.wrap());
-            let r2 = (radius * radius) as f32;
+            let r2 = (radius * radius).to_f32();
             for ((o, m), h) in open.iter_mut().zip(&mean).zip(height.values()) {
                 let d = (1.5 * (m - h) * texels).max(0.0);
                 o[0] = o[0].min(r2 / (r2 + d * d));
@@ -199,15 +200,15 @@ pub(super) fn blur(values: &[f32], (width, height): (usize, usize), radius: usiz
     if radius == 0 {
         return values.to_vec();
     }
-    let r = radius as i32;
-    let scale = 1.0 / (2 * radius + 1) as f32;
-    let at = |i: i32, n: usize| wrap.index(i, n as u32) as usize;
+    let r = radius.to_i32();
+    let scale = 1.0 / (2 * radius + 1).to_f32();
+    let at = |i: i32, n: usize| wrap.index(i, n.to_u32()).to_usize();
     let mut rows = vec![0.0f32; values.len()];
     for (row, out) in values.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
         let mut sum: f64 = (-r..=r).map(|i| f64::from(row[at(i, width)])).sum();
         for (x, o) in out.iter_mut().enumerate() {
-            *o = sum as f32 * scale;
-            let x = x as i32;
+            *o = sum.to_f32() * scale;
+            let x = x.to_i32();
             sum += f64::from(row[at(x + r + 1, width)]) - f64::from(row[at(x - r, width)]);
         }
     }
@@ -220,10 +221,10 @@ pub(super) fn blur(values: &[f32], (width, height): (usize, usize), radius: usiz
         }
     }
     for (y, line) in out.chunks_exact_mut(width).enumerate() {
-        let y = y as i32;
+        let y = y.to_i32();
         let (entering, leaving) = (row(y + r + 1), row(y - r));
         for (x, o) in line.iter_mut().enumerate() {
-            *o = sums[x] as f32 * scale;
+            *o = sums[x].to_f32() * scale;
             sums[x] += f64::from(entering[x]) - f64::from(leaving[x]);
         }
     }

@@ -6,7 +6,7 @@
 
 use super::noise::Perlin;
 use furrow_base::geometry::{AlphaMask, Margin};
-use furrow_base::math::{Vec2, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, smoothstep, vec2};
 use furrow_base::sampling::rng::mix;
 use std::sync::Arc;
 
@@ -49,7 +49,7 @@ impl Patch {
         }
         let q = vec2(q.dot(self.turn) / self.stretch, q.perp_dot(self.turn) * self.stretch);
         let n = noise.at2(f64::from(q.x * 1.3 + self.phase.x), f64::from(q.y * 1.3 + self.phase.y));
-        q.length() / (1.0 + RAGGED * n as f32)
+        q.length() / (1.0 + RAGGED * n.to_f32())
     }
 }
 
@@ -80,7 +80,7 @@ impl Tear {
         if !(-0.6..1.0 + beside / self.length).contains(&s) {
             return false;
         }
-        let stray = 0.8 * noise.at2(f64::from(p.x * 0.35), f64::from(p.y * 0.35)) as f32 * s.max(0.0);
+        let stray = 0.8 * noise.at2(f64::from(p.x * 0.35), f64::from(p.y * 0.35)).to_f32() * s.max(0.0);
         (q.perp_dot(self.along) + stray).abs() < 0.5 * self.width * (1.0 - s.max(0.0)) + beside
     }
 }
@@ -167,7 +167,7 @@ impl Marks {
     pub fn cut(&self, mask: Option<&AlphaMask>) -> AlphaMask {
         let noise = Perlin::new(self.seed);
         // The resolution of a generated texture: about 6 texels per mm.
-        let texels = |mm: f32| ((mm * 6.0) as u32).clamp(64, 1024);
+        let texels = |mm: f32| (mm * 6.0).trunc_to::<u32>().clamp(64, 1024);
         let whole = || AlphaMask::new(texels(self.image_mm.x), texels(self.image_mm.y), |_, _| true);
         let mut left = mask.cloned().unwrap_or_else(whole);
         for hole in &self.holes {
@@ -189,7 +189,7 @@ impl Marks {
     pub fn tissue(&self, uv: Vec2, noise: &Perlin) -> Tissue {
         let p = self.place(uv);
         let n =
-            |scale: f32, shift: f32| noise.at2(f64::from(p.x / scale + shift), f64::from(p.y / scale - shift)) as f32;
+            |scale: f32, shift: f32| noise.at2(f64::from(p.x / scale + shift), f64::from(p.y / scale - shift)).to_f32();
         let mut t = Tissue { shade: 1.0, ..Tissue::default() };
         if self.chlorosis > 0.0 {
             // Patches of one or two cm.
@@ -247,9 +247,10 @@ impl Marks {
         let mut most = 0.0_f32;
         for j in -1..=1 {
             for i in -1..=1 {
-                let c = cell + vec2(i as f32, j as f32);
-                let key = mix(mix(u64::from(self.seed) ^ (c.x as i64 as u64)) ^ (c.y as i64 as u64));
-                let unit = |k: u32| (mix(key.wrapping_add(u64::from(k))) >> 40) as f32 / (1u64 << 24) as f32;
+                let c = cell + vec2(i.to_f32(), j.to_f32());
+                let key = mix(mix(u64::from(self.seed) ^ c.x.trunc_to::<i64>().cast_unsigned())
+                    ^ c.y.trunc_to::<i64>().cast_unsigned());
+                let unit = |k: u32| (mix(key.wrapping_add(u64::from(k))) >> 40).to_f32() / (1u64 << 24).to_f32();
                 if unit(0) >= self.splash {
                     continue;
                 }

@@ -36,7 +36,7 @@ pub use surface::{NormalTexture, Surface, Transmission};
 
 use furrow_base::error::{Error, Result};
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::Vec2;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2};
 use pyramid::{Level, Plane, Pyramid, halve};
 use std::path::Path;
 
@@ -82,17 +82,17 @@ impl Texture {
     /// Creates a texture from rows of R, G, B, A bytes, top row first. Sizes are 1 to [`MAX_SIZE`]; `rgba` holds width
     /// × height × 4 bytes.
     pub fn from_rgba8(width: u32, height: u32, rgba: &[u8], space: ColorSpace) -> Self {
-        assert!(width > 0 && height > 0 && rgba.len() == width as usize * height as usize * 4);
+        assert!(width > 0 && height > 0 && rgba.len() == width.to_usize() * height.to_usize() * 4);
         let table = space.table();
         let bytes = |x: u32, y: u32| -> [u8; 4] {
-            let i = (y as usize * width as usize + x as usize) * 4;
+            let i = (y.to_usize() * width.to_usize() + x.to_usize()) * 4;
             [rgba[i], rgba[i + 1], rgba[i + 2], rgba[i + 3]]
         };
         // Colours are averaged with opacity as weight; otherwise the dark colour of transparent texels would bleed in.
         let weighed = |x, y| {
             let [r, g, b, a] = bytes(x, y);
             let alpha = f32::from(a) / 255.0;
-            [table[r as usize] * alpha, table[g as usize] * alpha, table[b as usize] * alpha, alpha]
+            [table[usize::from(r)] * alpha, table[usize::from(g)] * alpha, table[usize::from(b)] * alpha, alpha]
         };
         let mut planes: Vec<Plane<4>> = Vec::new();
         let mut next = halve(width, height, weighed);
@@ -149,7 +149,7 @@ impl Texture {
     /// Returns the level of detail of a footprint that spans `extent` of uv: 0 for one texel or less, 1 for two texels.
     #[inline]
     pub fn lod(&self, extent: f32) -> f32 {
-        (extent * self.width().max(self.height()) as f32).max(1.0).log2()
+        (extent * self.width().max(self.height()).to_f32()).max(1.0).log2()
     }
 
     /// Returns linear R, G, B and opacity at `uv`, bilinear on the mip level nearest to `lod` (0 is the finest).
@@ -159,7 +159,7 @@ impl Texture {
         let mut sum = [0.0; 4];
         for (texel, weight) in self.pyramid.taps(uv, lod, self.wrap) {
             for i in 0..3 {
-                sum[i] += weight * self.decode[texel[i] as usize];
+                sum[i] += weight * self.decode[usize::from(texel[i])];
             }
             sum[3] += weight * f32::from(texel[3]);
         }
@@ -170,7 +170,7 @@ impl Texture {
     /// Returns linear R, G, B and opacity of a texel of the finest level; x < width, y < height.
     pub fn texel(&self, x: u32, y: u32) -> [f32; 4] {
         let [r, g, b, a] = self.pyramid.levels[0].get(x, y);
-        [self.decode[r as usize], self.decode[g as usize], self.decode[b as usize], f32::from(a) / 255.0]
+        [self.decode[usize::from(r)], self.decode[usize::from(g)], self.decode[usize::from(b)], f32::from(a) / 255.0]
     }
 
     /// Returns the mask of texels that are at least half opaque; `None` if all are.
@@ -188,7 +188,7 @@ impl Texture {
 }
 
 fn alpha_code(alpha: f32) -> u8 {
-    (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+    (alpha.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>()
 }
 
 /// Divides colours by opacity, from the coarsest level down. Texels without opacity get the colour of the coarser texel
@@ -199,7 +199,7 @@ fn bleed(planes: &mut [Plane<4>]) {
         let plane = &mut finer[i];
         for y in 0..plane.height {
             for x in 0..plane.width {
-                let c = &mut plane.values[(y * plane.width + x) as usize];
+                let c = &mut plane.values[(y * plane.width + x).to_usize()];
                 if c[3] > 0.0 {
                     *c = [c[0] / c[3], c[1] / c[3], c[2] / c[3], c[3]];
                 } else if let Some(above) = coarser.first() {

@@ -2,6 +2,7 @@
 
 use ::noise::permutationtable::{NoiseHasher, PermutationTable};
 use ::noise::{NoiseFn, Perlin as Gradient};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use std::f64::consts::SQRT_2;
 
 /// Perlin noise with a seed, with values in about −1..1 and features of size 1. Source: Perlin 1985, improved 2002
@@ -17,7 +18,7 @@ impl Perlin {
     /// Creates the noise from a seed.
     pub fn new(seed: u32) -> Self {
         let table = PermutationTable::new(seed);
-        let order = std::array::from_fn(|k| table.hash(&[k as isize]) as u8);
+        let order = std::array::from_fn(|k| table.hash(&[k.to_isize()]).to_u8());
         Self { solid: Gradient::new(seed), order }
     }
 
@@ -27,14 +28,14 @@ impl Perlin {
     pub fn at2(&self, x: f64, y: f64) -> f64 {
         // Lower corner as in the crate: for zero and negative values the next lower integer, also from an exact
         // integer.
-        let corner = |v: f64| v as i64 - i64::from(v <= 0.0);
+        let corner = |v: f64| v.trunc_to::<i64>() - i64::from(v <= 0.0);
         let (left, top) = (corner(x), corner(y));
-        let (fx, fy) = (x - left as f64, y - top as f64);
+        let (fx, fy) = (x - left.to_f64(), y - top.to_f64());
         let signed = |v: f64, negative: u8| f64::from_bits(v.to_bits() ^ (u64::from(negative) << 63));
         let slope = |right: i64, below: i64| {
-            let column = usize::from(self.order[((left + right) & 0xff) as usize]);
-            let choice = self.order[column ^ ((top + below) & 0xff) as usize];
-            signed(fx - right as f64, choice & 1) + signed(fy - below as f64, (choice >> 1) & 1)
+            let column = usize::from(self.order[((left + right) & 0xff).to_usize()]);
+            let choice = self.order[column ^ ((top + below) & 0xff).to_usize()];
+            signed(fx - right.to_f64(), choice & 1) + signed(fy - below.to_f64(), (choice >> 1) & 1)
         };
         let fade = |t: f64| {
             let t = t.clamp(0.0, 1.0);
@@ -97,14 +98,14 @@ impl Tiling {
         let (fx, fy) = (x - x0, y - y0);
         let fade = |t: f32| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
         let ends = |i: f32| {
-            let i = (i as i64).rem_euclid(i64::from(period)) as u64;
+            let i = i.trunc_to::<i64>().rem_euclid(i64::from(period)).to_u64();
             [i, if i + 1 == u64::from(period) { 0 } else { i + 1 }]
         };
         let (xs, ys) = (ends(x0), ends(y0));
         let corner = |dx: usize, dy: usize| {
             let h = furrow_base::sampling::rng::mix(self.0 ^ (xs[dx] << 32 | ys[dy]));
-            let (gx, gy) = DIRECTIONS[(h >> 60) as usize];
-            gx * (fx - dx as f32) + gy * (fy - dy as f32)
+            let (gx, gy) = DIRECTIONS[(h >> 60).to_usize()];
+            gx * (fx - dx.to_f32()) + gy * (fy - dy.to_f32())
         };
         let (u, v) = (fade(fx), fade(fy));
         let top = corner(0, 0) * (1.0 - u) + corner(1, 0) * u;
@@ -117,7 +118,7 @@ impl Tiling {
         let (mut sum, mut amplitude, mut total, mut scale) = (0.0, 1.0, 0.0, 1u32);
         for octave in 0..octaves {
             let layer = Self(self.0.wrapping_add(u64::from(octave)));
-            sum += amplitude * layer.at(x * scale as f32, y * scale as f32, period * scale);
+            sum += amplitude * layer.at(x * scale.to_f32(), y * scale.to_f32(), period * scale);
             total += amplitude;
             amplitude *= gain;
             scale *= 2;

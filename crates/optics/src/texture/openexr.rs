@@ -10,6 +10,7 @@ use exr::meta::MetaData;
 use exr::meta::attribute::EnvironmentMap;
 use exr::meta::header::Header;
 use exr::prelude::{ReadChannels, ReadLayers, read};
+use furrow_base::math::ToInt;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
@@ -124,7 +125,7 @@ impl Window {
             window = Self { size: stored, first: (0, 0), stored };
         }
         check(window.size.0, window.size.1)?;
-        let beside = |first: i64, stored: usize, size: usize| first >= size as i64 || first + stored as i64 <= 0;
+        let beside = |first: i64, stored: usize, size: usize| first >= size.to_i64() || first + stored.to_i64() <= 0;
         if beside(window.first.0, stored.0, window.size.0) || beside(window.first.1, stored.1, window.size.1) {
             return Err("its data window lies outside its display window".into());
         }
@@ -138,12 +139,12 @@ impl Window {
         }
         let mut all = vec![0.0; self.size.0 * self.size.1];
         let clip = |first: i64, stored: usize, size: usize| {
-            (first.max(0) as usize)..((first + stored as i64).clamp(0, size as i64) as usize)
+            first.max(0).to_usize()..(first + stored.to_i64()).clamp(0, size.to_i64()).to_usize()
         };
         let columns = clip(self.first.0, self.stored.0, self.size.0);
         for y in clip(self.first.1, self.stored.1, self.size.1) {
-            let row = (y as i64 - self.first.1) as usize * self.stored.0;
-            let from = row + (columns.start as i64 - self.first.0) as usize;
+            let row = (y.to_i64() - self.first.1).to_usize() * self.stored.0;
+            let from = row + (columns.start.to_i64() - self.first.0).to_usize();
             all[y * self.size.0..][columns.clone()].copy_from_slice(&values[from..from + columns.len()]);
         }
         all
@@ -155,12 +156,13 @@ mod tests {
     use super::*;
     use exr::meta::attribute::Chromaticities;
     use exr::prelude::*;
+    use furrow_base::math::ToFloat;
 
     /// Returns a file of one layer that covers `data` (x, y, width, height) of a display window of `display`.
     fn file(channels: &[(&str, f32)], [x, y, w, h]: [i32; 4], display: (usize, usize), encoding: Encoding) -> Vec<u8> {
-        let size = (w as usize, h as usize);
+        let size = (w.to_usize(), h.to_usize());
         // Values count up from the first pixel.
-        let values = |first: f32| (0..size.0 * size.1).map(|k| first + k as f32).collect();
+        let values = |first: f32| (0..size.0 * size.1).map(|k| first + k.to_f32()).collect();
         let list = channels.iter().map(|(name, first)| AnyChannel::new(*name, FlatSamples::F32(values(*first))));
         let attributes = LayerAttributes { layer_position: Vec2(x, y), ..LayerAttributes::default() };
         let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(list.collect()));
@@ -198,7 +200,7 @@ mod tests {
         let down = Encoding { line_order: LineOrder::Decreasing, ..Encoding::SMALL_FAST_LOSSLESS };
         for encoding in [Encoding::UNCOMPRESSED, tiled, down] {
             let of = decode(&file(&RGB, [0, 0, 8, 4], (8, 4), encoding)).unwrap();
-            let expected: Vec<f32> = (1..=32).map(|k| k as f32).collect();
+            let expected: Vec<f32> = (1..=32).map(ToFloat::to_f32).collect();
             assert_eq!(of.rgb.iter().map(|c| c[0]).collect::<Vec<_>>(), expected, "{encoding:?}");
         }
     }
@@ -210,7 +212,7 @@ mod tests {
         };
         let layer = |layer: &str| ["R", "G", "B", "NIR"].map(|name| format!("{layer}.{name}"));
         let [one, other] = [layer("View.Combined"), layer("Noise")];
-        let four = |names: &[String; 4]| (0..4).map(|k| (names[k].clone(), k as f32)).collect::<Vec<_>>();
+        let four = |names: &[String; 4]| (0..4).map(|k| (names[k].clone(), k.to_f32())).collect::<Vec<_>>();
         let named =
             |all: &[(String, f32)]| found(&all.iter().map(|(name, first)| (name.as_str(), *first)).collect::<Vec<_>>());
         assert_eq!(named(&four(&one)), Ok(([0.0, 1.0, 2.0], Some(vec![3.0, 4.0]))));

@@ -8,6 +8,7 @@ use super::openexr;
 use super::rgbe;
 use super::texels::check;
 use furrow_base::input;
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use std::path::Path;
 
@@ -70,12 +71,12 @@ impl Panorama {
     fn halved(&self) -> Self {
         let (width, height) = (self.width / 2, self.height / 2);
         // The solid angle of a row is in proportion to the sine of the zenith angle at its middle.
-        let sine = |row: usize| (std::f64::consts::PI * (row as f64 + 0.5) / self.height as f64).sin();
+        let sine = |row: usize| (std::f64::consts::PI * (row.to_f64() + 0.5) / self.height.to_f64()).sin();
         let mean = |k: usize, value: &dyn Fn(usize) -> f32| {
             let (row, at) = (k / width * 2, k / width * 2 * self.width + k % width * 2);
             let (upper, lower) = (sine(row), sine(row + 1));
             let pair = |at: usize| f64::from(value(at)) + f64::from(value(at + 1));
-            (0.5 * (upper * pair(at) + lower * pair(at + self.width)) / (upper + lower)) as f32
+            (0.5 * (upper * pair(at) + lower * pair(at + self.width)) / (upper + lower)).to_f32()
         };
         let color = |k: usize| std::array::from_fn(|band| mean(k, &|at| self.rgb[at][band]));
         let single = |nir: &Vec<f32>| (0..width * height).map(|k| mean(k, &|at| nir[at])).collect();
@@ -104,8 +105,8 @@ mod tests {
             let bytes = radiance(8192, 4096, sun(row));
             let of = Panorama::decode(&bytes).unwrap();
             assert_eq!((of.width, of.height), (2048, 1024));
-            let cosine = |row: usize, height: usize| (std::f64::consts::PI * row as f64 / height as f64).cos();
-            let solid = |row: usize, height: usize| (cosine(row, height) - cosine(row + 1, height)) / height as f64;
+            let cosine = |row: usize, height: usize| (std::f64::consts::PI * row.to_f64() / height.to_f64()).cos();
+            let solid = |row: usize, height: usize| (cosine(row, height) - cosine(row + 1, height)) / height.to_f64();
             let light = |band: usize| {
                 let lit = of.rgb.iter().enumerate().map(|(k, c)| f64::from(c[band]) * solid(k / 2048, 1024));
                 lit.sum::<f64>()

@@ -4,7 +4,7 @@
 //! background is plain, such as paper.
 
 use super::grid::{flood, middle};
-use furrow_base::math::Vec2;
+use furrow_base::math::{ToFloat, ToInt, Vec2};
 
 /// Largest half width of a petiole relative to the square root of the blade's area.
 const THIN: f32 = 0.05;
@@ -28,7 +28,7 @@ pub(super) struct Petiole {
 /// Returns the petiole of the leaf with these pixels.
 pub(super) fn find(rgb: &[[u8; 3]], leaf: &[bool], width: usize, height: usize) -> Option<Petiole> {
     let object = object(rgb, leaf, width, height);
-    let size = (leaf.iter().filter(|inside| **inside).count() as f32).sqrt();
+    let size = leaf.iter().filter(|inside| **inside).count().to_f32().sqrt();
     let radius = THIN * size;
     // Opening: what a disc of this radius can reach within the object.
     let inner = distance(width, height, |i| !object[i]);
@@ -70,11 +70,11 @@ fn stalk(
     if touching.is_empty() {
         return None;
     }
-    let foot = touching.iter().sum::<Vec2>() / touching.len() as f32;
+    let foot = touching.iter().sum::<Vec2>() / touching.len().to_f32();
     let away = |i: &usize| (middle(*i, width) - foot).length();
     let length = pixels.iter().map(away).fold(0.0, f32::max);
     let within = |from: f32, to: f32| {
-        pixels.iter().map(away).filter(|d| (from * length..=to * length).contains(d)).count() as f32
+        pixels.iter().map(away).filter(|d| (from * length..=to * length).contains(d)).count().to_f32()
     };
     (length >= shortest && within(0.75, 1.0) >= BLUNT * within(0.25, 0.5)).then_some((length, foot))
 }
@@ -113,21 +113,21 @@ fn distance(width: usize, height: usize, goal: impl Fn(usize) -> bool) -> Vec<f3
     const FAR: u32 = u32::MAX / 2;
     let mut all: Vec<u32> = (0..width * height).map(|i| if goal(i) { 0 } else { FAR }).collect();
     let relax = |all: &mut [u32], i: usize, x: isize, y: isize, step: u32| {
-        if (0..width as isize).contains(&x) && (0..height as isize).contains(&y) {
-            all[i] = all[i].min(all[y as usize * width + x as usize].saturating_add(step));
+        if (0..width.to_isize()).contains(&x) && (0..height.to_isize()).contains(&y) {
+            all[i] = all[i].min(all[y.to_usize() * width + x.to_usize()].saturating_add(step));
         }
     };
     for i in 0..all.len() {
-        let (x, y) = ((i % width) as isize, (i / width) as isize);
+        let (x, y) = ((i % width).to_isize(), (i / width).to_isize());
         for (dx, dy, step) in [(-1, 0, 3), (-1, -1, 4), (0, -1, 3), (1, -1, 4)] {
             relax(&mut all, i, x + dx, y + dy, step);
         }
     }
     for i in (0..all.len()).rev() {
-        let (x, y) = ((i % width) as isize, (i / width) as isize);
+        let (x, y) = ((i % width).to_isize(), (i / width).to_isize());
         for (dx, dy, step) in [(1, 0, 3), (1, 1, 4), (0, 1, 3), (-1, 1, 4)] {
             relax(&mut all, i, x + dx, y + dy, step);
         }
     }
-    all.into_iter().map(|d| if d >= FAR { f32::INFINITY } else { d as f32 / 3.0 }).collect()
+    all.into_iter().map(|d| if d >= FAR { f32::INFINITY } else { d.to_f32() / 3.0 }).collect()
 }

@@ -1,7 +1,7 @@
 //! Mip pyramids in memory. Each level is half the size of the finer one. Texels are stored in 4×4 tiles, so a bilinear
 //! lookup touches one or two cache lines.
 
-use furrow_base::math::Vec2;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2};
 
 /// Wrap mode: the values outside uv ∈ [0, 1]².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,10 +20,10 @@ impl Wrap {
     #[inline]
     pub fn index(self, i: i32, n: u32) -> u32 {
         match self {
-            Self::Clamp => i.clamp(0, n as i32 - 1) as u32,
-            Self::Repeat => i.rem_euclid(n as i32) as u32,
+            Self::Clamp => i.clamp(0, n.to_i32() - 1).to_u32(),
+            Self::Repeat => i.rem_euclid(n.to_i32()).to_u32(),
             Self::Mirror => {
-                let i = i.rem_euclid(2 * n as i32) as u32;
+                let i = i.rem_euclid(2 * n.to_i32()).to_u32();
                 i.min(2 * n - 1 - i)
             }
         }
@@ -46,14 +46,14 @@ impl Wrap {
     /// weight of the second.
     #[inline]
     pub(super) fn pair(self, x: f32, n: u32) -> (u32, u32, f32) {
-        let place = self.coordinate(x) * n as f32 - 0.5;
+        let place = self.coordinate(x) * n.to_f32() - 0.5;
         let floor = place.floor();
-        let i = floor as i32;
+        let i = floor.trunc_to::<i32>();
         // A repeated coordinate is at most one texel outside, so no division is needed.
         let index = |i: i32| match self {
             Self::Repeat if i < 0 => n - 1,
-            Self::Repeat if i as u32 >= n => 0,
-            Self::Repeat => i as u32,
+            Self::Repeat if i.to_u32() >= n => 0,
+            Self::Repeat => i.to_u32(),
             // A mirrored image continues with its own edge.
             Self::Clamp | Self::Mirror => Self::Clamp.index(i, n),
         };
@@ -74,7 +74,7 @@ impl<T: Copy> Level<T> {
     /// Creates the level from the value of each texel (x, y); tile texels beyond the edge repeat the last one.
     pub(super) fn new(width: u32, height: u32, value: impl Fn(u32, u32) -> T) -> Self {
         let (tiles_x, tiles_y) = (width.div_ceil(4), height.div_ceil(4));
-        let mut texels = Vec::with_capacity((tiles_x * tiles_y * 16) as usize);
+        let mut texels = Vec::with_capacity((tiles_x * tiles_y * 16).to_usize());
         for tile in 0..tiles_x * tiles_y {
             let (x0, y0) = (tile % tiles_x * 4, tile / tiles_x * 4);
             for i in 0..16 {
@@ -86,7 +86,7 @@ impl<T: Copy> Level<T> {
 
     #[inline]
     pub(super) fn get(&self, x: u32, y: u32) -> T {
-        self.texels[(((y >> 2) * self.tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3)) as usize]
+        self.texels[(((y >> 2) * self.tiles_x + (x >> 2)) * 16 + (y & 3) * 4 + (x & 3)).to_usize()]
     }
 }
 
@@ -101,7 +101,7 @@ impl<T: Copy> Pyramid<T> {
     #[inline]
     pub(super) fn taps(&self, uv: Vec2, lod: f32, [across, down]: [Wrap; 2]) -> [(T, f32); 4] {
         // `max` comes first so that NaN selects the finest level.
-        let level = &self.levels[((lod.max(0.0) + 0.5) as usize).min(self.levels.len() - 1)];
+        let level = &self.levels[(lod.max(0.0) + 0.5).trunc_to::<usize>().min(self.levels.len() - 1)];
         let (x0, x1, fx) = across.pair(uv.x, level.width);
         let (y0, y1, fy) = down.pair(uv.y, level.height);
         [
@@ -123,7 +123,7 @@ pub(super) struct Plane<const N: usize> {
 impl<const N: usize> Plane<N> {
     #[inline]
     pub(super) fn get(&self, x: u32, y: u32) -> [f32; N] {
-        self.values[(y * self.width + x) as usize]
+        self.values[(y * self.width + x).to_usize()]
     }
 }
 
@@ -135,14 +135,14 @@ pub(super) fn halve<const N: usize>(width: u32, height: u32, value: impl Fn(u32,
     }
     let (w, h) = ((width / 2).max(1), (height / 2).max(1));
     let columns: Vec<_> = (0..w).map(|x| spans(x, width, w)).collect();
-    let mut values = Vec::with_capacity((w * h) as usize);
+    let mut values = Vec::with_capacity((w * h).to_usize());
     for y in 0..h {
         let rows = spans(y, height, h);
         for column in &columns {
             let mut sum = [0.0; N];
             for (dy, wy) in rows.weights.iter().enumerate().take(rows.count) {
                 for (dx, wx) in column.weights.iter().enumerate().take(column.count) {
-                    let v = value(column.first + dx as u32, rows.first + dy as u32);
+                    let v = value(column.first + dx.to_u32(), rows.first + dy.to_u32());
                     let weight = wx * wy;
                     for (s, v) in sum.iter_mut().zip(v) {
                         *s += weight * v;
@@ -165,11 +165,11 @@ struct Spans {
 fn spans(i: u32, n: u32, m: u32) -> Spans {
     let scale = f64::from(n) / f64::from(m);
     let (start, end) = (f64::from(i) * scale, (f64::from(i) * scale + scale).min(f64::from(n)));
-    let first = (start + 1e-9) as u32;
+    let first = (start + 1e-9).trunc_to::<u32>();
     let mut spans = Spans { first, count: 0, weights: [0.0; 4] };
     let mut at = f64::from(first);
     while at < end - 1e-9 && spans.count < 4 {
-        spans.weights[spans.count] = (((at + 1.0).min(end) - at.max(start)) / scale) as f32;
+        spans.weights[spans.count] = (((at + 1.0).min(end) - at.max(start)) / scale).to_f32();
         spans.count += 1;
         at += 1.0;
     }

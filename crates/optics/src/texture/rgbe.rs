@@ -7,6 +7,7 @@
 
 use super::primaries::{Primaries, convert};
 use super::texels::{Texels, check};
+use furrow_base::math::ToInt;
 use image::DynamicImage;
 use image::codecs::hdr::HdrDecoder;
 use std::io::{BufRead, Cursor, Read};
@@ -48,13 +49,13 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Texels, String> {
     // The pixels again under a header that the decoder knows.
     let (across, down) = if header.order.by_column { (height, width) } else { (width, height) };
     let usual = format!("#?RADIANCE\n\n-Y {down} +X {across}\n");
-    let pixels = &bytes[source.position() as usize..];
+    let pixels = &bytes[source.position().to_usize()..];
     let decoder = HdrDecoder::new(usual.as_bytes().chain(pixels)).map_err(|e| e.to_string())?;
     let stored = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
     let factors = header.exposure.map(|exposure| 1.0 / exposure);
     let pixel = |k: usize| {
         let (x, y) = header.order.place(k % width, k / width, (width, height));
-        let stored = stored.get_pixel(x as u32, y as u32).0;
+        let stored = stored.get_pixel(x.to_u32(), y.to_u32()).0;
         std::array::from_fn(|band| stored[band] * factors[band])
     };
     let mut rgb: Vec<[f32; 3]> = (0..width * height).map(pixel).collect();
@@ -117,7 +118,7 @@ fn resolution(line: &str) -> Result<(Order, (usize, usize)), String> {
     let wrong = || format!("its resolution `{line}` cannot be read");
     let words: Vec<&str> = line.split_whitespace().collect();
     let [first, many, second, few] = words[..] else { return Err(wrong()) };
-    let [many, few] = [many, few].map(|n| n.parse::<u32>().map(|n| n as usize));
+    let [many, few] = [many, few].map(|n| n.parse::<u32>().map(ToInt::to_usize));
     let (many, few) = (many.map_err(|_| wrong())?, few.map_err(|_| wrong())?);
     let from = |axis: &str| Some((axis == "-X", axis == "+Y")).filter(|_| ["-X", "+X", "-Y", "+Y"].contains(&axis));
     let ((right, below), (right_too, below_too)) = from(first).zip(from(second)).ok_or_else(wrong)?;

@@ -1,5 +1,6 @@
 //! Conversion between 8-bit codes and linear values by lookup tables. Source: IEC 61966-2-1.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use std::sync::LazyLock;
 
 /// Encoding of 8-bit values.
@@ -11,19 +12,19 @@ pub enum ColorSpace {
     Linear,
 }
 
-static FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| decode(i as f32 / 255.0)));
-static FROM_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
+static FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| decode(i.to_f32() / 255.0)));
+static FROM_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i.to_f32() / 255.0));
 /// Linear value above which code i + 1 is closer than code i.
-static SRGB_STEPS: LazyLock<[f32; 255]> = LazyLock::new(|| std::array::from_fn(|i| decode((i as f32 + 0.5) / 255.0)));
+static SRGB_STEPS: LazyLock<[f32; 255]> = LazyLock::new(|| std::array::from_fn(|i| decode((i.to_f32() + 0.5) / 255.0)));
 /// Initial guess of the code for each of 4096 linear values.
 static SRGB_GUESS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut code = 0;
     (0..4096)
         .map(|i| {
-            while code < 255 && i as f32 / 4095.0 > SRGB_STEPS[code] {
+            while code < 255 && i.to_f32() / 4095.0 > SRGB_STEPS[code] {
                 code += 1;
             }
-            code as u8
+            code.to_u8()
         })
         .collect()
 });
@@ -46,13 +47,13 @@ impl ColorSpace {
     pub fn encode(self, linear: f32) -> u8 {
         let x = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
         match self {
-            Self::Linear => (x * 255.0 + 0.5) as u8,
+            Self::Linear => (x * 255.0 + 0.5).trunc_to::<u8>(),
             Self::Srgb => {
-                let mut code = SRGB_GUESS[(x * 4095.0) as usize] as usize;
+                let mut code = usize::from(SRGB_GUESS[(x * 4095.0).trunc_to::<usize>()]);
                 while code < 255 && x > SRGB_STEPS[code] {
                     code += 1;
                 }
-                code as u8
+                code.to_u8()
             }
         }
     }
@@ -66,7 +67,7 @@ mod tests {
     fn every_code_survives_the_round_trip() {
         for space in [ColorSpace::Srgb, ColorSpace::Linear] {
             for code in 0..=255u8 {
-                assert_eq!(space.encode(space.table()[code as usize]), code, "{space:?}");
+                assert_eq!(space.encode(space.table()[usize::from(code)]), code, "{space:?}");
             }
             assert_eq!((space.encode(-1.0), space.encode(f32::NAN), space.encode(9.0)), (0, 0, 255));
         }

@@ -2,14 +2,14 @@
 
 use super::*;
 use furrow_base::error::Kind;
-use furrow_base::math::vec2;
+use furrow_base::math::{ToFloat, ToInt, vec2};
 
 /// Returns a green disc on transparent black with an odd size.
 fn disc() -> Texture {
     let (w, h) = (101u32, 67u32);
     let rgba: Vec<u8> = (0..w * h)
         .flat_map(|i| {
-            let (x, y) = ((i % w) as f32 - 50.0, (i / w) as f32 - 33.0);
+            let (x, y) = ((i % w).to_f32() - 50.0, (i / w).to_f32() - 33.0);
             if x.hypot(y) < 25.0 { [40, 120, 20, 255] } else { [0, 0, 0, 0] }
         })
         .collect();
@@ -22,7 +22,7 @@ fn colour_bleeds_into_what_is_transparent() {
     let centre = t.sample(vec2(0.5, 0.5), 0.0);
     for lod in [0.0, 1.0, 2.0, 4.0, 9.0] {
         for i in 0..50 {
-            let c = t.sample(vec2(0.02 * i as f32, 0.31), lod);
+            let c = t.sample(vec2(0.02 * i.to_f32(), 0.31), lod);
             for k in 0..3 {
                 // Within one 8-bit code: there is no dark fringe.
                 assert!((c[k] - centre[k]).abs() < 0.004, "{lod} {i}: {c:?} {centre:?}");
@@ -39,7 +39,7 @@ fn every_level_keeps_the_mean() {
             .flat_map(|y| (0..level.width).map(move |x| (x, y)))
             .map(|(x, y)| u64::from(level.get(x, y)[3]))
             .sum();
-        sum as f64 / f64::from(level.width * level.height)
+        sum.to_f64() / f64::from(level.width * level.height)
     };
     let first = mean(&t.pyramid.levels[0]);
     for level in &t.pyramid.levels {
@@ -95,7 +95,7 @@ fn hill(wrap: Wrap) -> Height {
     let (w, h) = (96u32, 64u32);
     let values = (0..w * h)
         .map(|i| {
-            let (x, y) = (((i % w) as f32 + 0.5 - 48.0) / 64.0, ((i / w) as f32 + 0.5 - 32.0) / 64.0);
+            let (x, y) = (((i % w).to_f32() + 0.5 - 48.0) / 64.0, ((i / w).to_f32() + 0.5 - 32.0) / 64.0);
             0.1 * (-(x * x + y * y) * 40.0).exp()
         })
         .collect();
@@ -140,7 +140,7 @@ fn a_pale_vein_is_impressed() {
 
 #[test]
 fn maps_take_no_longer_for_coarse_features_than_for_fine_ones() {
-    let rgba: Vec<u8> = (0..1024u32 * 1024).flat_map(|i| [(i % 251) as u8, (i % 13) as u8 * 9, 40, 255]).collect();
+    let rgba: Vec<u8> = (0..1024u32 * 1024).flat_map(|i| [(i % 251).to_u8(), (i % 13).to_u8() * 9, 40, 255]).collect();
     let texture = Texture::from_rgba8(1024, 1024, &rgba, ColorSpace::Srgb);
     let derive = |coarsest: f32| {
         let start = std::time::Instant::now();

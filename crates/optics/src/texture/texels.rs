@@ -1,5 +1,7 @@
 //! Decoded pixels of an environment map file.
 
+use furrow_base::math::ToInt;
+
 /// Pixel values as stored in the file.
 #[derive(Debug, PartialEq)]
 pub(super) struct Texels {
@@ -19,7 +21,7 @@ pub(super) fn check(width: usize, height: usize) -> Result<(), String> {
     if !is_equirectangular(width, height) {
         return Err(format!("it has {width} × {height} pixels; an equirectangular image is twice as wide as high"));
     }
-    if width > super::MAX_SIZE as usize {
+    if width > super::MAX_SIZE.to_usize() {
         return Err(format!("it has {width} columns; at most {} can be read", super::MAX_SIZE));
     }
     Ok(())

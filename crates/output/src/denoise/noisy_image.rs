@@ -1,5 +1,7 @@
 //! Input of one denoising step: an image and its guides.
 
+use furrow_base::math::ToInt;
+
 /// Red, green and blue, or the three components of a normal.
 pub(super) type Rgb = [f32; 3];
 
@@ -28,7 +30,7 @@ impl NoisyImage<'_> {
     /// # Panics
     /// Panics if a layer has another number of pixels.
     pub(super) fn pixels(&self) -> usize {
-        let count = self.size[0] as usize * self.size[1] as usize;
+        let count = self.size[0].to_usize() * self.size[1].to_usize();
         let whole = |image: &[Rgb]| assert_eq!(image.len(), count, "a picture of {:?} pixels", self.size);
         whole(self.noisy);
         if let Kind::Radiance { albedo, normal } = self.kind {

@@ -3,6 +3,7 @@
 //! Source: Open Image Denoise, documentation, "oidnDenoise"; PFM as defined by Debevec's HDR Shop.
 
 use super::noisy_image::{Kind, NoisyImage, Rgb};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -74,7 +75,7 @@ fn scratch(within: &Path) -> Result<tempfile::TempDir> {
 /// Encodes a colour PFM in little-endian single precision; its rows go from bottom to top.
 fn write_pfm(pixels: &[Rgb], width: u32, height: u32) -> Vec<u8> {
     let mut bytes = format!("PF\n{width} {height}\n-1.0\n").into_bytes();
-    for row in pixels.chunks(width as usize).rev() {
+    for row in pixels.chunks(width.to_usize()).rev() {
         bytes.extend(row.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
     }
     bytes
@@ -86,18 +87,19 @@ fn read_pfm(bytes: &[u8], width: u32, height: u32) -> Option<Vec<Rgb>> {
     let mut word = || std::str::from_utf8(lines.next()?).ok();
     let (kind, size, scale) = (word()?, word()?, word()?);
     let right = kind == "PF" && size == format!("{width} {height}") && scale.parse::<f32>().ok()? < 0.0;
-    let data = lines.next().filter(|d| right && d.len() == 12 * width as usize * height as usize)?;
+    let data = lines.next().filter(|d| right && d.len() == 12 * width.to_usize() * height.to_usize())?;
     let values: Vec<f32> = data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    Some(values.as_chunks::<3>().0.chunks(width as usize).rev().flatten().copied().collect())
+    Some(values.as_chunks::<3>().0.chunks(width.to_usize()).rev().flatten().copied().collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
 
     #[test]
     fn a_picture_comes_back_from_pfm() {
-        let pixels: Vec<Rgb> = (0..6).map(|i| [i as f32, -0.5, 1e-3 * i as f32]).collect();
+        let pixels: Vec<Rgb> = (0..6).map(|i| [i.to_f32(), -0.5, 1e-3 * i.to_f32()]).collect();
         let bytes = write_pfm(&pixels, 3, 2);
         assert_eq!(read_pfm(&bytes, 3, 2), Some(pixels));
         assert_eq!(read_pfm(&bytes, 2, 3), None);

@@ -7,6 +7,7 @@
 //! Source: Friedman & Jones, "Fully automatic ID mattes with support for motion blur and transparency", 2015;
 //! Cryptomatte specification 1.2.0. IDs: MurmurHash3, 32 bits, seed 0, Appleby 2011.
 
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_render::film::{Film, Tally};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -39,7 +40,7 @@ pub(super) fn matte(layer: &str, film: &Film, names: &[String]) -> Matte {
             let place = group * IN_GROUP + k / 2;
             let value = |(found, samples): (&Ranked, u32)| match found.get(place) {
                 Some((id, _)) if k % 2 == 0 => f32::from_bits(*id),
-                Some((_, count)) => (f64::from(*count) / f64::from(samples.max(1))) as f32,
+                Some((_, count)) => (f64::from(*count) / f64::from(samples.max(1))).to_f32(),
                 None => 0.0,
             };
             let pixels = ranked.iter().zip(film.pixels.iter().map(|p| p.samples));
@@ -92,7 +93,7 @@ type Ranked = SmallVec<[(u32, u32); 2]>;
 fn rank(tally: &Tally, ids: &[u32]) -> Ranked {
     let mut found = Ranked::new();
     for (part, count) in tally.iter() {
-        let id = ids[part as usize];
+        let id = ids[part.to_usize()];
         match found.iter_mut().find(|(other, _)| *other == id) {
             Some((_, sum)) => *sum += count,
             None => found.push((id, count)),
@@ -121,7 +122,7 @@ fn hash(bytes: &[u8]) -> u32 {
         h = h.rotate_left(13).wrapping_mul(5).wrapping_add(0xe6546b64);
     }
     h ^= scramble(tail.iter().rev().fold(0, |k, byte| k << 8 | u32::from(*byte)));
-    h ^= bytes.len() as u32;
+    h ^= bytes.len().to_u32();
     h = (h ^ h >> 16).wrapping_mul(0x85ebca6b);
     h = (h ^ h >> 13).wrapping_mul(0xc2b2ae35);
     h ^ h >> 16

@@ -11,7 +11,7 @@ mod order;
 
 use exr::prelude::*;
 use furrow_base::geometry::Window;
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::{Error, Result};
 use furrow_optics::texture::exr_size;
 use furrow_render::film::Film;
@@ -186,7 +186,7 @@ pub fn decode_geometry(path: &Path, bytes: Vec<u8>) -> Result<Geometry> {
         let (x, y, z) = (values("normal.X")?, values("normal.Y")?, values("normal.Z")?);
         normals = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect();
     }
-    Ok((layer.size.0 as u32, layer.size.1 as u32, depth, normals))
+    Ok((layer.size.0.to_u32(), layer.size.1.to_u32(), depth, normals))
 }
 
 fn write(w: Window, channels: Channels, text: &str) -> Result<Vec<u8>> {
@@ -203,7 +203,7 @@ fn write_with(
 ) -> Result<Vec<u8>> {
     let failed = |e: &dyn std::fmt::Display| Error::failed(format!("cannot encode an EXR: {e}"));
     let mut attributes = LayerAttributes {
-        layer_position: Vec2(w.x0 as i32, w.y0 as i32),
+        layer_position: Vec2(w.x0.to_i32(), w.y0.to_i32()),
         comments: Text::new_or_none(text),
         ..LayerAttributes::default()
     };
@@ -216,7 +216,7 @@ fn write_with(
     // Rows in increasing order, independent of the thread that compressed them, so that equal runs write equal bytes.
     let encoding =
         Encoding { compression, blocks: Blocks::ScanLines, line_order: exr::prelude::attribute::LineOrder::Increasing };
-    let size = Vec2(w.width() as usize, w.height() as usize);
+    let size = Vec2(w.width().to_usize(), w.height().to_usize());
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write().to_unbuffered(&mut bytes).map_err(|e| failed(&e))?;

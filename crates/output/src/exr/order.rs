@@ -5,6 +5,8 @@
 //! zero. The order has no meaning, and sorting preserves the header's length, on which the offsets of the following row
 //! table depend. Source: OpenEXR file layout, "Header".
 
+use furrow_base::math::ToInt;
+
 /// Length of magic number and version.
 const PREFIX: usize = 8;
 
@@ -15,7 +17,7 @@ pub(super) fn sorted(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     while *bytes.get(at)? != 0 {
         let name = text_end(&bytes, at)?;
         let kind = text_end(&bytes, name)?;
-        let length = u32::from_le_bytes(bytes.get(kind..kind + 4)?.try_into().ok()?) as usize;
+        let length = u32::from_le_bytes(bytes.get(kind..kind + 4)?.try_into().ok()?).to_usize();
         let end = kind + 4 + length;
         attributes.push(bytes.get(at..end)?);
         at = end;
@@ -39,7 +41,7 @@ mod tests {
     #[test]
     fn attributes_are_sorted_and_nothing_else_moves() {
         let attribute = |name: &str, value: &[u8]| {
-            [name.as_bytes(), b"\0string\0", &(value.len() as u32).to_le_bytes(), value].concat()
+            [name.as_bytes(), b"\0string\0", &value.len().to_u32().to_le_bytes(), value].concat()
         };
         let (a, b) = (attribute("a/long/name", b"12\x00345"), attribute("b", b""));
         let file = |header: [&[u8]; 2]| [b"magicver".as_slice(), header[0], header[1], b"\0rest"].concat();

@@ -4,7 +4,7 @@ use super::pack::Pack;
 use crate::png::{self, ImageData};
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, ToInt, Vec3};
 use furrow_grow::model::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, Image, LINEAR, LINEAR_MIPMAP_LINEAR, Material,
     NEAREST, NormalInfo, Pbr, Sampler, Texture, TextureInfo,
@@ -46,7 +46,7 @@ struct SharedImage<'a> {
 }
 
 fn address(mask: Option<&Arc<AlphaMask>>) -> usize {
-    mask.map_or(0, |m| Arc::as_ptr(m) as usize)
+    mask.map_or(0, |m| Arc::as_ptr(m).addr())
 }
 
 impl<'a> Materials<'a> {
@@ -68,14 +68,15 @@ impl<'a> Materials<'a> {
     fn swatches(&self) -> BTreeMap<u32, Swatch<'a>> {
         let scene = self.scene;
         let worn: BTreeSet<u32> = self.worn.iter().map(|(material, ..)| *material).collect();
-        worn.into_iter().map(|material| (material, scene.materials[material as usize].swatch())).collect()
+        worn.into_iter().map(|material| (material, scene.materials[material.to_usize()].swatch())).collect()
     }
 
     /// Writes materials, textures, samplers and images.
     pub(super) fn write(&self, document: &mut Document, pack: &mut Pack) -> Result<()> {
         let scene = self.scene;
         let swatches = self.swatches();
-        let dye = |material: u32, tint| swatches[&material].dyed(scene.materials[material as usize].tint_factors(tint));
+        let dye =
+            |material: u32, tint| swatches[&material].dyed(scene.materials[material.to_usize()].tint_factors(tint));
         let mut sheets: BTreeMap<Key, SharedImage<'a>> = BTreeMap::new();
         // Numbered by first use, because addresses differ from run to run and files must not.
         let mut order: Vec<Key> = Vec::new();
@@ -84,7 +85,7 @@ impl<'a> Materials<'a> {
             let key = key(swatch, *mask, i);
             let sheet = sheets.entry(key).or_insert_with(|| {
                 order.push(key);
-                let own = scene.materials[*material as usize].swatch();
+                let own = scene.materials[material.to_usize()].swatch();
                 // A plain colour shares no image, so the tinted colour itself is used.
                 let mean = || [dye.mean.reflectance, dye.mean.transmittance].map(|s| s.0.truncate());
                 let most = if own.size.is_some() { most(&own) } else { mean() };
@@ -202,7 +203,7 @@ impl SharedImage<'_> {
         let (sw, sh) = self.swatch.size.unwrap_or((1, 1));
         // The mask's size is used if it differs from the image's; the image is then sampled by its nearest texels.
         let tone = |x: u32, y: u32| self.swatch.texel(scaled(x, w, sw), scaled(y, h, sh));
-        let opacity = |x: u32, y: u32| if self.mask.is_none_or(|m| m.texel(x as i32, y as i32)) { 255 } else { 0 };
+        let opacity = |x: u32, y: u32| if self.mask.is_none_or(|m| m.texel(x.to_i32(), y.to_i32())) { 255 } else { 0 };
         let places = || (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
         let code = |v: Vec3| v.to_array().map(|c| ColorSpace::Srgb.encode(c));
         let reflected =
@@ -223,7 +224,7 @@ impl SharedImage<'_> {
         let normal = |(x, y): (u32, u32)| {
             let slope = self.swatch.slope(scaled(x, w, sw), scaled(y, h, sh));
             let n = Vec3::new(-slope.x, -slope.y, 1.0).normalize();
-            n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5) as u8)
+            n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5).trunc_to::<u8>())
         };
         let normals = (pictured && self.raised)
             .then(|| png::encode(w, h, &ImageData::Linear(&places().map(normal).collect::<Vec<_>>()), ""))
@@ -282,5 +283,5 @@ impl SharedImage<'_> {
 
 /// Returns the texel of a row of `to` texels at the position of texel `i` of `from`.
 fn scaled(i: u32, from: u32, to: u32) -> u32 {
-    if from == to { i } else { ((u64::from(i) * 2 + 1) * u64::from(to) / (u64::from(from) * 2)) as u32 }
+    if from == to { i } else { ((u64::from(i) * 2 + 1) * u64::from(to) / (u64::from(from) * 2)).to_u32() }
 }

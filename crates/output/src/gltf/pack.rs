@@ -1,7 +1,7 @@
 //! Buffer of a GLB file: vertices, indices and images, each kind in a separate span.
 
 use furrow_base::geometry::JointWeights;
-use furrow_base::math::{DMat4, Vec2, Vec3};
+use furrow_base::math::{DMat4, ToFloat, Vec2, Vec3};
 use furrow_grow::model::document::{
     ARRAY_BUFFER, Accessor, Buffer, BufferView, Document, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT, UNSIGNED_SHORT,
 };
@@ -106,7 +106,7 @@ impl Pack {
     /// Adds matrices and returns the index of their accessor.
     pub(super) fn matrices(&mut self, of: &[DMat4]) -> usize {
         let at = self.matrices.len();
-        let numbers = of.iter().flat_map(DMat4::to_cols_array).map(|number| number as f32);
+        let numbers = of.iter().flat_map(DMat4::to_cols_array).map(ToFloat::to_f32);
         self.matrices.extend(numbers.flat_map(f32::to_le_bytes));
         self.accessor(MATRICES, at, of.len(), "MAT4");
         self.accessors.len() - 1

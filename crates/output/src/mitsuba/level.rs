@@ -5,7 +5,7 @@
 //! were 5 % too dark in blue. With one level per organ, only the variation within an organ is ignored.
 
 use furrow_base::geometry::Mesh;
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3};
 use furrow_optics::sensor::Camera;
 use furrow_render::material::{Material, Varies};
 use furrow_render::scene::Scene;
@@ -25,7 +25,7 @@ impl Leveled {
         let mut known: BTreeMap<(u32, [u32; 3], Option<u32>), u32> = BTreeMap::new();
         let mut materials = Vec::new();
         let of_parts = scene.parts.iter().map(|part| {
-            let material = &scene.materials[part.material as usize];
+            let material = &scene.materials[part.material.to_usize()];
             let level = match material.varies() {
                 Varies::Texture(w, h) => Some(level(&part.in_world(), w.max(h), &scene.camera)),
                 Varies::Nowhere | Varies::Raster(..) | Varies::Place => None,
@@ -37,7 +37,7 @@ impl Leveled {
                     Some(level) => own.on_level(level),
                     None => own,
                 });
-                materials.len() as u32 - 1
+                materials.len().to_u32() - 1
             })
         });
         let of_parts = of_parts.collect();
@@ -63,7 +63,7 @@ fn level(mesh: &Mesh, size: u32, camera: &Camera) -> u32 {
     let eye = camera.pose().position;
     let (mut sum, mut areas) = (0.0_f64, 0.0_f64);
     for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| i as usize);
+        let [a, b, c] = t.map(ToInt::to_usize);
         let (e1, e2) = (mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]);
         let (t1, t2) = (mesh.uvs[b] - mesh.uvs[a], mesh.uvs[c] - mesh.uvs[a]);
         let determinant = t1.perp_dot(t2);
@@ -72,9 +72,9 @@ fn level(mesh: &Mesh, size: u32, camera: &Camera) -> u32 {
             let metres = ((e2 * t1.x - e1 * t2.x) / determinant).length();
             let pixel = camera.pixel_angle() * eye.distance(mesh.positions[a] + (e1 + e2) / 3.0);
             let area = f64::from(e1.cross(e2).length());
-            sum += area * f64::from((pixel / metres * size as f32).max(1.0).log2());
+            sum += area * f64::from((pixel / metres * size.to_f32()).max(1.0).log2());
             areas += area;
         }
     }
-    if areas > 0.0 { (sum / areas).round() as u32 } else { 0 }
+    if areas > 0.0 { (sum / areas).round_to::<u32>() } else { 0 }
 }

@@ -7,7 +7,7 @@ use super::files::{Band, Files, SCALE, matrix};
 use super::xml::Element;
 
 use furrow_base::Result;
-use furrow_base::math::{Frame, Spectrum, Vec3, direction, vec3};
+use furrow_base::math::{Frame, Spectrum, ToFloat, ToInt, Vec3, direction, vec3};
 use furrow_optics::light::{Form, Light, Outline};
 use std::f32::consts::{PI, TAU};
 
@@ -69,8 +69,8 @@ impl Lights {
             let (w, h) = SKY;
             let at = |i: u32| {
                 let (column, row) = (i % w, i / w);
-                let zenith = PI * row as f32 / (h - 1) as f32;
-                radiance(direction(zenith, TAU * (column as f32 + 0.5) / w as f32))
+                let zenith = PI * row.to_f32() / (h - 1).to_f32();
+                radiance(direction(zenith, TAU * (column.to_f32() + 0.5) / w.to_f32()))
             };
             let pixels: Vec<Spectrum> = (0..w * h).map(at).collect();
             files.spectra("textures/sky", w, h, &pixels)?;
@@ -146,15 +146,15 @@ fn sun_picture(
     let half = SUN_M * furrow_optics::light::HALF_ANGLE_DEG.to_radians().tan();
     let frame = Frame::about(-towards);
     let n = SUN_SIDE * SUB;
-    let place = |i: u32| half * (2.0 * (i as f32 + 0.5) / n as f32 - 1.0);
-    let mut pixels = vec![Spectrum::ZERO; (SUN_SIDE * SUN_SIDE) as usize];
+    let place = |i: u32| half * (2.0 * (i.to_f32() + 0.5) / n.to_f32() - 1.0);
+    let mut pixels = vec![Spectrum::ZERO; (SUN_SIDE * SUN_SIDE).to_usize()];
     for y in 0..n {
         for x in 0..n {
             let to = frame.to_world(vec3(place(x), place(y), -SUN_M));
-            pixels[(y / SUB * SUN_SIDE + x / SUB) as usize] += light.le(to.normalize()) / (SUB * SUB) as f32;
+            pixels[(y / SUB * SUN_SIDE + x / SUB).to_usize()] += light.le(to.normalize()) / (SUB * SUB).to_f32();
         }
     }
-    let solid_angle = (2.0 * half / SUN_M).powi(2) / pixels.len() as f32;
+    let solid_angle = (2.0 * half / SUN_M).powi(2) / pixels.len().to_f32();
     let sum = pixels.iter().fold([0.0_f64; 4], |sum, p| {
         let p = p.to_array();
         std::array::from_fn(|i| sum[i] + f64::from(p[i]) * f64::from(solid_angle))
@@ -163,7 +163,7 @@ fn sun_picture(
     let scale =
         Spectrum::from(std::array::from_fn(
             |i| {
-                if sum[i] > 0.0 { (f64::from(wanted[i]) / sum[i]) as f32 } else { 0.0 }
+                if sum[i] > 0.0 { (f64::from(wanted[i]) / sum[i]).to_f32() } else { 0.0 }
             },
         ));
     for pixel in &mut pixels {

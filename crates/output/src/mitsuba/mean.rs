@@ -14,7 +14,7 @@
 //! slopes over the ground plane; `normalmap` rotates the relief with the mesh and is darker on average, by 1.4 % on
 //! `02-one-plant.ron`.
 
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use furrow_optics::bsdf::microfacet::Ggx;
 use furrow_optics::bsdf::{SurfaceLayer, fresnel};
 use furrow_optics::optics::Shadowing;
@@ -98,7 +98,7 @@ impl Directions {
             ours += f64::from(pair.weight * (a + b * s) * through(eye) * through(light) * open);
             written += f64::from(pair.written);
         }
-        if written > 0.0 { (ours / written) as f32 } else { a }
+        if written > 0.0 { (ours / written).to_f32() } else { a }
     }
 
     /// Returns the mean transmission of the coats that the eye and the light see, c(θ_eye) c(θ_light) of `Leaf`, over
@@ -113,7 +113,7 @@ impl Directions {
             sum += f64::from(crossing.weight * through(0, eye) * through(1, light));
             weights += f64::from(crossing.weight);
         }
-        if weights > 0.0 { (sum / weights) as f32 } else { 1.0 }
+        if weights > 0.0 { (sum / weights).to_f32() } else { 1.0 }
     }
 
     /// Returns the effect of the layers on the upper and the lower side of a leaf.

@@ -37,7 +37,7 @@ use super::png::{self, ImageData};
 use super::{Export, FileSet, unheld};
 use files::{Band, Files, Plugins, SCALE, matrix};
 use furrow_base::geometry::{AlphaMask, Mesh};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::{Error, Result};
 use furrow_render::film::Filter;
 use furrow_render::integrator::PathTracer;
@@ -93,7 +93,7 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     let mut surfaces = Vec::with_capacity(groups.len());
     for group in &groups {
         let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
-        let look = ScatteringMap::of(&leveled.materials[group.material as usize]);
+        let look = ScatteringMap::of(&leveled.materials[group.material.to_usize()]);
         let factor = Surface::corner_factor(&look, directions);
         let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
         let surface = match colors {
@@ -134,7 +134,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
     let mut known: HashMap<Key, usize> = HashMap::new();
     let parts = scene.parts.iter().zip(&leveled.of_parts);
     for (part, &index) in parts.filter(|(p, _)| !p.mesh.triangles.is_empty()) {
-        let material = &leveled.materials[index as usize];
+        let material = &leveled.materials[index.to_usize()];
         let colors = (material.varies() == Varies::Place).then(|| scattering::colors(material, &part.in_world()));
         let look = match &colors {
             None => Ok(index),
@@ -166,7 +166,7 @@ fn groups(scene: &Scene, leveled: &Leveled) -> Result<Vec<Group>> {
 
 /// Masks are shared, so the address identifies a mask.
 fn address(part: &Part) -> usize {
-    part.mask.as_ref().map_or(0, |m| Arc::as_ptr(m) as usize)
+    part.mask.as_ref().map_or(0, |m| Arc::as_ptr(m).addr())
 }
 
 fn mesh_file(name: &str) -> String {
@@ -180,13 +180,13 @@ fn mask_file(
     known: &mut HashMap<usize, String>,
     files: &mut Files<'_>,
 ) -> Result<String> {
-    let address = Arc::as_ptr(mask) as usize;
+    let address = Arc::as_ptr(mask).addr();
     if let Some(name) = known.get(&address) {
         return Ok(name.clone());
     }
     let name = format!("textures/mask-{}.png", known.len());
     let (w, h) = mask.size();
-    let opaque = |i: u32| if mask.texel((i % w) as i32, (i / w) as i32) { 255 } else { 0 };
+    let opaque = |i: u32| if mask.texel((i % w).to_i32(), (i / w).to_i32()) { 255 } else { 0 };
     let pixels: Vec<u8> = (0..w * h).map(opaque).collect();
     files.write(&name, &png::encode(w, h, &ImageData::Gray(&pixels), text)?)?;
     known.insert(address, name.clone());
@@ -312,7 +312,7 @@ mod tests {
         mesh.normals = vec![Vec3::Z; 3];
         let part = |k: usize| {
             let class = if k.is_multiple_of(2) { Class::Crop } else { Class::Weed };
-            let tag = Tag { class, plant: (k / 2 + 1) as u32, leaf: 0 };
+            let tag = Tag { class, plant: (k / 2 + 1).to_u32(), leaf: 0 };
             Part { mesh: Arc::new(mesh.clone()), mask: None, material: 0, tag, instance: None }
         };
         let parts = (0..plants).chain(0..plants).map(part).collect();

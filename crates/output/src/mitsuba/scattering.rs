@@ -4,7 +4,7 @@
 //! texel of the level to which its textures are fixed, see [`super::level`].
 
 use furrow_base::geometry::{Hit, Interaction, Mesh};
-use furrow_base::math::{Spectrum, Vec2, Vec3, vec2};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_optics::bsdf::microfacet::Ggx;
 use furrow_optics::bsdf::{Bsdf, Form, SurfaceLayer};
 use furrow_optics::optics::Shadowing;
@@ -64,10 +64,10 @@ impl ScatteringMap {
         };
         let flat = patch(Vec3::ZERO, Vec3::Z);
         let (mut kind, mut held) = (None, true);
-        let mut texels = Vec::with_capacity((width * height) as usize);
+        let mut texels = Vec::with_capacity((width * height).to_usize());
         for y in 0..height {
             for x in 0..width {
-                let uv = vec2((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+                let uv = vec2((x.to_f32() + 0.5) / width.to_f32(), (y.to_f32() + 0.5) / height.to_f32());
                 let (of, texel, own) = at(material, &flat, uv);
                 held &= own;
                 kind = Some(kind.map_or(of, |known: Kind| known.and(of)));
@@ -85,7 +85,7 @@ impl ScatteringMap {
 
     /// Returns the mean fraction under water.
     pub(super) fn mean_film(&self) -> f32 {
-        self.texels.iter().map(|t| t.film).sum::<f32>() / self.texels.len().max(1) as f32
+        self.texels.iter().map(|t| t.film).sum::<f32>() / self.texels.len().max(1).to_f32()
     }
 
     /// Returns the value of `what` if it is the same in all texels.

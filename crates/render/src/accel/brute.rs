@@ -2,7 +2,7 @@
 
 use super::Surface;
 use furrow_base::geometry::{Hit, Intersect, Ray};
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, ToInt, Vec3};
 use glam::DVec3;
 
 /// Brute-force intersector. Exact where Embree is fast.
@@ -18,16 +18,16 @@ impl<'a> BruteForce<'a> {
 
     /// Intersects a ray with one triangle. Hits on transparent texels of its mask are ignored.
     pub fn triangle(&self, ray: &Ray, part: u32, triangle: u32) -> Option<Hit> {
-        let surface = &self.surfaces[part as usize];
+        let surface = &self.surfaces[part.to_usize()];
         let (t, u, v) = intersect(ray, surface.corners(triangle))?;
         if let Some(mask) = surface.mask {
-            let [a, b, c] = surface.mesh.triangles[triangle as usize].map(|k| surface.mesh.uvs[k as usize]);
-            let (u, v) = (u as f32, v as f32);
+            let [a, b, c] = surface.mesh.triangles[triangle.to_usize()].map(|k| surface.mesh.uvs[k.to_usize()]);
+            let (u, v) = (u.to_f32(), v.to_f32());
             if !mask.opaque_at(a * (1.0 - u - v) + b * u + c * v) {
                 return None;
             }
         }
-        Some(Hit { part, triangle, u: u as f32, v: v as f32, t: t as f32 })
+        Some(Hit { part, triangle, u: u.to_f32(), v: v.to_f32(), t: t.to_f32() })
     }
 }
 
@@ -52,7 +52,7 @@ fn intersect(ray: &Ray, [a, b, c]: [Vec3; 3]) -> Option<(f64, f64, f64)> {
 impl Intersect for BruteForce<'_> {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
         let parts = self.surfaces.iter().enumerate();
-        let all = parts.flat_map(|(p, s)| (0..s.mesh.triangles.len() as u32).map(move |t| (p as u32, t)));
+        let all = parts.flat_map(|(p, s)| (0..s.mesh.triangles.len().to_u32()).map(move |t| (p.to_u32(), t)));
         all.filter_map(|(p, t)| self.triangle(ray, p, t)).min_by(|a, b| a.t.total_cmp(&b.t))
     }
 

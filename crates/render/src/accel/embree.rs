@@ -11,8 +11,7 @@
 use super::Surface;
 use furrow_base::geometry::alpha::{Sorted, sort};
 use furrow_base::geometry::{AlphaMask, Hit, Intersect, Mesh, PACKET, Placement, Ray};
-use furrow_base::math::Vec2;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec2, Vec3};
 use furrow_base::{Error, Result};
 use furrow_embree as embree;
 use rayon::prelude::*;
@@ -75,7 +74,7 @@ struct AlphaTest {
 
 impl embree::Filter for AlphaTest {
     fn accepts(&self, primitive: u32, u: f32, v: f32) -> bool {
-        let [a, b, c] = self.uvs[primitive as usize];
+        let [a, b, c] = self.uvs[primitive.to_usize()];
         self.mask.opaque_at(a * (1.0 - u - v) + b * u + c * v)
     }
 }
@@ -177,12 +176,12 @@ impl EmbreeAccel {
         let (first, slots) = match instance {
             None => (0, &self.slots[..]),
             Some(number) => {
-                let instance = &self.instances[number as usize - self.slots.len()];
+                let instance = &self.instances[number.to_usize() - self.slots.len()];
                 (instance.first, &instance.slots[..])
             }
         };
-        let slot = &slots[geometry as usize];
-        let triangle = slot.triangles.as_ref().map_or(primitive, |t| t[primitive as usize]);
+        let slot = &slots[geometry.to_usize()];
+        let triangle = slot.triangles.as_ref().map_or(primitive, |t| t[primitive.to_usize()]);
         Hit { part: first + slot.part, triangle, u, v, t }
     }
 }
@@ -222,7 +221,7 @@ fn instances(
     let mut first = 0;
     for group in surfaces.chunk_by(|a, b| a.instance.map(Arc::as_ptr) == b.instance.map(Arc::as_ptr)) {
         groups.extend(group[0].instance.map(|placement| (first, group, &**placement)));
-        first += group.len() as u32;
+        first += group.len().to_u32();
     }
     let address = |surface: &Surface<'_>| (std::ptr::from_ref(surface.mesh), surface.mask.map(Arc::as_ptr));
     let key = |group: &[Surface<'_>]| -> Vec<_> { group.iter().map(address).collect() };
@@ -252,7 +251,7 @@ fn instances(
 /// Builds the geometries of a surface: its fully opaque triangles, and those cut by its mask.
 fn pieces(device: &Arc<embree::Device>, Surface { mesh, mask, .. }: &Surface<'_>) -> Result<Vec<Piece>> {
     let new = |triangles: &[u32], cut| {
-        let corners = triangles.iter().map(|i| mesh.triangles[*i as usize]);
+        let corners = triangles.iter().map(|i| mesh.triangles[i.to_usize()]);
         let geometry = embree::Geometry::new(device, positions(mesh), corners, cut).map_err(failed)?;
         Ok::<_, Error>((Arc::new(geometry), Some(triangles.into())))
     };
@@ -267,7 +266,7 @@ fn pieces(device: &Arc<embree::Device>, Surface { mesh, mask, .. }: &Surface<'_>
         pieces.push(new(&opaque, None)?);
     }
     if !mixed.is_empty() {
-        let uvs = mixed.iter().map(|i| mesh.triangles[*i as usize].map(|k| mesh.uvs[k as usize])).collect();
+        let uvs = mixed.iter().map(|i| mesh.triangles[i.to_usize()].map(|k| mesh.uvs[k.to_usize()])).collect();
         pieces.push(new(&mixed, Some(AlphaTest { uvs, mask: Arc::clone(mask) }))?);
     }
     Ok(pieces)

@@ -1,6 +1,6 @@
 //! Pixel reconstruction filters.
 
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2};
 use furrow_base::ron_file::{NonNegative, Num};
 use serde::Deserialize;
 
@@ -58,9 +58,9 @@ impl Footprint {
             None => Vec2::from(u) - 0.5,
             Some(q) => {
                 let offset = |u: f32| {
-                    let place = u * CELLS as f32;
-                    let cell = (place as usize).min(CELLS - 1);
-                    q[cell] + (q[cell + 1] - q[cell]) * (place - cell as f32)
+                    let place = u * CELLS.to_f32();
+                    let cell = place.trunc_to::<usize>().min(CELLS - 1);
+                    q[cell] + (q[cell + 1] - q[cell]) * (place - cell.to_f32())
                 };
                 vec2(offset(u[0]), offset(u[1]))
             }
@@ -73,8 +73,8 @@ impl Footprint {
 fn blurred_square(sigma: f64) -> Box<[f32]> {
     const STEPS: usize = 1 << 14;
     let end = 0.5 + 5.0 * sigma;
-    let step = 2.0 * end / STEPS as f64;
-    let at = |i: usize| (i as f64 + 0.5) * step - end;
+    let step = 2.0 * end / STEPS.to_f64();
+    let at = |i: usize| (i.to_f64() + 0.5) * step - end;
     // Unnormalised Φ by the rectangle rule over the same steps, clamped at both ends of the table.
     let mut below = Vec::with_capacity(STEPS + 1);
     let mut sum = 0.0;
@@ -85,22 +85,22 @@ fn blurred_square(sigma: f64) -> Box<[f32]> {
         below.push(sum);
     }
     let phi = |x: f64| {
-        let place = ((x + end) / step).clamp(0.0, STEPS as f64);
-        let cell = (place as usize).min(STEPS - 1);
-        below[cell] + (below[cell + 1] - below[cell]) * (place - cell as f64)
+        let place = ((x + end) / step).clamp(0.0, STEPS.to_f64());
+        let cell = place.trunc_to::<usize>().min(STEPS - 1);
+        below[cell] + (below[cell + 1] - below[cell]) * (place - cell.to_f64())
     };
     let density: Vec<f64> = (0..STEPS).map(|i| phi(at(i) + 0.5) - phi(at(i) - 0.5)).collect();
     let total: f64 = density.iter().sum();
     let mut quantiles = Vec::with_capacity(CELLS + 1);
     let (mut i, mut mass) = (0, 0.0);
     for k in 0..=CELLS {
-        let goal = k as f64 / CELLS as f64 * total;
+        let goal = k.to_f64() / CELLS.to_f64() * total;
         while i < STEPS && mass + density[i] < goal {
             mass += density[i];
             i += 1;
         }
         let within = if i < STEPS { (goal - mass) / density[i].max(f64::MIN_POSITIVE) } else { 0.0 };
-        quantiles.push(((i as f64 + within.clamp(0.0, 1.0)) * step - end) as f32);
+        quantiles.push(((i.to_f64() + within.clamp(0.0, 1.0)) * step - end).to_f32());
     }
     // The outermost cells are chosen to preserve the tail means: cells up to the ends of the tails would be far too
     // wide.
@@ -109,7 +109,7 @@ fn blurred_square(sigma: f64) -> Box<[f32]> {
         tail += density * at(i);
         weight += density;
     }
-    let outer = (2.0 * tail / weight - inner) as f32;
+    let outer = (2.0 * tail / weight - inner).to_f32();
     quantiles[0] = outer;
     quantiles[CELLS] = -outer;
     quantiles.into()
@@ -126,7 +126,7 @@ mod tests {
         for sigma in [0.1_f32, 0.4, 1.5] {
             let footprint = Filter::Gaussian(sigma).footprint();
             let n = 1_000_000;
-            let xs = (0..n).map(|i| f64::from(footprint.sample([(i as f32 + 0.5) / n as f32, 0.5]).x));
+            let xs = (0..n).map(|i| f64::from(footprint.sample([(i.to_f32() + 0.5) / n.to_f32(), 0.5]).x));
             let (mut mean, mut square, mut inside) = (0.0, 0.0, 0.0);
             for x in xs {
                 mean += x / f64::from(n);

@@ -5,7 +5,7 @@ mod filter;
 mod tally;
 
 use furrow_base::geometry::Window;
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec3};
 use glam::{DVec4, Vec4};
 use serde::{Deserialize, Serialize};
 
@@ -84,9 +84,9 @@ impl Accumulator {
         Pixel {
             mean: Spectrum(self.mean.as_vec4()),
             variance: Spectrum(variance.as_vec4()),
-            albedo: Spectrum(self.albedo / n as f32),
-            normal: self.normal / n as f32,
-            depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)) as f32 },
+            albedo: Spectrum(self.albedo / n.to_f32()),
+            normal: self.normal / n.to_f32(),
+            depth: if self.hits == 0 { f32::INFINITY } else { (self.depth / f64::from(self.hits)).to_f32() },
             samples: self.count,
             tally: self.tally.clone(),
         }
@@ -114,7 +114,7 @@ pub struct Film {
 impl Film {
     /// Returns the pixel at column x, row y of the window.
     pub fn at(&self, x: u32, y: u32) -> &Pixel {
-        &self.pixels[(y * self.window.width() + x) as usize]
+        &self.pixels[(y * self.window.width() + x).to_usize()]
     }
 
     /// Cuts out a window.
@@ -142,7 +142,7 @@ impl Film {
     /// Returns the minimum, mean and maximum number of samples per pixel.
     pub fn samples(&self) -> (u32, f64, u32) {
         let counts = || self.pixels.iter().map(|p| p.samples);
-        let mean = counts().map(f64::from).sum::<f64>() / self.pixels.len().max(1) as f64;
+        let mean = counts().map(f64::from).sum::<f64>() / self.pixels.len().max(1).to_f64();
         (counts().min().unwrap_or(0), mean, counts().max().unwrap_or(0))
     }
 }

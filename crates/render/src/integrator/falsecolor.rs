@@ -2,7 +2,7 @@
 
 use super::{CameraSample, FirstHit, Integrator, Sample, World};
 
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec3};
 
 use furrow_base::sampling::rng::mix;
 
@@ -26,8 +26,8 @@ impl Integrator for FalseColor {
         let ray = &sample.ray;
         let Some((hit, at)) = world.interact(ray, 0.0, spread) else { return CameraSample::default() };
         let wo = -ray.direction;
-        let part = &world.scene.parts[hit.part as usize];
-        let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
+        let part = &world.scene.parts[hit.part.to_usize()];
+        let (bsdf, frame) = world.scene.materials[part.material.to_usize()].scatter(&at, wo);
         let normal = if frame.z.dot(wo) < 0.0 { -frame.z } else { frame.z };
         let albedo = bsdf.reflectance(frame.to_local(wo).z);
         let rgb = |v: Vec3| Spectrum::new(v.x, v.y, v.z, v.element_sum() / 3.0);
@@ -35,7 +35,7 @@ impl Integrator for FalseColor {
             Self::Normals => rgb(normal * 0.5 + 0.5),
             Self::Ids => {
                 let h = mix(u64::from(hit.part));
-                rgb(Vec3::new((h & 255) as f32, (h >> 8 & 255) as f32, (h >> 16 & 255) as f32) / 255.0)
+                rgb(Vec3::new((h & 255).to_f32(), (h >> 8 & 255).to_f32(), (h >> 16 & 255).to_f32()) / 255.0)
             }
             Self::Uv => rgb(at.uv.extend(0.0)),
             Self::Albedo => albedo,

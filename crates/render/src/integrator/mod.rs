@@ -8,7 +8,7 @@ mod vertex;
 
 use crate::scene::Scene;
 use furrow_base::geometry::{Hit, Interaction, Intersect, PACKET, Ray};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::sampling::Sampler;
 
 pub use falsecolor::FalseColor;
@@ -34,7 +34,7 @@ impl World<'_> {
     /// Computes the surface interaction for a hit; `footprint` in metres.
     #[inline]
     fn at(&self, hit: &Hit, footprint: f32) -> Interaction {
-        self.scene.parts[hit.part as usize].interaction(hit, footprint)
+        self.scene.parts[hit.part.to_usize()].interaction(hit, footprint)
     }
 }
 

@@ -11,7 +11,7 @@ use super::roulette::RouletteSplitting;
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, Sample, World};
 use furrow_base::geometry::{PACKET, Ray};
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToInt, Vec3};
 use furrow_base::sampling::{Sampler, sets};
 use furrow_optics::light::Light;
 
@@ -217,7 +217,7 @@ impl PathTracer {
                     *rays = roulette.split(vertex.returned(), *found) / chance;
                     weighed[i] = true;
                 }
-                let [own_u, own_v, asks, _] = sampler.get4(sets::first_light(k as u32));
+                let [own_u, own_v, asks, _] = sampler.get4(sets::first_light(k.to_u32()));
                 if asks >= chance {
                     continue;
                 }
@@ -328,7 +328,7 @@ impl PathTracer {
     ) -> Spectrum {
         let mean = roulette.split(vertex.returned(), direct);
         let [lobe, own_u, own_v, extra] = sampler.get4(sets::scatter(0, 0));
-        let count = (mean + extra) as u32;
+        let count = (mean + extra).trunc_to::<u32>();
         let mut radiance = Spectrum::ZERO;
         for branch in 0..count {
             let [lobe, u, v] = match (branch, narrow) {

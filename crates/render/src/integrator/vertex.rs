@@ -2,7 +2,7 @@
 
 use super::{FirstHit, World};
 use furrow_base::geometry::{Hit, Interaction, Ray};
-use furrow_base::math::{Frame, Spectrum, Vec3};
+use furrow_base::math::{Frame, Spectrum, ToInt, Vec3};
 use furrow_optics::bsdf::Bsdf;
 
 /// A surface hit by a ray.
@@ -34,8 +34,8 @@ impl Vertex {
     #[inline]
     pub(super) fn new(world: &World<'_>, ray: &Ray, hit: &Hit, at: Interaction) -> Self {
         let wo = -ray.direction;
-        let part = &world.scene.parts[hit.part as usize];
-        let (bsdf, frame) = world.scene.materials[part.material as usize].scatter(&at, wo);
+        let part = &world.scene.parts[hit.part.to_usize()];
+        let (bsdf, frame) = world.scene.materials[part.material.to_usize()].scatter(&at, wo);
         Self { at, bsdf, frame, wo, seen: frame.to_local(wo) }
     }
 

@@ -14,7 +14,7 @@
 //! does not increase.
 
 use super::Damage;
-use furrow_base::math::{Spectrum, Vec2, Vec3, Vec4, smoothstep};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec2, Vec3, Vec4, smoothstep};
 use furrow_base::ron_file::Num;
 use furrow_optics::optics::{Leaf, LeafBands, LeafOptics, Pigments};
 use furrow_optics::texture::Texture;
@@ -46,7 +46,7 @@ impl Tones {
     /// Computes the tissues of a leaf with pigments `base`.
     pub fn new(base: &Pigments) -> Self {
         let yellow = |i: usize| {
-            let s = i as f64 / STEPS as f64;
+            let s = i.to_f64() / STEPS.to_f64();
             let n = (base.n.get() + 0.15 * s).min(4.0);
             let chlorophyll = Num::new(base.chlorophyll.get() * (1.0 - 0.85 * s));
             let carotenoid = Num::new(base.carotenoid.get() * (1.0 - 0.45 * s));
@@ -71,14 +71,14 @@ impl Tones {
 
     /// Returns `leaf` yellowed: shifted like the leaf's mean, and less where it is already pale.
     fn yellowed(&self, leaf: Leaf, s: f32) -> Leaf {
-        let place = s.clamp(0.0, 1.0) * STEPS as f32;
-        let i = (place as usize).min(STEPS - 1);
+        let place = s.clamp(0.0, 1.0) * STEPS.to_f32();
+        let i = place.trunc_to::<usize>().min(STEPS - 1);
         let (a, b) = (self.yellow[i], self.yellow[i + 1]);
         let (from, most) = (self.yellow[0], self.yellow[STEPS]);
         let move_by = |own: Spectrum, a: Spectrum, b: Spectrum, from: Spectrum, most: Spectrum| {
             let way = most.0 - from.0;
             let left = (most.0 - own.0) / (way + Vec4::splat(1e-6) * way.signum());
-            Spectrum(own.0 + (a.lerp(b, place - i as f32).0 - from.0) * left.clamp(Vec4::ZERO, Vec4::splat(1.5)))
+            Spectrum(own.0 + (a.lerp(b, place - i.to_f32()).0 - from.0) * left.clamp(Vec4::ZERO, Vec4::splat(1.5)))
         };
         Leaf {
             reflectance: move_by(leaf.reflectance, a.reflectance, b.reflectance, from.reflectance, most.reflectance),
@@ -160,13 +160,13 @@ impl ConditionOptics {
 
     /// Address of the shared data, equal for clones.
     pub(super) fn key(&self) -> usize {
-        Arc::as_ptr(&self.0) as usize
+        Arc::as_ptr(&self.0).addr()
     }
 
     /// Size of an image that resolves the marks at about 3 texels per mm, at most `most`.
     pub(super) fn picture_size(&self, most: (u32, u32)) -> (u32, u32) {
         let Some(marks) = &self.0.marks else { return most };
-        let fit = |mm: f32, most: u32| ((mm * 3.0).ceil() as u32).clamp(16.min(most), most);
+        let fit = |mm: f32, most: u32| (mm * 3.0).ceil_to::<u32>().clamp(16.min(most), most);
         (fit(marks.image_mm.x, most.0), fit(marks.image_mm.y, most.1))
     }
 
@@ -268,7 +268,7 @@ mod tests {
     fn mean_ndvi(marks: Marks) -> f32 {
         let of = optics(marks, 0.0);
         let leaf = LeafOptics::new(&Pigments::default()).plain();
-        let at = |i: usize| vec2((i % 40) as f32 / 40.0, (i / 40) as f32 / 40.0);
+        let at = |i: usize| vec2((i % 40).to_f32() / 40.0, (i / 40).to_f32() / 40.0);
         (0..1600).map(|i| ndvi(of.at(leaf, at(i), None).upper)).sum::<f32>() / 1600.0
     }
 
@@ -281,7 +281,7 @@ mod tests {
         assert!((0.65..0.92).contains(&green), "{green}");
         assert!((0.2..0.65).contains(&ndvi(yellow)), "{}", ndvi(yellow));
         assert!((0.1..0.32).contains(&ndvi(dead)), "{}", ndvi(dead));
-        let steps: Vec<f32> = (0..=10).map(|i| ndvi(tissues(&base, i as f32 / 10.0)[0])).collect();
+        let steps: Vec<f32> = (0..=10).map(|i| ndvi(tissues(&base, i.to_f32() / 10.0)[0])).collect();
         assert!(steps.windows(2).all(|w| w[1] < w[0] + 1e-4), "{steps:?}");
         assert_eq!(tissues(&base, 0.0)[0].reflectance, base.bands().reflectance);
         // Yellow, not white: blue stays dark.
@@ -315,8 +315,8 @@ mod tests {
             seed in 0u32..40,
         ) {
             let spot = |k: usize| {
-                let centre = vec2((k * 7 % 60) as f32 - 30.0, (k * 13 % 100) as f32);
-                Patch { centre, radius: 3.0, turn: Vec2::X, stretch: 1.2, phase: Vec2::splat(k as f32) }
+                let centre = vec2((k * 7 % 60).to_f32() - 30.0, (k * 13 % 100).to_f32());
+                Patch { centre, radius: 3.0, turn: Vec2::X, stretch: 1.2, phase: Vec2::splat(k.to_f32()) }
             };
             let spots: Vec<Patch> = (0..spots).map(spot).collect();
             let marks = Marks { seed, chlorosis, blotches: spots.clone(), spots, dust, splash, ..Marks::default() };

@@ -5,7 +5,7 @@ use super::shading::frame;
 use super::swatch::{Grain, Swatch, Tone};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
-use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, vec2};
+use furrow_base::math::{Frame, RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_optics::bsdf::{Bsdf, OrenNayar, Rough, Shadowed, Wet};
 use furrow_optics::optics::Shadowing;
 use furrow_optics::optics::soil::{FACETS, at as four_bands, wet};
@@ -65,9 +65,9 @@ impl BakedGround {
             let (moist, film) = wet(dry, f32::from(maps.moisture[i]) / 255.0);
             let moist = maps.lost.map_or(moist, |lost| moist.map(|r| lost.darken(r)));
             Texel {
-                reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5) as u8),
+                reflectance: moist.to_array().map(|r| (r.max(0.0).sqrt() * 255.0 + 0.5).trunc_to::<u8>()),
                 slope: maps.slope[i],
-                film: (film * 255.0 + 0.5) as u8,
+                film: (film * 255.0 + 0.5).trunc_to::<u8>(),
             }
         };
         let film_roughness = maps.lost.map_or(FILM_ROUGHNESS, |lost| rougher(lost.slope));
@@ -75,7 +75,7 @@ impl BakedGround {
             width: maps.width,
             height: maps.height,
             texels: (0..maps.width * maps.height).into_par_iter().map(texel).collect(),
-            decode: std::array::from_fn(|i| (i as f32 / 255.0).powi(2)),
+            decode: std::array::from_fn(|i| (i.to_f32() / 255.0).powi(2)),
             shadowing: maps.lost.map(|lost| lost.shadowing),
             most: MOST_REFLECTANCE / maps.lost.map_or(1.0, |lost| lost.shadowing.most().max(1.0)),
             film_roughness,
@@ -86,20 +86,20 @@ impl BakedGround {
     /// Bilinear lookup of reflectance, slope (∂z/∂x, ∂z/∂y) and water film.
     #[inline]
     fn sample(&self, uv: Vec2) -> (Spectrum, Vec2, f32) {
-        let place = uv.clamp(Vec2::ZERO, Vec2::ONE) * vec2(self.width as f32, self.height as f32) - 0.5;
+        let place = uv.clamp(Vec2::ZERO, Vec2::ONE) * vec2(self.width.to_f32(), self.height.to_f32()) - 0.5;
         let floor = place.floor();
         let part = place - floor;
-        let column = |i: i32| i.clamp(0, self.width as i32 - 1) as usize;
-        let row = |j: i32| j.clamp(0, self.height as i32 - 1) as usize * self.width;
-        let (x0, x1) = (column(floor.x as i32), column(floor.x as i32 + 1));
-        let (y0, y1) = (row(floor.y as i32), row(floor.y as i32 + 1));
+        let column = |i: i32| i.clamp(0, self.width.to_i32() - 1).to_usize();
+        let row = |j: i32| j.clamp(0, self.height.to_i32() - 1).to_usize() * self.width;
+        let (x0, x1) = (column(floor.x.trunc_to::<i32>()), column(floor.x.trunc_to::<i32>() + 1));
+        let (y0, y1) = (row(floor.y.trunc_to::<i32>()), row(floor.y.trunc_to::<i32>() + 1));
         let weights =
             [(1.0 - part.x) * (1.0 - part.y), part.x * (1.0 - part.y), (1.0 - part.x) * part.y, part.x * part.y];
         let mut reflectance = Spectrum::ZERO;
         let (mut slope, mut film) = (Vec2::ZERO, 0.0);
         for (index, w) in [y0 + x0, y0 + x1, y1 + x0, y1 + x1].into_iter().zip(weights) {
             let t = &self.texels[index];
-            reflectance += Spectrum::from(t.reflectance.map(|r| self.decode[r as usize])) * w;
+            reflectance += Spectrum::from(t.reflectance.map(|r| self.decode[usize::from(r)])) * w;
             slope += vec2(f32::from(t.slope[0]), f32::from(t.slope[1])) * w;
             film += f32::from(t.film) * w;
         }
@@ -138,31 +138,31 @@ impl Ground {
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
         let baked = &self.baked;
-        let decode = |t: &Texel| Spectrum::from(t.reflectance.map(|r| baked.decode[r as usize]));
+        let decode = |t: &Texel| Spectrum::from(t.reflectance.map(|r| baked.decode[usize::from(r)]));
         let tone = |reflectance| Tone { reflectance, transmittance: Spectrum::ZERO };
-        let texel = move |x: u32, y: u32| tone(decode(&baked.texels[y as usize * baked.width + x as usize]));
+        let texel = move |x: u32, y: u32| tone(decode(&baked.texels[y.to_usize() * baked.width + x.to_usize()]));
         // About one texel in a thousand is enough for the mean.
         let some = baked.texels.iter().step_by(997);
         let (sum, count) = some.fold((Spectrum::ZERO, 0.0), |(s, n), t| (s + decode(t), n + 1.0));
         let mean = tone(sum / count * self.tint);
-        let key = [Arc::as_ptr(baked) as usize, 0];
-        let size = (baked.width as u32, baked.height as u32);
+        let key = [Arc::as_ptr(baked).addr(), 0];
+        let size = (baked.width.to_u32(), baked.height.to_u32());
         // Rows of the maps run north, rows of the image run down, so the top of the image is south.
         let slope = move |x: u32, y: u32| {
-            let [east, north] = baked.texels[y as usize * baked.width + x as usize].slope.map(f32::from);
+            let [east, north] = baked.texels[y.to_usize() * baked.width + x.to_usize()].slope.map(f32::from);
             vec2(east, -north) / GroundMaps::SLOPE_STEPS
         };
         Swatch::pictured(key, size, texel, mean, 1.0)
             .tinted(self.tint.0.truncate(), Vec3::ONE)
             .raised(slope, f32::from(u8::from(self.relief)))
             .grained(move |x, y| {
-                let film = baked.texels[y as usize * baked.width + x as usize].film;
+                let film = baked.texels[y.to_usize() * baked.width + x.to_usize()].film;
                 Grain { open: 1.0, film: f32::from(film) / 255.0 }
             })
     }
 
     pub(super) fn varies(&self) -> Varies {
-        Varies::Raster(self.baked.width as u32, self.baked.height as u32)
+        Varies::Raster(self.baked.width.to_u32(), self.baked.height.to_u32())
     }
 
     #[inline]

@@ -8,7 +8,7 @@ use super::shading::{bump, grained_frame};
 use super::swatch::{Grain, Swatch, Tone, centre};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
-use furrow_base::math::{Frame, Spectrum, Vec2, Vec3, Vec4};
+use furrow_base::math::{Frame, Spectrum, ToFloat, Vec2, Vec3, Vec4};
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Pick};
 use furrow_optics::bsdf::{self, Bsdf, Side, SurfaceLayer};
 use furrow_optics::optics::{Leaf, LeafOptics, Pigments};
@@ -288,7 +288,7 @@ impl LeafMaterial {
         roughness: f32,
     ) -> Swatch<'a> {
         let size = condition.picture_size((picture.color.width(), picture.color.height()));
-        let lod = picture.color.lod(1.0 / size.0.max(size.1) as f32);
+        let lod = picture.color.lod(1.0 / size.0.max(size.1).to_f32());
         let tone = move |uv: Vec2| {
             let [r, g, b, _] = picture.color.sample(uv, lod);
             let leaf = self.optics.at((Vec3::new(r, g, b) * self.exposure * self.tint).to_array());
@@ -296,7 +296,7 @@ impl LeafMaterial {
             self.tone(upper, waxy)
         };
         // Mean over the opaque points of a grid.
-        let places = (0..1024).map(|i| Vec2::new((i % 32) as f32 + 0.5, (i / 32) as f32 + 0.5) / 32.0);
+        let places = (0..1024).map(|i| Vec2::new((i % 32).to_f32() + 0.5, (i / 32).to_f32() + 0.5) / 32.0);
         let there = |uv: &Vec2| picture.color.sample(*uv, lod)[3] > 0.5;
         let (mut sum, mut count) = (Tone { reflectance: Spectrum::ZERO, transmittance: Spectrum::ZERO }, 0.0);
         for uv in places.filter(there) {
@@ -307,7 +307,7 @@ impl LeafMaterial {
         }
         let share = 1.0 / f32::max(count, 1.0);
         let mean = Tone { reflectance: sum.reflectance * share, transmittance: sum.transmittance * share };
-        let key = [condition.key(), Arc::as_ptr(&self.optics) as usize];
+        let key = [condition.key(), Arc::as_ptr(&self.optics).addr()];
         Swatch::pictured(key, size, move |x, y| tone(centre(size, x, y)), mean, roughness)
             .raised(move |x, y| picture.maps.normal.sample(centre(size, x, y), lod), self.relief)
             .grained(move |x, y| Grain { open: picture.maps.occlusion.sample(centre(size, x, y), lod), film: 0.0 })
@@ -330,7 +330,7 @@ impl LeafMaterial {
         let middle = self.middle();
         let (bare, tinted) = (read(middle), read(middle * self.tint));
         let passed = |tone: Tone| tone.transmittance.0.truncate().max(Vec3::splat(1e-4));
-        let key = [Arc::as_ptr(picture) as usize, Arc::as_ptr(&self.optics) as usize];
+        let key = [Arc::as_ptr(picture).addr(), Arc::as_ptr(&self.optics).addr()];
         let size = (picture.color.width(), picture.color.height());
         let slope = move |x, y| picture.maps.normal.sample(centre(size, x, y), 0.0);
         Swatch::pictured(key, size, texel, tinted, roughness)
@@ -355,7 +355,7 @@ impl LeafMaterial {
             Some(picture) => {
                 // The footprint as a fraction of the image, using the larger side of a texel on the surface.
                 let metres = tangents.1.length().max(1e-6);
-                let lod = self.level.map_or_else(|| picture.color.lod(at.footprint / metres), |level| level as f32);
+                let lod = self.level.map_or_else(|| picture.color.lod(at.footprint / metres), ToFloat::to_f32);
                 let color = if self.pictured {
                     let [r, g, b, _] = picture.color.sample(at.uv, lod);
                     Vec3::new(r, g, b) * self.exposure
@@ -406,7 +406,7 @@ fn exposure(photograph: &Texture, wanted: Vec3) -> Vec3 {
                 .iter()
                 .map(|(value, n)| f64::from((f32::from_bits(*value) * factor).min(BRIGHTEST)) * f64::from(*n))
                 .sum();
-            (sum / f64::from(all.max(1))) as f32
+            (sum / f64::from(all.max(1))).to_f32()
         };
         // Fixed-point iteration: unclamped texels compensate for the clamped ones.
         let mut factor = 1.0_f32;

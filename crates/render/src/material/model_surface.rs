@@ -14,7 +14,7 @@ use super::shading::{bump, frame};
 use super::swatch::{Swatch, Tone, centre};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
-use furrow_base::math::{Frame, Spectrum, Vec2, Vec3};
+use furrow_base::math::{Frame, Spectrum, ToFloat, ToInt, Vec2, Vec3};
 use furrow_optics::bsdf::{self, Bsdf, OrenNayar, Side};
 use furrow_optics::texture::{NormalTexture, Surface, Texture, Transmission};
 use std::sync::Arc;
@@ -141,7 +141,7 @@ impl ModelSurface {
         let size = (picture.width(), picture.height());
         let texel = move |x, y| self.tone(|picture| rgb(picture.sample(centre(size, x, y), 0.0)));
         // Repainted surfaces do not share the image of the file.
-        let swatch = Swatch::pictured([std::ptr::from_ref(self) as usize, 1], size, texel, mean, roughness);
+        let swatch = Swatch::pictured([std::ptr::from_ref(self).addr(), 1], size, texel, mean, roughness);
         match &self.relief {
             Some(NormalTexture { normals, strength }) => {
                 swatch.raised(move |x, y| normals.sample(centre(size, x, y), 0.0), *strength)
@@ -167,7 +167,7 @@ impl ModelSurface {
     /// Width of a ray's footprint in texture coordinates.
     fn extent(&self, at: &Interaction) -> f32 {
         if let (Some(level), Some(p)) = (self.level, self.finest()) {
-            return 2.0_f32.powi(level as i32) / p.width().max(p.height()) as f32;
+            return 2.0_f32.powi(level.to_i32()) / p.width().max(p.height()).to_f32();
         }
         let (along_u, along_v) = at.tangents();
         at.footprint / along_u.length().max(along_v.length()).max(1e-6)

@@ -10,7 +10,7 @@ use super::shading::frame;
 use super::swatch::{Swatch, Tone};
 use super::varies::Varies;
 use furrow_base::geometry::Interaction;
-use furrow_base::math::{Frame, Spectrum, Vec3, lerp, smoothstep};
+use furrow_base::math::{Frame, Spectrum, ToFloat, Vec3, lerp, smoothstep};
 use furrow_optics::bsdf::{Bsdf, OrenNayar, Wet};
 use furrow_optics::optics::soil::wet;
 use furrow_optics::texture::noise::Perlin;
@@ -120,7 +120,7 @@ impl Solid {
     /// Reflectance at point `p` with outward normal `up`.
     fn tone(&self, p: Vec3, up: Vec3) -> Spectrum {
         let noise = |size: f32, apart: f32| {
-            self.grain.as_ref().map_or(0.0, |g| g.noise.fbm3((p / size + apart).as_dvec3().to_array(), 2, 0.5) as f32)
+            self.grain.as_ref().map_or(0.0, |g| g.noise.fbm3((p / size + apart).as_dvec3().to_array(), 2, 0.5).to_f32())
         };
         let albedo = self.albedo * self.grain.as_ref().map_or(1.0, |g| 1.0 + g.depth * noise(g.size, 0.0));
         let albedo = self.dust.map_or(albedo, |d| {
@@ -195,7 +195,7 @@ mod tests {
         let dusty = clean.clone().with_grain(4, 2e-3, 0.0).with_dust(LOESS, 0.5, 3e-3);
         let mean = |solid: &Solid, up: Vec3| {
             let all: Spectrum = (0..400).fold(Spectrum::ZERO, |sum, i| {
-                let p = Vec3::new((i % 20) as f32, (i / 20) as f32, 3.0) * 1.7e-3;
+                let p = Vec3::new((i % 20).to_f32(), (i / 20).to_f32(), 3.0) * 1.7e-3;
                 sum + solid.tone(p, up)
             });
             all * (1.0 / 400.0)

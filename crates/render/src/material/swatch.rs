@@ -3,7 +3,7 @@
 //!
 //! Specimens that differ only in tint share one image, identified by [`Swatch::key`].
 
-use furrow_base::math::{Spectrum, Vec2, Vec3};
+use furrow_base::math::{Spectrum, ToFloat, Vec2, Vec3};
 
 /// Reflectance and transmittance at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,5 +141,5 @@ impl<'a> Swatch<'a> {
 
 /// Texture coordinates of the centre of texel (x, y) in an image of this size.
 pub(super) fn centre(size: (u32, u32), x: u32, y: u32) -> Vec2 {
-    Vec2::new((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32)
+    Vec2::new((x.to_f32() + 0.5) / size.0.to_f32(), (y.to_f32() + 0.5) / size.1.to_f32())
 }

@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::scene::tag::Tag;
 use crate::settings::{Technique, Techniques};
 use furrow_base::geometry::Window;
-use furrow_base::math::{Spectrum, Vec3, Vec4};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec3, Vec4};
 use furrow_base::{Error, Result};
 use furrow_optics::light::{Form, Light};
 use wgpu::{
@@ -54,7 +54,7 @@ pub(super) fn draw(gpu: &Gpu, pipelines: &Pipelines, scene: &Scene, techniques: 
     let lights = Lights::new(scene, &vertices.corners, techniques);
     let corners = bytemuck::cast_slice(&vertices.corners);
     let most = limits.max_buffer_size.min(u64::from(u32::MAX));
-    if corners.len() as u64 > most {
+    if corners.len().to_u64() > most {
         return Err(Error::input(format!("{} triangles are more than {} can hold", scene.triangles(), gpu.name())));
     }
     let scale = scale(scene);
@@ -127,9 +127,9 @@ fn seen(scene: &Scene, lights: &Lights, techniques: &Techniques, scale: f32) -> 
     }
     let shown = [Technique::Shadows, Technique::Ssao, Technique::NormalMaps, Technique::Foliage];
     let effects = (0..).zip(shown).map(|(bit, effect)| u32::from(techniques.has(effect)) << bit).sum();
-    let counts = [camera.width(), camera.height(), lights.each.len() as u32, effects];
+    let counts = [camera.width(), camera.height(), lights.each.len().to_u32(), effects];
     all[40..44].copy_from_slice(&counts.map(f32::from_bits));
-    all[44..46].copy_from_slice(&[camera.intrinsics()[0] as f32, OCCLUSION_RADIUS]);
+    all[44..46].copy_from_slice(&[camera.intrinsics()[0].to_f32(), OCCLUSION_RADIUS]);
     all
 }
 
@@ -194,12 +194,12 @@ impl Stage<'_> {
         let count = if wanted { lights.each.len() } else { 0 };
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
         let side = if count > 0 { SHADOW_SIZE } else { 1 };
-        let maps = self.gpu.texture((side, side), count.max(1) as u32, 1, DEPTH, 1, usage);
+        let maps = self.gpu.texture((side, side), count.max(1).to_u32(), 1, DEPTH, 1, usage);
         let empty: [BindGroup; 2] = std::array::from_fn(|_| bind(self.gpu, &self.pipelines.nothing, &[]));
         for light in 0..count {
             let layer = maps.create_view(&TextureViewDescriptor {
                 dimension: Some(TextureViewDimension::D2),
-                base_array_layer: light as u32,
+                base_array_layer: light.to_u32(),
                 array_layer_count: Some(1),
                 ..Default::default()
             });
@@ -306,7 +306,7 @@ fn read_labels(gpu: &Gpu, scene: &Scene, parts: &Texture, positions: &Texture, n
     let window = Window::full(scene.camera.width(), scene.camera.height());
     let (parts, positions, normals) = (gpu.read(parts)?, gpu.read(positions)?, gpu.read(normals)?);
     let pose = scene.camera.pose();
-    let count = (window.width() * window.height()) as usize;
+    let count = (window.width() * window.height()).to_usize();
     let mut map = LabelMap {
         window,
         parts: vec![label::NONE; count],
@@ -321,8 +321,8 @@ fn read_labels(gpu: &Gpu, scene: &Scene, parts: &Texture, positions: &Texture, n
         let Some(part) = u32::from_le_bytes(*part).checked_sub(1) else { continue };
         let [x, y, z, _] = bytemuck::cast::<_, [f32; 4]>(*place);
         map.parts[i] = part;
-        map.tags[i] = scene.parts[part as usize].tag;
-        let (eye, _) = scene.camera.centre_ray(i as u32 % window.width(), i as u32 / window.width());
+        map.tags[i] = scene.parts[part.to_usize()].tag;
+        let (eye, _) = scene.camera.centre_ray(i.to_u32() % window.width(), i.to_u32() / window.width());
         map.depth[i] = (Vec3::new(x, y, z) - eye).dot(pose.axes.z_axis);
         map.normals[i] = halves(*normal).truncate().normalize_or_zero();
     }
@@ -365,12 +365,12 @@ fn sky(gpu: &Gpu, scene: &Scene, labels: &LabelMap) -> TextureView {
 /// Converts the image to a film.
 fn film(scene: &Scene, labels: &LabelMap, radiance: &[u8], unscale: f32) -> Film {
     let forward = scene.camera.pose().axes.z_axis;
-    let width = labels.window.width() as usize;
+    let width = labels.window.width().to_usize();
     let pixels = radiance.as_chunks::<8>().0.iter().enumerate().map(|(i, bytes)| {
         let mut pixel = Accumulator::default();
         pixel.add(Spectrum(halves(*bytes) * unscale));
         if labels.parts[i] != label::NONE {
-            let (_, direction) = scene.camera.centre_ray((i % width) as u32, (i / width) as u32);
+            let (_, direction) = scene.camera.centre_ray((i % width).to_u32(), (i / width).to_u32());
             let distance = labels.depth[i] / direction.dot(forward).max(1e-6);
             pixel.add_first(labels.parts[i], Spectrum::ZERO, labels.normals[i], distance);
         }

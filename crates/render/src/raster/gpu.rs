@@ -1,5 +1,6 @@
 //! The GPU: opening it, uploading and reading back data.
 
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -100,7 +101,7 @@ impl Gpu {
     /// Creates a texture and uploads its mip levels, finest first.
     pub(super) fn picture(&self, size: (u32, u32), format: TextureFormat, levels: &[Vec<u8>]) -> TextureView {
         let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
-        let texture = self.texture(size, 1, levels.len() as u32, format, 1, usage);
+        let texture = self.texture(size, 1, levels.len().to_u32(), format, 1, usage);
         let bytes = format.block_copy_size(None).unwrap_or(4);
         for (level, data) in (0..).zip(levels) {
             let (width, height) = ((size.0 >> level).max(1), (size.1 >> level).max(1));
@@ -138,7 +139,7 @@ impl Gpu {
         };
         self.device.poll(PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
         let mapped = buffer.get_mapped_range(..).map_err(|e| lost(&e))?;
-        Ok(mapped.chunks(padded as usize).flat_map(|line| &line[..row as usize]).copied().collect())
+        Ok(mapped.chunks(padded.to_usize()).flat_map(|line| &line[..row.to_usize()]).copied().collect())
     }
 }
 

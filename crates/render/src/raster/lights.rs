@@ -7,7 +7,7 @@
 use super::vertices::STRIDE;
 use crate::scene::Scene;
 use crate::settings::{Technique, Techniques};
-use furrow_base::math::{Frame, Spectrum, Vec3, Vec4, vec3};
+use furrow_base::math::{Frame, Spectrum, ToFloat, Vec3, Vec4, vec3};
 use furrow_optics::light::{Form, Light};
 use std::f32::consts::PI;
 
@@ -91,7 +91,7 @@ fn sunlight(towards: Vec3, irradiance: Spectrum, corners: &[[f32; STRIDE]]) -> [
     let row = |axis: Vec3, s: f32, m: f32| (axis * s).extend(-m * s);
     let rows =
         [row(frame.x, scale.x, middle.x), row(frame.y, scale.y, middle.y), row(frame.z, scale.z, middle.z), Vec4::W];
-    let texel = (hi.x - lo.x).max(hi.y - lo.y) / SHADOW_SIZE as f32;
+    let texel = (hi.x - lo.x).max(hi.y - lo.y) / SHADOW_SIZE.to_f32();
     pack(towards.extend(0.0), Vec3::ZERO.extend(texel), irradiance, transposed(rows))
 }
 
@@ -106,7 +106,7 @@ fn lamplight(at: Vec3, frame: Frame, intensity: Spectrum) -> [f32; LIGHT] {
         Vec4::new(depth.x, depth.y, depth.z, depth.w - near * far / (far - near)),
         row(frame.z, 1.0),
     ];
-    let texel = 2.0 * LAMP_TAN / SHADOW_SIZE as f32;
+    let texel = 2.0 * LAMP_TAN / SHADOW_SIZE.to_f32();
     pack(at.extend(1.0), frame.z.extend(texel), intensity, transposed(rows))
 }
 
@@ -126,13 +126,13 @@ fn even(light: &Light) -> [Vec4; 9] {
 fn harmonics(light: &Light) -> [Vec4; 9] {
     const ROWS: usize = 128;
     const COLUMNS: usize = 256;
-    let cell = 2.0 / ROWS as f32 * 2.0 * PI / COLUMNS as f32;
+    let cell = 2.0 / ROWS.to_f32() * 2.0 * PI / COLUMNS.to_f32();
     let mut all = [Vec4::ZERO; 9];
     for row in 0..ROWS {
-        let z = 1.0 - (row as f32 + 0.5) * 2.0 / ROWS as f32;
+        let z = 1.0 - (row.to_f32() + 0.5) * 2.0 / ROWS.to_f32();
         let across = (1.0 - z * z).sqrt();
         for column in 0..COLUMNS {
-            let (sin, cos) = ((column as f32 + 0.5) * 2.0 * PI / COLUMNS as f32).sin_cos();
+            let (sin, cos) = ((column.to_f32() + 0.5) * 2.0 * PI / COLUMNS.to_f32()).sin_cos();
             let d = vec3(across * cos, across * sin, z);
             let radiance = light.le(d).0 * cell;
             for (sum, y) in all.iter_mut().zip(basis(d)) {

@@ -2,6 +2,7 @@
 
 use super::gpu::Gpu;
 use super::vertices::STRIDE;
+use furrow_base::math::ToInt;
 use wgpu::{
     BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType, ColorTargetState,
     ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, MultisampleState,
@@ -167,7 +168,7 @@ impl<'a> PipelineParameters<'a> {
         let attributes =
             vertex_attr_array![0 => Float32x4, 1 => Float32x3, 2 => Float32x3, 3 => Float32x2, 4 => Uint32];
         let corners = VertexBufferLayout {
-            array_stride: STRIDE as u64 * 4,
+            array_stride: STRIDE.to_u64() * 4,
             step_mode: VertexStepMode::Vertex,
             attributes: &attributes,
         };

@@ -8,7 +8,7 @@ use super::gpu::Gpu;
 use crate::material::swatch::{Dye, Swatch};
 use crate::scene::Scene;
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::{Spectrum, Vec4};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec4};
 use furrow_optics::texture::ColorSpace;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -49,8 +49,8 @@ impl SceneTextures {
         let mut masks: BTreeMap<usize, TextureView> = BTreeMap::new();
         let mut colors: BTreeMap<[usize; 2], [TextureView; 3]> = BTreeMap::new();
         for part in &scene.parts {
-            let swatch = &swatches[part.material as usize];
-            let of_mask = part.mask.as_ref().map_or(0, |m| Arc::as_ptr(m) as usize);
+            let swatch = &swatches[part.material.to_usize()];
+            let of_mask = part.mask.as_ref().map_or(0, |m| Arc::as_ptr(m).addr());
             let of_colors = if swatch.size.is_some() { swatch.key } else { [0; 2] };
             let next = known.len();
             let sheet = *known.entry((of_colors, of_mask)).or_insert(next);
@@ -62,7 +62,7 @@ impl SceneTextures {
                 sheets.all.push(MaterialTextures { reflected, transmitted, relief, mask: mask.clone() });
             }
             sheets.worn.push(sheet);
-            let by = scene.materials[part.material as usize].tint_factors(part.tint());
+            let by = scene.materials[part.material.to_usize()].tint_factors(part.tint());
             sheets.wears.push(wear(swatch, swatch.dyed(by)));
         }
         sheets
@@ -107,7 +107,7 @@ impl Plane {
                 let columns = [2 * x, (2 * x + 1).min(w - 1)];
                 let sum: Vec4 = rows
                     .iter()
-                    .flat_map(|y| columns.iter().map(|x| self.texels[*y as usize * w as usize + *x as usize]))
+                    .flat_map(|y| columns.iter().map(|x| self.texels[y.to_usize() * w.to_usize() + x.to_usize()]))
                     .sum();
                 sum * 0.25
             })
@@ -131,7 +131,7 @@ impl Plane {
 }
 
 fn byte(v: f32) -> u8 {
-    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+    (v.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>()
 }
 
 /// Uploads mip levels. Colours are sRGB-encoded, so that 8 bits are sufficient in the dark.
@@ -184,9 +184,9 @@ fn opacity(gpu: &Gpu, mask: Option<&AlphaMask>, most: u32) -> TextureView {
     let Some(mask) = mask else {
         return gpu.picture((1, 1), TextureFormat::R8Unorm, &[vec![255]]);
     };
-    let at = |x: u32, y: u32| Vec4::splat(f32::from(u8::from(mask.texel(x as i32, y as i32))));
+    let at = |x: u32, y: u32| Vec4::splat(f32::from(u8::from(mask.texel(x.to_i32(), y.to_i32()))));
     let levels = Plane::new(mask.size(), at).levels(most);
-    let share = levels[0].texels.iter().filter(|v| v.x >= 0.5).count() as f64 / levels[0].texels.len() as f64;
+    let share = levels[0].texels.iter().filter(|v| v.x >= 0.5).count().to_f64() / levels[0].texels.len().to_f64();
     let bytes: Vec<Vec<u8>> = levels
         .iter()
         .map(|level| {
@@ -200,7 +200,7 @@ fn opacity(gpu: &Gpu, mask: Option<&AlphaMask>, most: u32) -> TextureView {
 /// Returns the value that this fraction of a level's texels reaches.
 fn cut(level: &Plane, share: f64) -> f32 {
     let mut values: Vec<f32> = level.texels.iter().map(|v| v.x).collect();
-    let rank = ((share * values.len() as f64).round() as usize).clamp(1, values.len()) - 1;
+    let rank = (share * values.len().to_f64()).round_to::<usize>().clamp(1, values.len()) - 1;
     let (_, value, _) = values.select_nth_unstable_by(rank, |a, b| b.total_cmp(a));
     // Where many texels have the same value, such as 1, that value does not separate them; the cut is at most ½.
     value.min(0.5)

@@ -9,7 +9,7 @@
 
 use crate::scene::Scene;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::{ToFloat, ToInt, Vec2, Vec3};
 use furrow_optics::sensor::Camera;
 use std::ops::Range;
 
@@ -42,28 +42,28 @@ impl Vertices {
         order.sort_by_key(|i| worn[*i]);
         let mut all = Self { of_sheet: vec![0..0; sheets], ..Self::default() };
         for part in order {
-            let begin = all.indices.len() as u32;
-            all.add(&scene.parts[part].in_world(), part as u32, &scene.camera);
+            let begin = all.indices.len().to_u32();
+            all.add(&scene.parts[part].in_world(), part.to_u32(), &scene.camera);
             let span = &mut all.of_sheet[worn[part]];
             if span.start == span.end {
                 *span = begin..begin;
             }
-            span.end = all.indices.len() as u32;
+            span.end = all.indices.len().to_u32();
         }
         all
     }
 
     fn add(&mut self, mesh: &Mesh, part: u32, camera: &Camera) {
-        let first = self.corners.len() as u32;
+        let first = self.corners.len().to_u32();
         let places: Vec<ProjectedVertex> = mesh.positions.iter().map(|p| ProjectedVertex::new(camera, *p)).collect();
         for (i, placed) in places.iter().enumerate() {
             self.corners.push(corner(placed, mesh.positions[i], mesh.normals[i], mesh.uvs[i], part));
         }
         let bends = camera.bends_lines();
         for triangle in &mesh.triangles {
-            if bends && longest(&triangle.map(|i| &places[i as usize]), camera).is_some() {
+            if bends && longest(&triangle.map(|i| &places[i.to_usize()]), camera).is_some() {
                 let of = triangle.map(|i| {
-                    let i = i as usize;
+                    let i = i.to_usize();
                     ObjectVertex { position: mesh.positions[i], normal: mesh.normals[i], uv: mesh.uvs[i] }
                 });
                 self.halve(&of, part, camera, 0);
@@ -85,7 +85,7 @@ impl Vertices {
             }
             _ => {
                 for (bare, placed) in of.iter().zip(&placed) {
-                    self.indices.push(self.corners.len() as u32);
+                    self.indices.push(self.corners.len().to_u32());
                     self.corners.push(corner(placed, bare.position, bare.normal, bare.uv, part));
                 }
             }
@@ -131,7 +131,7 @@ impl ProjectedVertex {
         });
         let ndc = [2.0 * at[0] / f64::from(camera.width()) - 1.0, 1.0 - 2.0 * at[1] / f64::from(camera.height())];
         // Reversed depth near / z: 1 at the near plane, 0 at infinity, with even precision.
-        Self { at, depth, clip: [ndc[0] * depth, ndc[1] * depth, NEAR, depth].map(|v| v as f32) }
+        Self { at, depth, clip: [ndc[0] * depth, ndc[1] * depth, NEAR, depth].map(ToFloat::to_f32) }
     }
 }
 

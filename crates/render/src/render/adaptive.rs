@@ -11,6 +11,7 @@ use super::{Progressive, RenderMonitor, Settings};
 use crate::film::{Film, Pixel, median_relative_error};
 use crate::integrator::{Integrator, World};
 use furrow_base::Result;
+use furrow_base::math::RoundTo;
 use furrow_base::sampling::rng::mix;
 use std::time::Instant;
 
@@ -69,7 +70,7 @@ pub fn adaptive(
 fn needed(pixels: &[Pixel], error: f32, most: u32) -> u32 {
     let samples = pixels.first().map_or(0, |p| p.samples);
     let ratio = f64::from(median_relative_error(pixels) / error);
-    let needed = (f64::from(samples) * ratio * ratio).min(f64::from(most)) as u32;
+    let needed = (f64::from(samples) * ratio * ratio).min(f64::from(most)).trunc_to::<u32>();
     needed.max(LOOK).next_multiple_of(BLOCK).min(most)
 }
 

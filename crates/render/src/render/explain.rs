@@ -3,7 +3,7 @@
 use super::{Settings, label, pixel};
 use crate::integrator::{Integrator, World};
 use furrow_base::geometry::{Ray, Window};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToInt};
 use std::fmt::Write;
 
 /// Describes a pixel: its label, the surface at its centre, and the radiance of its samples. `plant` describes a plant
@@ -27,8 +27,8 @@ pub fn explain(
     match world.interact(&Ray::new(origin, direction), 0.0, scene.camera.pixel_angle()) {
         None => text.push_str("\n  surface: none"),
         Some((hit, at)) => {
-            let part = &scene.parts[hit.part as usize];
-            let (bsdf, frame) = scene.materials[part.material as usize].scatter(&at, -direction);
+            let part = &scene.parts[hit.part.to_usize()];
+            let (bsdf, frame) = scene.materials[part.material.to_usize()].scatter(&at, -direction);
             let cos = frame.to_local(-direction).z;
             let _ = write!(
                 text,

@@ -10,7 +10,7 @@ use crate::accel::BruteForce;
 use crate::scene::tag::Tag;
 use crate::scene::{Part, Scene};
 use furrow_base::geometry::{Ray, Window};
-use furrow_base::math::{Vec3, vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, vec3};
 use furrow_optics::sensor::{Camera, PixelBox};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -30,12 +30,12 @@ pub struct Extent {
 impl Extent {
     /// Visible fraction of the part inside the window, 0 to 1.
     pub fn visible_fraction(&self) -> f32 {
-        self.visible as f32 / self.unoccluded.max(1) as f32
+        self.visible.to_f32() / self.unoccluded.max(1).to_f32()
     }
 
     /// Fraction of the whole that is inside the window, 0 to 1.
     pub fn inside_fraction(&self) -> f32 {
-        self.unoccluded as f32 / self.whole.max(1) as f32
+        self.unoccluded.to_f32() / self.whole.max(1).to_f32()
     }
 }
 
@@ -98,14 +98,14 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
 fn visible(labels: &LabelMap) -> BTreeMap<(u32, u16), (u32, Area)> {
     let mut seen: BTreeMap<(u32, u16), (u32, Area)> = BTreeMap::new();
     let Window { x0, y0, .. } = labels.window;
-    for (row, y) in labels.tags.chunks(labels.window.width() as usize).zip(y0 as i32..) {
-        let mut x = x0 as i32;
+    for (row, y) in labels.tags.chunks(labels.window.width().to_usize()).zip(y0.to_i32()..) {
+        let mut x = x0.to_i32();
         for run in row.chunk_by(|a, b| a == b) {
             let Tag { plant, leaf, .. } = run[0];
-            let end = x + run.len() as i32;
+            let end = x + run.len().to_i32();
             if plant > 0 {
                 let (count, area) = seen.entry((plant, leaf)).or_default();
-                *count += run.len() as u32;
+                *count += run.len().to_u32();
                 *area = area.join(Area { x0: x, y0: y, x1: end, y1: y + 1 });
             }
             x = end;
@@ -126,13 +126,13 @@ struct Area {
 impl Area {
     fn of(window: Window) -> Self {
         let Window { x0, y0, x1, y1 } = window;
-        Self { x0: x0 as i32, y0: y0 as i32, x1: x1 as i32, y1: y1 as i32 }
+        Self { x0: x0.to_i32(), y0: y0.to_i32(), x1: x1.to_i32(), y1: y1.to_i32() }
     }
 
     /// Returns the pixels whose centres are in a box. 0.01 pixel covers the rounding of rays to single precision.
     fn within([lo, hi]: PixelBox) -> Self {
-        let [x0, y0] = lo.map(|v| (v - 0.51).ceil() as i32);
-        let [x1, y1] = hi.map(|v| ((v - 0.49).floor() as i32).saturating_add(1));
+        let [x0, y0] = lo.map(|v| (v - 0.51).ceil_to::<i32>());
+        let [x1, y1] = hi.map(|v| (v - 0.49).floor_to::<i32>().saturating_add(1));
         Self { x0, y0, x1, y1 }
     }
 
@@ -141,7 +141,7 @@ impl Area {
     }
 
     fn width(self) -> usize {
-        (self.x1 - self.x0).max(0) as usize
+        (self.x1 - self.x0).max(0).to_usize()
     }
 
     /// Intersection of two areas.
@@ -162,7 +162,7 @@ impl Area {
 
 /// Area by which the image is extended: its own size to each side.
 fn reach(camera: &Camera) -> Area {
-    let (w, h) = (camera.width() as i32, camera.height() as i32);
+    let (w, h) = (camera.width().to_i32(), camera.height().to_i32());
     Area { x0: -w, y0: -h, x1: 2 * w, y1: 2 * h }
 }
 
@@ -199,12 +199,12 @@ impl LabelledObject {
         let mut mask = Mask::new(self.area);
         let window = Area::of(labels.window);
         mask.fill(self.area.meet(window), |x, y| {
-            let tag = labels.tags[(y - window.y0) as usize * window.width() + (x - window.x0) as usize];
+            let tag = labels.tags[(y - window.y0).to_usize() * window.width() + (x - window.x0).to_usize()];
             (tag.plant, tag.leaf) == key
         });
         for part in &self.parts {
-            let it = &scene.parts[*part as usize];
-            for triangle in 0..it.mesh.triangles.len() as u32 {
+            let it = &scene.parts[part.to_usize()];
+            for triangle in 0..it.mesh.triangles.len().to_u32() {
                 let Some(outline) = scene.camera.triangle_outline(it.corners(triangle)) else { continue };
                 mask.fill(Area::within(outline.bounds).meet(self.area), |x, y| {
                     // Most pixels in the bounds of a small triangle are rejected by its edges, which is cheaper than a
@@ -229,16 +229,16 @@ struct Mask {
 
 impl Mask {
     fn new(area: Area) -> Self {
-        let height = (area.y1 - area.y0).max(0) as usize;
+        let height = (area.y1 - area.y0).max(0).to_usize();
         Self { area, set: vec![false; area.width() * height] }
     }
 
     /// Adds the pixels of a part of the area that pass a test. Pixels already in the set are not tested.
     fn fill(&mut self, part: Area, test: impl Fn(i32, i32) -> bool) {
         for y in part.y0..part.y1 {
-            let row = (y - self.area.y0) as usize * self.area.width();
+            let row = (y - self.area.y0).to_usize() * self.area.width();
             for x in part.x0..part.x1 {
-                let set = &mut self.set[row + (x - self.area.x0) as usize];
+                let set = &mut self.set[row + (x - self.area.x0).to_usize()];
                 *set = *set || test(x, y);
             }
         }
@@ -248,7 +248,7 @@ impl Mask {
     fn add(&mut self, other: &Self) {
         let area = other.area;
         for (row, y) in other.set.chunks(area.width().max(1)).zip(area.y0..) {
-            let from = (y - self.area.y0) as usize * self.area.width() + (area.x0 - self.area.x0) as usize;
+            let from = (y - self.area.y0).to_usize() * self.area.width() + (area.x0 - self.area.x0).to_usize();
             for (to, set) in self.set[from..].iter_mut().zip(row) {
                 *to |= *set;
             }
@@ -259,10 +259,10 @@ impl Mask {
     fn count(&self, window: Area) -> Extent {
         let mut extent = Extent::default();
         for (row, y) in self.set.chunks(self.area.width().max(1)).zip(self.area.y0..) {
-            let count = |row: &[bool]| row.iter().filter(|set| **set).count() as u32;
+            let count = |row: &[bool]| row.iter().filter(|set| **set).count().to_u32();
             extent.whole += count(row);
             if (window.y0..window.y1).contains(&y) {
-                let column = |x: i32| (x.clamp(self.area.x0, self.area.x1) - self.area.x0) as usize;
+                let column = |x: i32| (x.clamp(self.area.x0, self.area.x1) - self.area.x0).to_usize();
                 extent.unoccluded += count(&row[column(window.x0)..column(window.x1)]);
             }
         }

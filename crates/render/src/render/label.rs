@@ -4,7 +4,7 @@
 use crate::scene::Part;
 use crate::scene::tag::Tag;
 use furrow_base::geometry::{Hit, Intersect, Mesh, PACKET, Ray, Window};
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec3};
 use furrow_optics::sensor::Camera;
 use rayon::prelude::*;
 
@@ -47,7 +47,7 @@ impl LabelMap {
 
 /// Computes the labels of `parts` in a window of the camera image.
 pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: Window) -> LabelMap {
-    let (width, count) = (window.width() as usize, (window.width() * window.height()) as usize);
+    let (width, count) = (window.width().to_usize(), (window.width() * window.height()).to_usize());
     let mut map = LabelMap {
         window,
         parts: vec![NONE; count],
@@ -59,7 +59,7 @@ pub fn label(geometry: &dyn Intersect, parts: &[Part], camera: &Camera, window: 
     let rows = rows.zip(map.depth.par_chunks_mut(width)).zip(map.normals.par_chunks_mut(width));
     rows.zip(window.y0..window.y1).for_each(|((((row, tags), depth), normals), y)| {
         row_hits(geometry, camera, window, y, |x, ray, hit| {
-            let part = &parts[hit.part as usize];
+            let part = &parts[hit.part.to_usize()];
             row[x] = hit.part;
             tags[x] = part.tag;
             depth[x] = hit.t * ray.direction.dot(camera.pose().axes.z_axis);
@@ -78,12 +78,12 @@ pub fn row_hits(
     y: u32,
     mut found: impl FnMut(usize, &Ray, &Hit),
 ) {
-    let width = window.width() as usize;
+    let width = window.width().to_usize();
     // Rays of neighbouring pixels are nearly parallel and traced as packets.
     for first in (0..width).step_by(PACKET) {
         let mut rays = [None; PACKET];
         for (x, ray) in (first..width).zip(&mut rays) {
-            let (origin, direction) = camera.centre_ray(window.x0 + x as u32, y);
+            let (origin, direction) = camera.centre_ray(window.x0 + x.to_u32(), y);
             *ray = Some(Ray::new(origin, direction));
         }
         let hits = geometry.closest_packet(&rays);
@@ -107,7 +107,7 @@ pub(super) fn normal(part: &Part, hit: &Hit, direction: Vec3) -> Vec3 {
 /// surface the interpolated normal may face away; then the triangle's own normal is used.
 #[inline]
 fn facing(mesh: &Mesh, hit: &Hit, direction: Vec3) -> Vec3 {
-    let corners = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+    let corners = mesh.triangles[hit.triangle.to_usize()].map(ToInt::to_usize);
     let [a, b, c] = corners.map(|i| mesh.positions[i]);
     let [na, nb, nc] = corners.map(|i| mesh.normals[i]);
     let flat = (b - a).cross(c - a);

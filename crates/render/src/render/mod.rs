@@ -13,7 +13,7 @@ use crate::accel::prepare_thread;
 use crate::film::{Accumulator, Film, Pixel};
 use crate::integrator::{Integrator, Sample, World};
 use furrow_base::geometry::{PACKET, Ray, Window};
-use furrow_base::math::vec2;
+use furrow_base::math::{ToFloat, ToInt, vec2};
 use furrow_base::sampling::{Points, Sampler, sets};
 use furrow_base::{Error, Result};
 use rayon::prelude::*;
@@ -91,7 +91,7 @@ pub fn render(
                 .take_while(|_| !watch.stopped())
                 .map(|(x, y)| pixel(world, integrator, settings, x, y))
                 .collect();
-            (watch.done)(u64::from(settings.spp) * pixels.len() as u64);
+            (watch.done)(u64::from(settings.spp) * pixels.len().to_u64());
             pixels
         })
         .collect();
@@ -120,9 +120,9 @@ fn gather(
     sum: &mut Accumulator,
 ) {
     let spread = world.scene.camera.pixel_angle();
-    for packet in samples.start / PACKET as u32..samples.end.div_ceil(PACKET as u32) {
+    for packet in samples.start / PACKET.to_u32()..samples.end.div_ceil(PACKET.to_u32()) {
         let mut wanted = [None; PACKET];
-        for (index, wanted) in (packet * PACKET as u32..).zip(&mut wanted) {
+        for (index, wanted) in (packet * PACKET.to_u32()..).zip(&mut wanted) {
             if samples.contains(&index) {
                 *wanted = Some(sample(world, settings, at, index));
             }
@@ -142,7 +142,7 @@ fn sample(world: &World<'_>, settings: &Settings, (x, y): (u32, u32), index: u32
     let (camera, filter) = (&world.scene.camera, &world.scene.filter);
     let sampler = Sampler::of(settings.points, settings.seed, x, y, index);
     let [u, v, ..] = sampler.get4(sets::FIRST);
-    let at = vec2(x as f32 + 0.5, y as f32 + 0.5) + filter.sample([u, v]);
+    let at = vec2(x.to_f32() + 0.5, y.to_f32() + 0.5) + filter.sample([u, v]);
     let lens = camera.aperture().map_or([0.0; 2], |_| {
         let [u, v, ..] = sampler.get4(sets::LENS);
         [u, v]

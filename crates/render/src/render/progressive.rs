@@ -5,6 +5,7 @@ use super::{RenderMonitor, Settings, gather, tiles};
 use crate::film::{Accumulator, Film, Pixel};
 use crate::integrator::{Integrator, World};
 use furrow_base::geometry::{PACKET, Window};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -37,7 +38,7 @@ impl<'a> Progressive<'a> {
         let empty = |window: Window| Tile {
             window,
             done: 0,
-            sums: vec![Accumulator::default(); (window.width() * window.height()) as usize],
+            sums: vec![Accumulator::default(); (window.width() * window.height()).to_usize()],
         };
         Self { world, integrator, settings, tiles: tiles::tiles(settings.window).into_iter().map(empty).collect() }
     }
@@ -60,7 +61,7 @@ impl<'a> Progressive<'a> {
                 gather(world, *integrator, settings, at, range.clone(), sum);
             }
             tile.done = range.end;
-            (watch.done)((range.len() * tile.sums.len()) as u64);
+            (watch.done)((range.len() * tile.sums.len()).to_u64());
         });
         // Some accumulators may have more samples than their tile records, so the result must not be used.
         if watch.stopped() { Err(Error::interrupted()) } else { Ok(()) }
@@ -74,7 +75,7 @@ impl<'a> Progressive<'a> {
         deadline: Option<Instant>,
         watch: &RenderMonitor<'_>,
     ) -> Result<bool> {
-        let packets = |samples: u32| samples.div_ceil(PACKET as u32);
+        let packets = |samples: u32| samples.div_ceil(PACKET.to_u32());
         let most = packets(goals.iter().copied().max().unwrap_or(0));
         let Some(deadline) = deadline else {
             self.advance_each(|i| goals[i], watch)?;
@@ -86,8 +87,8 @@ impl<'a> Progressive<'a> {
         while done < most && step > 0 {
             let begin = Instant::now();
             let next = done.saturating_add(step).min(most);
-            let share = |goal: u32| (u64::from(packets(goal)) * u64::from(next)).div_ceil(u64::from(most)) as u32;
-            self.advance_each(|i| (share(goals[i]) * PACKET as u32).min(goals[i]), watch)?;
+            let share = |goal: u32| (u64::from(packets(goal)) * u64::from(next)).div_ceil(u64::from(most)).to_u32();
+            self.advance_each(|i| (share(goals[i]) * PACKET.to_u32()).min(goals[i]), watch)?;
             let each = begin.elapsed().as_secs_f64() / f64::from(next - done);
             done = next;
             let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
@@ -95,8 +96,8 @@ impl<'a> Progressive<'a> {
             if step == 0 && done < most {
                 // Fill the remaining time with part of a packet. Nothing follows it, so the bits are those of a single
                 // pass.
-                let part = (0.75 * left / each * PACKET as f64) as u32;
-                self.advance_each(|i| (share(goals[i]) * PACKET as u32 + part).min(goals[i]), watch)?;
+                let part = (0.75 * left / each * PACKET.to_f64()).trunc_to::<u32>();
+                self.advance_each(|i| (share(goals[i]) * PACKET.to_u32() + part).min(goals[i]), watch)?;
             }
         }
         Ok(done >= most)
@@ -119,7 +120,7 @@ impl<'a> Progressive<'a> {
 /// seconds. Passes double; near the end each takes three quarters of what fits, so that errors of the prediction are
 /// small when they matter.
 fn next_step(done: u32, each: f64, left: f64) -> u32 {
-    let fits = (left / each.max(1e-9)) as u32;
+    let fits = (left / each.max(1e-9)).trunc_to::<u32>();
     if fits >= 2 * done.max(1) { done.max(1) } else { (fits - fits / 4).min(done.max(1)) }
 }
 

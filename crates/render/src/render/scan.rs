@@ -27,7 +27,7 @@ use super::label::normal;
 use crate::integrator::World;
 use crate::scene::Part;
 use furrow_base::geometry::{PACKET, Ray};
-use furrow_base::math::{Spectrum, Vec3};
+use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec3};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::sensor::{BeamRay, Lidar, Pulse};
 use rayon::prelude::*;
@@ -94,18 +94,18 @@ fn echoes(world: &World<'_>, lidar: &Lidar, pulse: Pulse, errors: &mut Stream) -
     let mut glints = glints(world, lidar, &lidar.rays(&pulse));
     glints.sort_by(|a, b| a.range.total_cmp(&b.range));
     let clusters = glints.chunk_by(|near, far| {
-        let same = parts[near.part as usize].tag == parts[far.part as usize].tag;
+        let same = parts[near.part.to_usize()].tag == parts[far.part.to_usize()].tag;
         let stretched = if same { 0.5 * (near.depth + far.depth) } else { 0.0 };
         far.range - near.range <= lidar.separation + stretched
     });
     let mut all: Vec<Echo> = clusters.filter_map(|cluster| echo(parts, lidar, pulse, cluster)).collect();
     for echo in &mut all {
-        echo.range += (lidar.noise * errors.normal()) as f32;
+        echo.range += (lidar.noise * errors.normal()).to_f32();
     }
     // The LiDAR reports measured values: their order, and only those within its range.
     all.retain(|echo| lidar.in_range(echo.range));
     all.sort_by(|a, b| a.range.total_cmp(&b.range));
-    let count = all.len() as u8;
+    let count = all.len().to_u8();
     for (number, echo) in (1..).zip(&mut all) {
         (echo.number, echo.count) = (number, count);
     }
@@ -127,7 +127,7 @@ fn glints(world: &World<'_>, lidar: &Lidar, rays: &[BeamRay]) -> Vec<Glint> {
             let width = lidar.spacing(hit.t);
             let (back, reflectance) = world.backscatter(asked, &hit, width);
             let [.., nir] = back.to_array();
-            let normal = normal(&world.scene.parts[hit.part as usize], &hit, asked.direction);
+            let normal = normal(&world.scene.parts[hit.part.to_usize()], &hit, asked.direction);
             let cos = normal.dot(asked.direction).abs().clamp(LEAST_COS, 1.0);
             all.push(Glint {
                 range: hit.t,
@@ -150,7 +150,7 @@ fn echo(parts: &[Part], lidar: &Lidar, pulse: Pulse, cluster: &[Glint]) -> Optio
     if !(energy > 0.0 && energy >= lidar.least && lidar.in_range(range)) {
         return None;
     }
-    let tag = |glint: &Glint| parts[glint.part as usize].tag;
+    let tag = |glint: &Glint| parts[glint.part.to_usize()].tag;
     let of_its_kind = |glint: &Glint| cluster.iter().filter(|g| tag(g) == tag(glint)).map(|g| g.energy).sum::<f32>();
     let rank = |glint: &Glint| (of_its_kind(glint), glint.energy);
     let most = cluster.iter().reduce(|a, b| if rank(b) > rank(a) { b } else { a })?;

@@ -3,6 +3,7 @@
 //! The tile grid is fixed to the camera image, not to the window: cropping cuts tiles but does not move them.
 
 use furrow_base::geometry::Window;
+use furrow_base::math::ToInt;
 
 /// Side length of a tile, pixels.
 pub(super) const TILE: u32 = 16;
@@ -28,10 +29,10 @@ pub(super) fn pixels(window: Window) -> impl Iterator<Item = (u32, u32)> {
 
 /// Assembles per-tile results into the rows of the window.
 pub(super) fn assemble<T: Clone + Default>(window: Window, made: impl Iterator<Item = (Window, Vec<T>)>) -> Vec<T> {
-    let mut whole = vec![T::default(); (window.width() * window.height()) as usize];
+    let mut whole = vec![T::default(); (window.width() * window.height()).to_usize()];
     for (tile, values) in made {
         for ((x, y), value) in pixels(tile).zip(values) {
-            whole[((y - window.y0) * window.width() + x - window.x0) as usize] = value;
+            whole[((y - window.y0) * window.width() + x - window.x0).to_usize()] = value;
         }
     }
     whole

@@ -3,6 +3,7 @@
 use super::frame::{WIDTH, figure, tenth};
 use crate::axis::step;
 use crate::{Bar, Tally, number, whole};
+use furrow_base::math::{RoundTo, ToFloat};
 use maud::{Markup, html};
 
 /// Margins: left for the maximum count, right for half of a tick label.
@@ -40,10 +41,10 @@ pub fn histograms(key: &str, title: &str, unit: &str, series: &[Series<'_>]) -> 
     let values: Vec<&Tally> = shown.iter().map(|s| s.values).collect();
     let rows = Tally::bars(&values);
     let axis = Axis::of(&rows[0], values[0]);
-    let height = rows.len() as f64 * (WORDS + BARS + GAP) - GAP + FOOT;
+    let height = rows.len().to_f64() * (WORDS + BARS + GAP) - GAP + FOOT;
     let body = html! {
         @for (k, (one, bars)) in shown.iter().zip(&rows).enumerate() {
-            (row(key, one, bars, &axis, k as f64 * (WORDS + BARS + GAP)))
+            (row(key, one, bars, &axis, k.to_f64() * (WORDS + BARS + GAP)))
         }
         @for (at, text) in axis.ticks() {
             text.tick x=(tenth(at)) y=(tenth(height - 5.0)) text-anchor="middle" { (text) }
@@ -88,7 +89,7 @@ fn row(key: &str, one: &Series<'_>, bars: &[Bar], axis: &Axis, top: f64) -> Mark
 /// One bar.
 fn column(bar: &Bar, most: u64, axis: &Axis, floor: f64) -> Markup {
     // A single count remains visible.
-    let tall = (BARS * bar.count as f64 / most as f64).max(1.0);
+    let tall = (BARS * bar.count.to_f64() / most.to_f64()).max(1.0);
     let (from, to) = (axis.at(bar.from), axis.at(bar.to));
     let range = if axis.centred { number(bar.from) } else { format!("{} to {}", number(bar.from), number(bar.to)) };
     html! {
@@ -135,14 +136,15 @@ impl Axis {
         if self.logarithmic {
             let (from, to) = (self.from.max(1.0).log2(), self.to.max(1.0).log2());
             let step = ((to - from) / 6.0).ceil().max(1.0);
-            let first = (from / step).ceil() as i32;
-            let last = (to / step).floor() as i32;
+            let first = (from / step).ceil_to::<i32>();
+            let last = (to / step).floor_to::<i32>();
             return (first..=last).map(|k| (f64::from(k) * step).exp2()).map(|v| (self.at(v), short(v))).collect();
         }
         let step = step((self.to - self.from) / 5.0).max(if self.centred { 1.0 } else { 0.0 });
         let half = if self.centred { 0.5 } else { 0.0 };
-        let (first, last) = ((self.from / step - 1e-9).ceil() as i64, ((self.to - half) / step + 1e-9).floor() as i64);
-        (first..=last).map(|k| k as f64 * step).map(|v| (self.at(v + half), number(v))).collect()
+        let (first, last) =
+            ((self.from / step - 1e-9).ceil_to::<i64>(), ((self.to - half) / step + 1e-9).floor_to::<i64>());
+        (first..=last).map(|k| k.to_f64() * step).map(|v| (self.at(v + half), number(v))).collect()
     }
 }
 

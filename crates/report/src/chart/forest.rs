@@ -3,6 +3,7 @@
 use super::frame::{drawing, tenth};
 use crate::axis::ticks;
 use crate::number;
+use furrow_base::math::ToFloat;
 use maud::{Markup, html};
 
 /// Width of a chart in its own units: larger than that of the small charts, to leave room for names.
@@ -47,19 +48,19 @@ pub fn forest(title: &str, unit: &str, effects: &[Effect]) -> Markup {
     let mut effects: Vec<&Effect> = effects.iter().collect();
     effects.sort_by(|a, b| a.mean.total_cmp(&b.mean));
     let longest = effects.iter().map(|effect| effect.name.chars().count()).max().unwrap_or(0);
-    let left = (longest as f64 * CHARACTER).min(NAMES) + 16.0;
+    let left = (longest.to_f64() * CHARACTER).min(NAMES) + 16.0;
     let least = effects.iter().map(|effect| effect.ends().0).fold(0.0, f64::min);
     let most = effects.iter().map(|effect| effect.ends().1).fold(0.0, f64::max);
     let (least, most) = if least < most { (least, most) } else { (-1.0, 1.0) };
     let at = |value: f64| left + (value - least) / (most - least) * (WIDTH - left - RIGHT);
-    let foot = ROW * effects.len() as f64;
+    let foot = ROW * effects.len().to_f64();
     let body = html! {
         @for tick in ticks(least, most, 5) {
             path.rung d=(format!("M{} 0V{}", tenth(at(tick)), tenth(foot))) {}
             text.tick x=(tenth(at(tick))) y=(tenth(foot + 15.0)) text-anchor="middle" { (number(tick)) }
         }
         path.zero d=(format!("M{} 0V{}", tenth(at(0.0)), tenth(foot))) {}
-        @for (k, effect) in effects.iter().enumerate() { (row(effect, &at, left, ROW * (k as f64 + 0.5))) }
+        @for (k, effect) in effects.iter().enumerate() { (row(effect, &at, left, ROW * (k.to_f64() + 0.5))) }
     };
     html! { figure.chart.forest { (drawing(title, unit, (WIDTH, foot + FOOT), body)) } }
 }
@@ -68,7 +69,7 @@ pub fn forest(title: &str, unit: &str, effects: &[Effect]) -> Markup {
 fn row(effect: &Effect, at: &dyn Fn(f64) -> f64, left: f64, middle: f64) -> Markup {
     let (from, to) = effect.ends();
     let (from, to, mean, y) = (tenth(at(from)), tenth(at(to)), tenth(at(effect.mean)), tenth(middle));
-    let shown = effect.name.chars().count() as f64 * CHARACTER;
+    let shown = effect.name.chars().count().to_f64() * CHARACTER;
     // A name that does not fit is condensed, not truncated.
     let length = (shown > NAMES).then(|| tenth(NAMES));
     html! {

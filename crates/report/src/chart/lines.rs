@@ -3,6 +3,7 @@
 use super::frame::{figure, tenth};
 use crate::axis::ticks;
 use crate::number;
+use furrow_base::math::{RoundTo, ToFloat};
 use maud::{Markup, html};
 use std::fmt::Write;
 
@@ -112,14 +113,14 @@ impl Chart {
 
     fn body(&self, ink: &Ink) -> Markup {
         let rows = self.legend();
-        let top = TITLE + LEGEND * rows.last().map_or(0, |(_, _, row)| row + 1) as f64 + 8.0;
+        let top = TITLE + LEGEND * rows.last().map_or(0, |(_, _, row)| row + 1).to_f64() + 8.0;
         let frame = Frame::of(self, [LEFT, SIZE.0 - RIGHT, top, SIZE.1 - BOTTOM]);
         html! {
             title { (self.title) }
             text x=(LEFT) y="20" style={ "font-size:15px;fill:" (ink.text) } font-weight="600" { (self.title) }
             @if let Some(frame) = frame {
                 @for (k, (name, x, row)) in rows.into_iter().enumerate() {
-                    @let y = TITLE + LEGEND * row as f64 + 10.0;
+                    @let y = TITLE + LEGEND * row.to_f64() + 10.0;
                     path d=(format!("M{x:.1} {:.1}h20", y - 4.0)) fill="none" stroke=(color(k)) stroke-dasharray=[dashes(k)]
                         stroke-width="3" {}
                     (words((x + 26.0, y), 12, ink.text, "start", name))
@@ -138,7 +139,7 @@ impl Chart {
     fn legend(&self) -> Vec<(&str, f64, usize)> {
         let (mut x, mut row) = (LEFT, 0);
         let place = |curve: &Curve| -> (f64, usize) {
-            let wide = 26.0 + CHARACTER * curve.name.chars().count() as f64 + 18.0;
+            let wide = 26.0 + CHARACTER * curve.name.chars().count().to_f64() + 18.0;
             if x > LEFT && x + wide > SIZE.0 - RIGHT {
                 (x, row) = (LEFT, row + 1);
             }
@@ -238,9 +239,9 @@ impl Frame {
             return ticks(from, to, about).into_iter().map(|v| (v, number(v))).collect();
         }
         // Powers of ten; in a short range also 2 and 5 times them.
-        let decades = from.floor() as i32..=to.ceil() as i32;
+        let decades = from.floor_to::<i32>()..=to.ceil_to::<i32>();
         let steps: &[f64] = if to - from < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let every = ((to - from) / 8.0).ceil().max(1.0) as i32;
+        let every = ((to - from) / 8.0).ceil().max(1.0).trunc_to::<i32>();
         let round = decades.filter(|k| k % every == 0).flat_map(|k| steps.iter().map(move |s| s * 10.0_f64.powi(k)));
         let mut values: Vec<f64> = round.filter(|v| (from..=to).contains(&v.log10())).collect();
         if values.len() < LEAST {

@@ -2,6 +2,7 @@
 
 use super::frame::{WIDTH, figure, tenth};
 use crate::percent;
+use furrow_base::math::ToFloat;
 use maud::{Markup, html};
 
 /// Left and right margin.
@@ -19,7 +20,7 @@ pub fn shares(title: &str, unit: &str, rows: &[(String, &str, f64)]) -> Markup {
     let wide = WIDTH - 2.0 * MARGIN;
     let body = html! {
         @for (k, (name, class, share)) in rows.iter().enumerate() {
-            @let top = 2.0 + LINE * k as f64;
+            @let top = 2.0 + LINE * k.to_f64();
             g class=(class) {
                 text.name x=(MARGIN) y=(tenth(top + 11.0)) { (name) }
                 text.tick x=(tenth(WIDTH - MARGIN)) y=(tenth(top + 11.0)) text-anchor="end" { (percent(*share)) }
@@ -28,5 +29,5 @@ pub fn shares(title: &str, unit: &str, rows: &[(String, &str, f64)]) -> Markup {
             }
         }
     };
-    figure(title, unit, 2.0 + LINE * rows.len() as f64, body)
+    figure(title, unit, 2.0 + LINE * rows.len().to_f64(), body)
 }

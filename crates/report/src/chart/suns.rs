@@ -1,6 +1,7 @@
 //! Sun positions in the sky: north up, the zenith in the centre, the horizon as the outer circle.
 
 use super::frame::{WIDTH, figure, tenth};
+use furrow_base::math::ToFloat;
 use maud::{Markup, html};
 
 /// Radius of the horizon, and position of the zenith.
@@ -16,7 +17,7 @@ pub fn suns(suns: &[[f64; 3]]) -> Markup {
     let (x0, y0) = SKY;
     let radius = |elevation: f64| RADIUS * (90.0 - elevation) / 90.0;
     // Opacity decreases with the number of dots, down to a visible minimum.
-    let opacity = (40.0 / suns.len() as f64).clamp(0.25, 0.85);
+    let opacity = (40.0 / suns.len().to_f64()).clamp(0.25, 0.85);
     let dot = |[azimuth, elevation, cloud]: [f64; 3]| {
         let (sin, cos) = azimuth.to_radians().sin_cos();
         let r = radius(elevation);

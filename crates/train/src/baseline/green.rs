@@ -1,5 +1,6 @@
 //! Excess green index (ExG) and its threshold.
 
+use furrow_base::math::{RoundTo, ToFloat};
 use serde::{Deserialize, Serialize};
 
 /// Excess green index.
@@ -32,16 +33,17 @@ const PER_UNIT: f64 = 1024.0;
 /// Excess green at the start of level 0.
 const LEAST: f64 = -2.0;
 /// Number of levels: they cover −2 to 2.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive integer")]
 pub(super) const LEVELS: usize = 4 * PER_UNIT as usize + 1;
 
 /// Returns the level of an excess green value, clamped to the range.
 pub(super) fn level(value: f64) -> usize {
-    ((value - LEAST) * PER_UNIT).clamp(0.0, LEVELS as f64 - 1.0) as usize
+    ((value - LEAST) * PER_UNIT).clamp(0.0, LEVELS.to_f64() - 1.0).trunc_to::<usize>()
 }
 
 /// Returns the excess green at the start of a level. It is exact in binary, so that `level(begin(k)) == k`.
 pub(super) fn begin(level: usize) -> f64 {
-    level as f64 / PER_UNIT + LEAST
+    level.to_f64() / PER_UNIT + LEAST
 }
 
 /// Counts the pixels of each level.
@@ -57,7 +59,7 @@ pub(super) fn histogram(levels: &[usize]) -> Vec<u64> {
 /// is filled, the threshold is above all levels. Source: Otsu 1979, "A threshold selection method from gray-level histograms".
 pub(super) fn otsu(counts: &[u64]) -> usize {
     let all = counts.iter().enumerate();
-    let (total, sum) = all.fold((0.0, 0.0), |(n, s), (k, c)| (n + *c as f64, s + k as f64 * *c as f64));
+    let (total, sum) = all.fold((0.0, 0.0), |(n, s), (k, c)| (n + c.to_f64(), s + k.to_f64() * c.to_f64()));
     let (mut below, mut sum_below) = (0.0, 0.0);
     let mut best = (0.0, counts.len());
     for (k, count) in counts.iter().enumerate() {
@@ -70,8 +72,8 @@ pub(super) fn otsu(counts: &[u64]) -> usize {
                 best = (variance, k);
             }
         }
-        below += *count as f64;
-        sum_below += k as f64 * *count as f64;
+        below += count.to_f64();
+        sum_below += k.to_f64() * count.to_f64();
     }
     best.1
 }
@@ -80,12 +82,14 @@ pub(super) fn otsu(counts: &[u64]) -> usize {
 /// beyond the border.
 pub(super) fn blurred(width: usize, height: usize, rgb: &[[u8; 3]], deviation: f64) -> Vec<[f32; 3]> {
     let sharp: Vec<[f32; 3]> = rgb.iter().map(|pixel| pixel.map(f32::from)).collect();
-    let reach = (3.0 * deviation).ceil() as usize;
+    let reach = (3.0 * deviation).ceil_to::<usize>();
     if reach == 0 || sharp.is_empty() {
         return sharp;
     }
-    let bell: Vec<f32> =
-        (0..=2 * reach).map(|k| (k as f64 - reach as f64) / deviation).map(|z| (-0.5 * z * z).exp() as f32).collect();
+    let bell: Vec<f32> = (0..=2 * reach)
+        .map(|k| (k.to_f64() - reach.to_f64()) / deviation)
+        .map(|z| (-0.5 * z * z).exp().to_f32())
+        .collect();
     let sum: f32 = bell.iter().sum();
     let bell: Vec<f32> = bell.iter().map(|weight| weight / sum).collect();
     // A Gaussian is separable: blur along rows, then along columns.

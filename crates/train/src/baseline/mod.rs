@@ -27,6 +27,7 @@ pub use size::SizeRule;
 
 use self::green::{LEVELS, begin, blurred, histogram, level, otsu};
 use self::size::{CLASSES, CROP, SOIL, Sizes};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::sample::IGNORE;
 use serde::{Deserialize, Serialize};
@@ -172,7 +173,7 @@ impl Baseline {
 
 /// Blurs the colours of an image; `blur` is the standard deviation as a fraction of the image diagonal.
 fn smooth(width: u32, height: u32, rgb: &[[u8; 3]], blur: f64) -> Vec<[f32; 3]> {
-    blurred(width as usize, height as usize, rgb, blur * f64::from(width).hypot(f64::from(height)))
+    blurred(width.to_usize(), height.to_usize(), rgb, blur * f64::from(width).hypot(f64::from(height)))
 }
 
 fn levels(index: Index, colours: &[[f32; 3]]) -> Vec<usize> {
@@ -188,7 +189,7 @@ fn threshold(soil: &[u64], plants: &[u64]) -> Option<(f64, usize)> {
     for level in (0..LEVELS).rev() {
         hit += plants[level];
         wrong += soil[level];
-        let iou = hit as f64 / (all + wrong) as f64;
+        let iou = hit.to_f64() / (all + wrong).to_f64();
         if all > 0 && best.is_none_or(|(most, _)| iou >= most) {
             best = Some((iou, level));
         }
@@ -198,7 +199,7 @@ fn threshold(soil: &[u64], plants: &[u64]) -> Option<(f64, usize)> {
 
 /// Checks that a training image has the number of pixels of its size and only the three classes.
 fn check(image: &Example) -> Result<()> {
-    let n = image.width as usize * image.height as usize;
+    let n = image.width.to_usize() * image.height.to_usize();
     if image.rgb.len() != n || image.truth.len() != n {
         let (rgb, truth) = (image.rgb.len(), image.truth.len());
         return Err(Error::misuse(format!(

@@ -2,6 +2,7 @@
 
 use crate::measure::components::Components;
 use crate::measure::{Confusion, Scores};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_dataset::model::sample::IGNORE;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,7 @@ pub(super) const CLASSES: usize = 3;
 /// Number of area bins per doubling of a region's fraction of the image.
 const PER_DOUBLING: f64 = 8.0;
 /// Number of area bins: fractions from 2⁻³² to 1.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive integer")]
 const SIZES: usize = 32 * PER_DOUBLING as usize + 1;
 
 /// Rule that classifies green regions by area, as a fraction of the image's pixels.
@@ -29,7 +31,7 @@ impl SizeRule {
     pub(super) fn classes(&self, width: u32, height: u32, green: &[bool]) -> Vec<u8> {
         let regions = regions(width, height, green);
         let class = |area: &u32| {
-            let share = f64::from(*area) / green.len() as f64;
+            let share = f64::from(*area) / green.len().to_f64();
             if share >= self.crop_from {
                 CROP
             } else if share >= self.weed_from {
@@ -39,13 +41,13 @@ impl SizeRule {
             }
         };
         let classes: Vec<u8> = regions.areas.iter().map(class).collect();
-        let of = |label: &u32| label.checked_sub(1).map_or(SOIL, |k| classes[k as usize]);
+        let of = |label: &u32| label.checked_sub(1).map_or(SOIL, |k| classes[k.to_usize()]);
         regions.labels.iter().map(of).collect()
     }
 }
 
 fn regions(width: u32, height: u32, green: &[bool]) -> Components {
-    Components::of(width as usize, height as usize, |at| green[at].then_some(()))
+    Components::of(width.to_usize(), height.to_usize(), |at| green[at].then_some(()))
 }
 
 /// Pixel counts of the training images by region area and true class.
@@ -64,10 +66,10 @@ impl Sizes {
     /// Adds the counts of an image with the vegetation mask `green` and the true classes `truth`.
     pub(super) fn add(&mut self, width: u32, height: u32, green: &[bool], truth: &[u8]) {
         let regions = regions(width, height, green);
-        let bin = |area: &u32| bin(f64::from(*area) / green.len() as f64);
+        let bin = |area: &u32| bin(f64::from(*area) / green.len().to_f64());
         let bins: Vec<usize> = regions.areas.iter().map(bin).collect();
         for (label, truth) in regions.labels.iter().zip(truth).filter(|(_, truth)| **truth != IGNORE) {
-            let counts = label.checked_sub(1).map_or(&mut self.bare, |k| &mut self.sized[bins[k as usize]]);
+            let counts = label.checked_sub(1).map_or(&mut self.bare, |k| &mut self.sized[bins[k.to_usize()]]);
             counts[usize::from(*truth)] += 1;
         }
     }
@@ -97,7 +99,7 @@ impl Sizes {
 
 /// Returns the bin of an area, as a fraction of the image.
 fn bin(share: f64) -> usize {
-    let guess = ((share.log2() + 32.0) * PER_DOUBLING).floor().clamp(0.0, SIZES as f64 - 1.0) as usize;
+    let guess = ((share.log2() + 32.0) * PER_DOUBLING).floor().clamp(0.0, SIZES.to_f64() - 1.0).trunc_to::<usize>();
     // Correct for rounding of the logarithm at the start of a bin.
     if guess + 1 < SIZES && share >= begin(guess + 1) {
         guess + 1
@@ -110,7 +112,7 @@ fn bin(share: f64) -> usize {
 
 /// Returns the start of a bin, as a fraction of the image; above 1 for `SIZES`.
 fn begin(bin: usize) -> f64 {
-    (bin as f64 / PER_DOUBLING - 32.0).exp2()
+    (bin.to_f64() / PER_DOUBLING - 32.0).exp2()
 }
 
 #[cfg(test)]

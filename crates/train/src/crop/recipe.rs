@@ -7,6 +7,7 @@ use crate::data::{Pick, Selection};
 use crate::fit::{Plan, Settings};
 use crate::net::Network;
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 use furrow_dataset::model::split::{Shares, Split};
 use furrow_dataset::{Order, model};
 use furrow_render::settings::{Quality, RenderOptions};
@@ -105,13 +106,14 @@ impl Recipe {
 
     /// Returns the estimated core seconds of the training.
     pub fn training_core_s(&self) -> f64 {
-        STEP_CORE_S * self.steps as f64
+        STEP_CORE_S * self.steps.to_f64()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToInt;
 
     /// Rationale: the recipe is that of a measured network. Expected: its settings, 36 images of the quick one to train on, and no
     /// refinement that votes over the network.
@@ -121,7 +123,7 @@ mod tests {
             let order = recipe.order(Path::new("scene.ron"));
             let train = (0..order.count).filter(|k| order.split.of(*k) == Split::Train).count();
             let test = (0..order.count).filter(|k| order.split.of(*k) == Split::Test).count();
-            assert_eq!((train, test as u64), (images, recipe.images - images as u64));
+            assert_eq!((train, test.to_u64()), (images, recipe.images - images.to_u64()));
             let plan = recipe.plan(Path::new("data"), "f32", 2).unwrap();
             assert_eq!((plan.hyper.refine.name(), plan.hyper.resize.name()), ("colour".into(), "480,640,960".into()));
             assert_eq!((plan.hyper.crop_size, plan.hyper.pretrained.name()), (Some(CROP), "imagenet".into()));

@@ -8,6 +8,7 @@ use super::crop::{self, Crop, GeometricAugmentation, Placement};
 use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::Stream;
 use furrow_optics::sensor::Jpeg;
 use serde::{Deserialize, Serialize};
@@ -151,8 +152,8 @@ impl Augment {
         }
         let light = self.colour.then(|| Light::draw(colour, stream));
         let centred = |i: usize, (w, h): (u32, u32)| {
-            let (x, y) = (i as u32 % w, i as u32 / w);
-            [x as f32 + 0.5 - w as f32 / 2.0, y as f32 + 0.5 - h as f32 / 2.0]
+            let (x, y) = (i.to_u32() % w, i.to_u32() / w);
+            [x.to_f32() + 0.5 - w.to_f32() / 2.0, y.to_f32() + 0.5 - h.to_f32() / 2.0]
         };
         if let Some(light) = &light {
             let at = |i| placement.as_ref().map_or_else(|| centred(i, image), |p| p.map(centred(i, size)));
@@ -217,26 +218,28 @@ struct Light {
 
 impl Light {
     fn draw(colour: &[bool], stream: &mut Stream) -> Self {
-        let mut log_normal = |sigma: f64| (sigma * stream.normal()).exp() as f32;
+        let mut log_normal = |sigma: f64| (sigma * stream.normal()).exp().to_f32();
         let exposure = log_normal(0.25);
         let gamma = log_normal(0.2);
         let gains: Vec<f32> = colour.iter().map(|_| exposure * log_normal(0.1)).collect();
         let saturation = stream.range32(0.5, 1.5);
-        let mut slope = || (0.08 * stream.normal()) as f32;
-        let curve = (0..=CURVE).map(|i| (i as f32 / CURVE as f32).powf(gamma)).collect();
+        let mut slope = || (0.08 * stream.normal()).to_f32();
+        let curve = (0..=CURVE).map(|i| (i.to_f32() / CURVE.to_f32()).powf(gamma)).collect();
         Self { curve, gains: gains.into_iter().map(|g| [g, slope(), slope()]).collect(), saturation }
     }
 
     /// Applies the changes in place. `at` returns the position of a pixel in the image of `size`, relative to its centre.
     fn apply(&self, pixels: &mut [f32], colour: &[bool], size: (u32, u32), at: impl Fn(usize) -> [f32; 2]) {
-        let colours = colour.iter().filter(|c| **c).count().max(1) as f32;
-        let (right, down) = (2.0 / size.0 as f32, 2.0 / size.1 as f32);
+        let colours = colour.iter().filter(|c| **c).count().max(1).to_f32();
+        let (right, down) = (2.0 / size.0.to_f32(), 2.0 / size.1.to_f32());
         for (i, pixel) in pixels.chunks_exact_mut(colour.len()).enumerate() {
             let [x, y] = at(i);
             // The gain is constant beyond the edges, where images are mirrored.
             let (x, y) = ((x * right).clamp(-1.0, 1.0), (y * down).clamp(-1.0, 1.0));
             for (v, [gain, along, across]) in pixel.iter_mut().zip(&self.gains) {
-                *v = gain * (1.0 + along * x + across * y).max(0.0) * self.curve[(*v * CURVE as f32 + 0.5) as usize];
+                *v = gain
+                    * (1.0 + along * x + across * y).max(0.0)
+                    * self.curve[(*v * CURVE.to_f32() + 0.5).trunc_to::<usize>()];
             }
             let gray = pixel.iter().zip(colour).filter(|(_, c)| **c).map(|(v, _)| *v).sum::<f32>() / colours;
             for (v, _) in pixel.iter_mut().zip(colour).filter(|(_, c)| **c) {
@@ -248,14 +251,14 @@ impl Light {
 
 /// Blurs in place with a separable Gaussian of `sigma` pixels; edge pixels are repeated.
 fn blur(pixels: &mut [f32], bands: usize, (w, h): (u32, u32), sigma: f32) {
-    let radius = (3.0 * sigma).ceil() as i64;
-    let mut kernel: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
+    let radius = (3.0 * sigma).ceil_to::<i64>();
+    let mut kernel: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i.to_f32() / sigma).powi(2)).exp()).collect();
     let sum: f32 = kernel.iter().sum();
     for k in &mut kernel {
         *k /= sum;
     }
-    let row = w as usize * bands;
-    let reach = radius as usize;
+    let row = w.to_usize() * bands;
+    let reach = radius.to_usize();
     let mut across = vec![0.0; pixels.len()];
     let mut padded = vec![0.0; row + 2 * reach * bands];
     for (out, from) in across.chunks_exact_mut(row).zip(pixels.chunks_exact(row)) {
@@ -271,7 +274,7 @@ fn blur(pixels: &mut [f32], bands: usize, (w, h): (u32, u32), sigma: f32) {
     pixels.fill(0.0);
     for (y, out) in pixels.chunks_exact_mut(row).enumerate() {
         for (i, k) in kernel.iter().enumerate() {
-            let from = (y + i).saturating_sub(reach).min(h as usize - 1) * row;
+            let from = (y + i).saturating_sub(reach).min(h.to_usize() - 1) * row;
             add_times(out, &across[from..], *k);
         }
     }
@@ -279,10 +282,10 @@ fn blur(pixels: &mut [f32], bands: usize, (w, h): (u32, u32), sigma: f32) {
 
 /// Applies the loss of JPEG compression to the colour channels in place. Does nothing unless there are three of them.
 fn compress(pixels: &mut [f32], colour: &[bool], width: u32, stream: &mut Stream) {
-    let jpeg = Jpeg { quality: stream.range(30.0, 96.0) as u32, full_color: stream.chance(0.5) };
+    let jpeg = Jpeg { quality: stream.range(30.0, 96.0).trunc_to::<u32>(), full_color: stream.chance(0.5) };
     let places: Vec<usize> = (0..colour.len()).filter(|b| colour[*b]).collect();
     let &[red, green, blue] = places.as_slice() else { return };
-    let coded = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let coded = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round_to::<u8>();
     let mut rgb: Vec<u8> =
         pixels.chunks_exact(colour.len()).flat_map(|p| [red, green, blue].map(|b| coded(p[b]))).collect();
     jpeg.pass(&mut rgb, width);
@@ -305,7 +308,7 @@ fn add_noise(pixels: &mut [f32], sd: f32, stream: &mut Stream) {
     let scale = sd * 3.0f32.sqrt() / f32::from(u8::MAX);
     for v in pixels {
         let bytes = stream.seed32().to_le_bytes().map(i32::from);
-        *v += scale * (bytes.iter().sum::<i32>() - 510) as f32;
+        *v += scale * (bytes.iter().sum::<i32>() - 510).to_f32();
     }
 }
 
@@ -338,7 +341,7 @@ mod tests {
             for window in [(w, h), (17, 21)] {
                 let (pixels, labels) =
                     augment.apply(&example(w, h), &crop((w, h), window), &[true; 3], &as_it_is(), &mut stream);
-                assert_eq!(labels.len(), (window.0 * window.1) as usize);
+                assert_eq!(labels.len(), (window.0 * window.1).to_usize());
                 let wrong =
                     pixels.chunks_exact(3).zip(&labels).filter(|(p, l)| (p[0] > 120.0 / 255.0) != (**l == 1)).count();
                 assert!(wrong <= 8, "{wrong} pixels of seed {seed}");
@@ -410,7 +413,7 @@ mod tests {
         }
         assert!(spot.iter().skip(1).step_by(2).all(|v| *v == 0.0));
         add_noise(&mut flat, 0.03, &mut Stream::of(1, 0, Purpose::Test, 0));
-        let n = flat.len() as f32;
+        let n = flat.len().to_f32();
         let mean = flat.iter().sum::<f32>() / n;
         let sd = (flat.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / n).sqrt();
         assert!((mean - 0.5).abs() < 0.003 && (sd - 0.03).abs() < 0.002, "{mean} {sd}");
@@ -436,7 +439,7 @@ mod tests {
     fn compression_changes_colours_a_little_and_nothing_else() {
         let smooth: Vec<f32> = (0..48 * 32)
             .flat_map(|i| {
-                let v = 0.3 + 0.4 * (i % 48) as f32 / 48.0;
+                let v = 0.3 + 0.4 * (i % 48).to_f32() / 48.0;
                 [v, 0.8 * v, 0.5 * v, 0.123]
             })
             .collect();

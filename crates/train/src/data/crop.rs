@@ -2,6 +2,7 @@
 
 use super::example::Example;
 use super::ground::Ground;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::Stream;
 use furrow_dataset::model::sample::IGNORE;
 
@@ -38,7 +39,7 @@ pub(super) struct GeometricAugmentation {
 pub(super) fn rare_pixel(labels: &[u8], (w, h): (u32, u32), stream: &mut Stream) -> Option<[f32; 2]> {
     let mut counts = [0usize; IGNORE as usize];
     labels.iter().filter(|l| **l != IGNORE).for_each(|l| counts[usize::from(*l)] += 1);
-    let chance = |count: usize| if count > 0 { 1.0 / count as f64 } else { 0.0 };
+    let chance = |count: usize| if count > 0 { 1.0 / count.to_f64() } else { 0.0 };
     let mut left = stream.uniform() * counts.iter().map(|count| chance(*count)).sum::<f64>();
     let class = (0..counts.len()).find(|class| {
         left -= chance(counts[*class]);
@@ -46,8 +47,8 @@ pub(super) fn rare_pixel(labels: &[u8], (w, h): (u32, u32), stream: &mut Stream)
     })?;
     let place = stream.index(counts[class]);
     let (i, _) = labels.iter().enumerate().filter(|(_, l)| usize::from(**l) == class).nth(place)?;
-    let (x, y) = (i as u32 % w, i as u32 / w);
-    Some([x as f32 + 0.5 - w as f32 / 2.0, y as f32 + 0.5 - h as f32 / 2.0])
+    let (x, y) = (i.to_u32() % w, i.to_u32() / w);
+    Some([x.to_f32() + 0.5 - w.to_f32() / 2.0, y.to_f32() + 0.5 - h.to_f32() / 2.0])
 }
 
 /// Transform from the crop to the image, both relative to their centres: a linear map, then a shift.
@@ -79,19 +80,19 @@ impl Placement {
             None => 1.0,
         };
         // In a strongly reduced image, single sample points would alias.
-        let points = if ground.is_some() { (1.0 / zoom).ceil().clamp(1.0, FINEST) as u32 } else { 1 };
+        let points = if ground.is_some() { (1.0 / zoom).ceil().clamp(1.0, FINEST).trunc_to::<u32>() } else { 1 };
         let reach = if moves.shift { 0.1 + (0.5 - 0.5 / zoom).max(0.0) } else { 0.0 };
         let (sin, cos) = angle.sin_cos();
         let matrix = [mirror * cos / zoom, -sin / zoom, mirror * sin / zoom, cos / zoom];
         // The shift moves the point to a uniformly random pixel of the crop.
         let about = about.map(|[x, y]| {
-            let [u, v] = [size.0, size.1].map(|n| stream.index(n as usize) as f32 + 0.5 - 0.5 * n as f32);
+            let [u, v] = [size.0, size.1].map(|n| stream.index(n.to_usize()).to_f32() + 0.5 - 0.5 * n.to_f32());
             [x - matrix[0] * u - matrix[1] * v, y - matrix[2] * u - matrix[3] * v]
         });
         let shift = [0, 1].map(|axis| {
             let (n, part) = [(image.0, size.0), (image.1, size.1)][axis];
-            let rest = 0.5 * (n - part) as f32;
-            let reach = reach * n as f32 + rest;
+            let rest = 0.5 * (n - part).to_f32();
+            let reach = reach * n.to_f32() + rest;
             let shift = about.map_or_else(|| stream.range32(-reach, reach), |shift| shift[axis].clamp(-reach, reach));
             // Without rotation and scaling, the shift is a whole number of pixels, so that the image stays sharp.
             if moves.rotate || moves.scale { shift } else { (shift + rest).round() - rest }
@@ -109,20 +110,20 @@ impl Placement {
     pub(super) fn read(&self, example: &Example, crop: &Crop) -> (Vec<f32>, Vec<u8>) {
         let &Crop { image: (w, h), size, .. } = crop;
         let bands = example.planes.len();
-        let (cx, cy) = (w as f32 / 2.0, h as f32 / 2.0);
-        let (wx, wy) = (size.0 as f32 / 2.0, size.1 as f32 / 2.0);
+        let (cx, cy) = (w.to_f32() / 2.0, h.to_f32() / 2.0);
+        let (wx, wy) = (size.0.to_f32() / 2.0, size.1.to_f32() / 2.0);
         let source = |x: f32, y: f32| {
             let [x, y] = self.map([x - wx, y - wy]);
             [mirrored(x + cx, w), mirrored(y + cy, h)]
         };
-        let count = size.0 as usize * size.1 as usize;
+        let count = size.0.to_usize() * size.1.to_usize();
         let mut pixels = Vec::with_capacity(count * bands);
         let mut labels = Vec::with_capacity(count);
         for y in 0..size.1 {
             for x in 0..size.0 {
-                let middle = source(x as f32 + 0.5, y as f32 + 0.5);
-                let [column, row] = middle.map(|v| v as usize);
-                labels.push(example.labels[row.min(h as usize - 1) * w as usize + column.min(w as usize - 1)]);
+                let middle = source(x.to_f32() + 0.5, y.to_f32() + 0.5);
+                let [column, row] = middle.map(RoundTo::trunc_to::<usize>);
+                labels.push(example.labels[row.min(h.to_usize() - 1) * w.to_usize() + column.min(w.to_usize() - 1)]);
                 if self.points == 1 {
                     let around = BilinearTaps::new(middle, (w, h));
                     pixels.extend(example.planes.iter().map(|plane| around.value(plane)));
@@ -130,10 +131,10 @@ impl Placement {
                 }
                 let first = pixels.len();
                 pixels.resize(first + bands, 0.0);
-                let part = |k: u32| (k as f32 + 0.5) / self.points as f32;
-                let share = 1.0 / (self.points * self.points) as f32;
+                let part = |k: u32| (k.to_f32() + 0.5) / self.points.to_f32();
+                let share = 1.0 / (self.points * self.points).to_f32();
                 for k in 0..self.points * self.points {
-                    let at = source(x as f32 + part(k % self.points), y as f32 + part(k / self.points));
+                    let at = source(x.to_f32() + part(k % self.points), y.to_f32() + part(k / self.points));
                     let around = BilinearTaps::new(at, (w, h));
                     for (mean, plane) in pixels[first..].iter_mut().zip(&example.planes) {
                         *mean += share * around.value(plane);
@@ -154,7 +155,7 @@ struct BilinearTaps {
 
 impl BilinearTaps {
     fn new([x, y]: [f32; 2], (w, h): (u32, u32)) -> Self {
-        Self { columns: between(x, w), rows: between(y, h), width: w as usize }
+        Self { columns: between(x, w), rows: between(y, h), width: w.to_usize() }
     }
 
     /// Interpolates a plane bilinearly; returns 0 to 1.
@@ -169,16 +170,16 @@ impl BilinearTaps {
 
 /// Mirrors a coordinate at both edges into 0 to n.
 fn mirrored(x: f32, n: u32) -> f32 {
-    let n = n as f32;
+    let n = n.to_f32();
     let folded = x.rem_euclid(2.0 * n);
     if folded < n { folded } else { 2.0 * n - folded }
 }
 
 /// Returns the pixels on both sides of a coordinate, and the weight of the second.
 fn between(x: f32, n: u32) -> (usize, usize, f32) {
-    let at = (x - 0.5).clamp(0.0, (n - 1) as f32);
-    let low = (at as usize).min(n as usize - 1);
-    (low, (low + 1).min(n as usize - 1), at - low as f32)
+    let at = (x - 0.5).clamp(0.0, (n - 1).to_f32());
+    let low = at.trunc_to::<usize>().min(n.to_usize() - 1);
+    (low, (low + 1).min(n.to_usize() - 1), at - low.to_f32())
 }
 
 #[cfg(test)]
@@ -208,7 +209,7 @@ mod tests {
                     let crop = Crop { image, size: (20, 16), rare, ground: None };
                     let (pixels, labels) = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream);
                     assert!(pixels.iter().zip(&labels).all(|(v, l)| (v * 255.0 - f32::from(*l)).abs() < 1e-3));
-                    (0..3).for_each(|class| holding[class] += u32::from(labels.contains(&(class as u8))));
+                    (0..3).for_each(|class| holding[class] += u32::from(labels.contains(&class.to_u8())));
                     if let Some(i) = labels.iter().position(|l| *l == 2) {
                         columns[i % 20 / 5] += 1;
                     }
@@ -227,7 +228,7 @@ mod tests {
     /// Returns the width of a pixel of each of `draws` random crops, in pixels of the image. The image is a ramp whose value is the
     /// column number.
     fn widths(ground: Option<Ground>, draws: u64) -> Vec<(f64, Stream)> {
-        let ramp: Vec<u8> = (0..256 * 8).map(|i| (i % 256) as u8).collect();
+        let ramp: Vec<u8> = (0..256 * 8).map(|i| (i % 256).to_u8()).collect();
         let picture =
             Example { name: String::new(), labels: vec![0; ramp.len()], planes: vec![ramp], plants: Vec::new() };
         let as_it_is = Normalization::Fixed { mean: vec![0.0], sd: vec![1.0] };
@@ -257,7 +258,7 @@ mod tests {
             places.sort_by(f64::total_cmp);
             assert!(places[0] > -0.01 && places[1999] < 1.01, "{} to {}", places[0], places[1999]);
             let apart =
-                places.iter().enumerate().map(|(i, p)| (p - (i as f64 + 0.5) / 2000.0).abs()).fold(0.0, f64::max);
+                places.iter().enumerate().map(|(i, p)| (p - (i.to_f64() + 0.5) / 2000.0).abs()).fold(0.0, f64::max);
             assert!(apart < 0.06, "{pixel_mm}: {apart}");
         }
         let same = widths(Some(Ground { pixel_mm: 0.6, range_mm: (0.9, 0.9) }), 20);

@@ -4,6 +4,7 @@
 //! object on a field (a plate, a board, a shoe) is not a plant. Without such patches, a network trained only on fields predicts a
 //! white plate as a pale leaf.
 
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::Stream;
 
 /// Largest number of patches per crop.
@@ -18,8 +19,8 @@ pub(super) fn erase(pixels: &mut [f32], labels: &mut [u8], (w, h): (u32, u32), s
     for _ in 0..=stream.index(MOST) {
         let patch = Patch::draw((w, h), bands, stream);
         for (i, (pixel, label)) in pixels.chunks_exact_mut(bands).zip(labels.iter_mut()).enumerate() {
-            if patch.holds((i as u32 % w) as f32 + 0.5, (i as u32 / w) as f32 + 0.5) {
-                let grain = 1.0 + patch.grain * (stream.uniform() as f32 - 0.5);
+            if patch.holds((i.to_u32() % w).to_f32() + 0.5, (i.to_u32() / w).to_f32() + 0.5) {
+                let grain = 1.0 + patch.grain * (stream.uniform().to_f32() - 0.5);
                 pixel.iter_mut().zip(&patch.colour).for_each(|(v, colour)| *v = (colour * grain).clamp(0.0, 1.0));
                 *label = 0;
             }
@@ -40,7 +41,7 @@ struct Patch {
 
 impl Patch {
     fn draw((w, h): (u32, u32), bands: usize, stream: &mut Stream) -> Self {
-        let side = (w.min(h)) as f32;
+        let side = (w.min(h)).to_f32();
         let angle = stream.range32(0.0, std::f32::consts::PI);
         // Widths from a twelfth to two fifths of the crop. With thinner patches, a network would predict grass leaves as soil.
         let half = [0, 1].map(|_| stream.range32(0.2, 0.45).powi(2) * side);
@@ -55,7 +56,7 @@ impl Patch {
             *green = red.max(*blue);
         }
         Self {
-            centre: [stream.range32(0.0, w as f32), stream.range32(0.0, h as f32)],
+            centre: [stream.range32(0.0, w.to_f32()), stream.range32(0.0, h.to_f32())],
             turn: [angle.cos(), angle.sin()],
             half,
             colour,

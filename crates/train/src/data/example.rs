@@ -2,6 +2,7 @@
 
 use super::bands::{self, Band};
 use super::margin;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_dataset::Set;
 use furrow_dataset::model::classes::Map;
@@ -24,7 +25,7 @@ pub struct Shape {
 impl Shape {
     /// Returns the number of pixels of an image.
     pub fn pixels(&self) -> usize {
-        self.width as usize * self.height as usize
+        self.width.to_usize() * self.height.to_usize()
     }
 }
 
@@ -111,7 +112,7 @@ impl Example {
 
     /// Returns its size in memory, bytes.
     pub fn bytes(&self) -> u64 {
-        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 4 * self.plants.len()) as u64
+        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 4 * self.plants.len()).to_u64()
     }
 
     /// Counts the pixels of each of `classes` classes.
@@ -129,11 +130,11 @@ pub(crate) fn nearest<T: Copy>(from: (u32, u32), values: &[T], to: (u32, u32)) -
     if from == to {
         return values.to_vec();
     }
-    let at = |i: u32, from: u32, to: u32| ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as usize;
+    let at = |i: u32, from: u32, to: u32| ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))).to_usize();
     let columns: Vec<usize> = (0..to.0).map(|x| at(x, from.0, to.0)).collect();
     (0..to.1)
         .flat_map(|y| {
-            let row = at(y, from.1, to.1) * from.0 as usize;
+            let row = at(y, from.1, to.1) * from.0.to_usize();
             columns.iter().map(move |x| values[row + x])
         })
         .collect()

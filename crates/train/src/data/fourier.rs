@@ -9,6 +9,7 @@
 //! sums over the image.
 
 use super::example::Example;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::Stream;
 use std::f64::consts::TAU;
 
@@ -21,13 +22,13 @@ pub(super) fn restyled(example: &Example, other: &Example, size: (u32, u32), str
     if stream.chance(0.5) {
         return None;
     }
-    let waves = Waves::new((size.0 as usize, size.1 as usize), 1 + stream.index(MOST));
-    let share = stream.uniform() as f32;
+    let waves = Waves::new((size.0.to_usize(), size.1.to_usize()), 1 + stream.index(MOST));
+    let share = stream.uniform().to_f32();
     let values = |plane: &[u8]| plane.iter().map(|v| f32::from(*v)).collect::<Vec<f32>>();
     let planes = example.planes.iter().zip(&other.planes).map(|(own, other)| {
         let mut own = values(own);
         waves.blend(&mut own, &values(other), share);
-        own.into_iter().map(|v| v.round().clamp(0.0, 255.0) as u8).collect()
+        own.into_iter().map(|v| v.round().clamp(0.0, 255.0).trunc_to::<u8>()).collect()
     });
     Some(Example { planes: planes.collect(), ..example.clone() })
 }
@@ -57,10 +58,10 @@ impl Waves {
     fn new((width, height): (usize, usize), most: usize) -> Self {
         let of = |n: usize| {
             let wave = |k: usize| {
-                let angle = |i: usize| TAU * (k * i % n.max(1)) as f64 / n as f64;
+                let angle = |i: usize| TAU * (k * i % n.max(1)).to_f64() / n.to_f64();
                 Complex {
-                    re: (0..n).map(|i| angle(i).cos() as f32).collect(),
-                    im: (0..n).map(|i| angle(i).sin() as f32).collect(),
+                    re: (0..n).map(|i| angle(i).cos().to_f32()).collect(),
+                    im: (0..n).map(|i| angle(i).sin().to_f32()).collect(),
                 }
             };
             // Frequencies from half of the number of pixels on are aliases of lower ones.
@@ -103,7 +104,7 @@ impl Waves {
     /// Blends the amplitudes of a plane's coefficients with those of another plane by the fraction `share`; phases stay.
     fn blend(&self, plane: &mut [f32], other: &[f32], share: f32) {
         let (own, other) = (self.coefficients(plane), self.coefficients(other));
-        let n = plane.len() as f32;
+        let n = plane.len().to_f32();
         for (y, (own, other)) in own.iter().zip(&other).enumerate() {
             // Change of the coefficient of this vertical frequency at each column. The negative frequency adds the conjugate.
             let mut added = Complex::zeros(self.width);
@@ -151,7 +152,7 @@ mod tests {
             let mut sum = (0.0, 0.0);
             for (i, v) in plane.iter().enumerate() {
                 let (sin, cos) =
-                    (-TAU * ((kx * (i % w)) as f64 / w as f64 + (ky * (i / w)) as f64 / h as f64)).sin_cos();
+                    (-TAU * ((kx * (i % w)).to_f64() / w.to_f64() + (ky * (i / w)).to_f64() / h.to_f64())).sin_cos();
                 sum = (sum.0 + f64::from(*v) * cos, sum.1 + f64::from(*v) * sin);
             }
             sum
@@ -186,8 +187,8 @@ mod tests {
         let (w, h) = (24u32, 16u32);
         let example = |value: u8, label: u8| Example {
             name: String::new(),
-            planes: vec![vec![value; (w * h) as usize]; 3],
-            labels: vec![label; (w * h) as usize],
+            planes: vec![vec![value; (w * h).to_usize()]; 3],
+            labels: vec![label; (w * h).to_usize()],
             plants: Vec::new(),
         };
         let mut changed = 0;

@@ -5,6 +5,7 @@
 //! height of the image.
 
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::sampling::Stream;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
@@ -94,8 +95,8 @@ impl AugmentScale {
 fn percentiles(values: &[f64]) -> (f64, f64) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1) as f64;
-    let at = |share: f64| sorted.get((share * last).round() as usize).copied().unwrap_or(1.0);
+    let last = sorted.len().saturating_sub(1).to_f64();
+    let at = |share: f64| sorted.get((share * last).round_to::<usize>()).copied().unwrap_or(1.0);
     (at(PERCENTILES.0), at(PERCENTILES.1))
 }
 
@@ -115,7 +116,7 @@ impl Ground {
     /// Samples the enlargement of a crop.
     pub(super) fn zoom(&self, stream: &mut Stream) -> f32 {
         let (lo, hi) = self.range_mm;
-        (self.pixel_mm / (lo * (hi / lo).powf(stream.uniform()))) as f32
+        (self.pixel_mm / (lo * (hi / lo).powf(stream.uniform()))).to_f32()
     }
 }
 

@@ -9,6 +9,7 @@ use super::fourier;
 use super::order::BatchSettings;
 use super::photos::{Photos, Views};
 use super::store::Store;
+use furrow_base::math::ToInt;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
@@ -66,12 +67,12 @@ impl<T: Send + 'static> Loader<T> {
     where
         M: FnMut(u64) -> Result<T> + Send + 'static,
     {
-        let threads = threads.max(1) as u64;
+        let threads = threads.max(1).to_u64();
         let begin = |thread: u64| {
             let (sender, receiver) = sync_channel(AHEAD);
             let mut make = maker();
             let work = move || {
-                for step in (from + thread..to).step_by(threads as usize) {
+                for step in (from + thread..to).step_by(threads.to_usize()) {
                     let made = supervised(|| make(step)).map_err(|bug| bug.within(format!("step {step}")));
                     let made = made.and_then(|made| made);
                     let failed = made.is_err();
@@ -107,7 +108,7 @@ struct Epochs {
 impl Epochs {
     /// Returns the image at the position `place` of the endless list.
     fn at(&mut self, place: u64, images: usize) -> usize {
-        let (epoch, within) = (place / images as u64, place % images as u64);
+        let (epoch, within) = (place / images.to_u64(), place % images.to_u64());
         if self.current.as_ref().is_none_or(|(e, _)| *e != epoch) {
             let mut stream = Stream::of(self.seed, epoch, Purpose::Training, 1);
             let mut order: Vec<usize> = (0..images).collect();
@@ -116,7 +117,7 @@ impl Epochs {
             }
             self.current = Some((epoch, order));
         }
-        self.current.as_ref().map_or(0, |(_, order)| order[within as usize])
+        self.current.as_ref().map_or(0, |(_, order)| order[within.to_usize()])
     }
 }
 
@@ -125,8 +126,8 @@ fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) ->
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
     let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare, ground: None };
     let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
-    for slot in 0..order.batch as u64 {
-        let place = step * order.batch as u64 + slot;
+    for slot in 0..order.batch.to_u64() {
+        let place = step * order.batch.to_u64() + slot;
         let image = epochs.at(place, store.len());
         let mut example = store.get(image)?;
         if order.augment.fourier {

@@ -4,7 +4,7 @@
 //! network that is evaluated on manual masks should be trained on masks of the same kind: one pixel around a leaf of 40 pixels
 //! diameter is a tenth of its area.
 
-use furrow_base::math::disc;
+use furrow_base::math::{ToInt, disc};
 
 /// Largest dilation or erosion of a mask, pixels.
 pub const MOST: f32 = 16.0;
@@ -31,10 +31,10 @@ pub(super) fn moved(labels: &[u8], (w, h): (u32, u32), margin: f32) -> Vec<u8> {
     let disc = disc(reach);
     let (w, h) = (i64::from(w), i64::from(h));
     let at = |x: i64, y: i64| {
-        if (0..w).contains(&x) && (0..h).contains(&y) { Some(labels[(y * w + x) as usize]) } else { None }
+        if (0..w).contains(&x) && (0..h).contains(&y) { Some(labels[(y * w + x).to_usize()]) } else { None }
     };
     let pixel = |i: usize| {
-        let (x, y) = (i as i64 % w, i as i64 / w);
+        let (x, y) = (i.to_i64() % w, i.to_i64() / w);
         let nearest = || disc.iter().find_map(|(dx, dy)| at(x + dx, y + dy).filter(|label| comes(*label)));
         if gives(labels[i]) { nearest().unwrap_or(labels[i]) } else { labels[i] }
     };
@@ -52,12 +52,13 @@ fn is_plant(label: u8) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
     use furrow_dataset::model::sample::IGNORE;
 
     /// Draws a disc of `class` with a radius of `radius` pixels around a point.
     fn plant(class: u8, radius: f32, (cx, cy): (f32, f32), labels: &mut [u8]) {
         for (i, label) in labels.iter_mut().enumerate() {
-            let (x, y) = ((i % 80) as f32 + 0.5, (i / 80) as f32 + 0.5);
+            let (x, y) = ((i % 80).to_f32() + 0.5, (i / 80).to_f32() + 0.5);
             if (x - cx).hypot(y - cy) < radius {
                 *label = class;
             }
@@ -74,7 +75,7 @@ mod tests {
         for margin in [-3.0f32, -1.4, -0.6, 0.6, 1.4, 2.5, 5.0] {
             let moved = moved(&labels, (80, 60), margin);
             let area: u32 = moved.iter().map(|l| u32::from(*l == 2)).sum();
-            let radius = (area as f32 / std::f32::consts::PI).sqrt();
+            let radius = (area.to_f32() / std::f32::consts::PI).sqrt();
             assert!((radius - 12.0 - margin).abs() < 0.4, "{margin}: {radius}");
             assert!(moved.iter().all(|l| [0, 2].contains(l)));
         }
@@ -85,7 +86,7 @@ mod tests {
     /// stay so and do not spread; plants at the edge of the image are not eroded from there. Source: the rule.
     #[test]
     fn only_soil_and_plants_meet_at_outlines_that_move() {
-        let row = |labels: &[u8], margin| moved(labels, (labels.len() as u32, 1), margin);
+        let row = |labels: &[u8], margin| moved(labels, (labels.len().to_u32(), 1), margin);
         assert_eq!(row(&[1, 1, 1, 2, 2, 0, 0, 0, 0], 1.0), [1, 1, 1, 2, 2, 2, 0, 0, 0]);
         assert_eq!(row(&[1, 1, 1, 2, 2, 0, 0, 0, 0], -1.0), [1, 1, 1, 2, 0, 0, 0, 0, 0]);
         assert_eq!(row(&[1, 0, 0, 0, 0, 2, IGNORE, 0], 3.0), [1, 1, 1, 2, 2, 2, IGNORE, 2]);

@@ -2,6 +2,7 @@
 
 use super::store::Store;
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use serde::{Deserialize, Serialize};
 
 /// Normalization of bands to mean 0 and standard deviation 1.
@@ -32,7 +33,7 @@ impl Normalization {
         let mut pixels = 0u64;
         for place in 0..store.len() {
             let example = store.get(place)?;
-            pixels += example.labels.len() as u64;
+            pixels += example.labels.len().to_u64();
             for (sum, plane) in sums.iter_mut().zip(&example.planes) {
                 for v in plane {
                     sum.0 += u64::from(*v);
@@ -40,12 +41,12 @@ impl Normalization {
                 }
             }
         }
-        let n = pixels.max(1) as f64;
-        let mean: Vec<f64> = sums.iter().map(|(s, _)| *s as f64 / n / 255.0).collect();
+        let n = pixels.max(1).to_f64();
+        let mean: Vec<f64> = sums.iter().map(|(s, _)| s.to_f64() / n / 255.0).collect();
         let sd =
-            sums.iter().zip(&mean).map(|((_, q), m)| (*q as f64 / n / 255.0 / 255.0 - m * m).max(0.0).sqrt() as f32);
+            sums.iter().zip(&mean).map(|((_, q), m)| (q.to_f64() / n / 255.0 / 255.0 - m * m).max(0.0).sqrt().to_f32());
         let sd = sd.map(|s| s.max(LEAST)).collect();
-        Ok(Self::Fixed { mean: mean.iter().map(|m| *m as f32).collect(), sd })
+        Ok(Self::Fixed { mean: mean.iter().map(|m| m.to_f32()).collect(), sd })
     }
 
     /// Normalizes an image in place; `pixels` has interleaved bands.
@@ -81,9 +82,9 @@ fn moments<'a>(values: impl Iterator<Item = &'a f32>) -> (f32, f32) {
         sum += f64::from(*v);
         squares += f64::from(*v) * f64::from(*v);
     }
-    let n = n.max(1) as f64;
+    let n = n.max(1).to_f64();
     let mean = sum / n;
-    (mean as f32, ((squares / n - mean * mean).max(0.0).sqrt() as f32).max(LEAST))
+    (mean.to_f32(), (squares / n - mean * mean).max(0.0).sqrt().to_f32().max(LEAST))
 }
 
 #[cfg(test)]
@@ -92,7 +93,7 @@ mod tests {
 
     #[test]
     fn exposure_and_white_balance_go_colours_stay_where_asked() {
-        let picture: Vec<f32> = (0..60).map(|i| ((i * 37) % 23) as f32 / 30.0).collect();
+        let picture: Vec<f32> = (0..60).map(|i| ((i * 37) % 23).to_f32() / 30.0).collect();
         let brighter: Vec<f32> = picture.iter().map(|v| 1.2 * v + 0.05).collect();
         let tinted: Vec<f32> = picture.iter().enumerate().map(|(i, v)| v * [1.0, 0.7, 1.3][i % 3]).collect();
         let apply = |n: &Normalization, p: &[f32]| {

@@ -10,6 +10,7 @@ use super::example::Example;
 use super::order::BatchSettings;
 use super::resize::Resize;
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::sample::IGNORE;
 use sha2::{Digest, Sha256};
@@ -85,8 +86,8 @@ impl Photos {
         let moved = Augment { flip, rotate, scale, crop, ..Augment::NONE };
         let changed = Augment { colour: true, blur: true, noise: true, ..moved };
         let mut views = Views { plain: Vec::new(), changed: Vec::new() };
-        for slot in 0..order.batch as u64 {
-            let mut stream = Stream::of(order.seed, step * order.batch as u64 + slot, Purpose::Training, 3);
+        for slot in 0..order.batch.to_u64() {
+            let mut stream = Stream::of(order.seed, step * order.batch.to_u64() + slot, Purpose::Training, 3);
             let photo = &self.all[stream.index(self.all.len())];
             let (image, example) = photo.at(stream.index(photo.sizes.len()), order.crop_size);
             let crop = Crop { image, size: order.crop_size, rare: 0.0, ground: None };
@@ -105,12 +106,12 @@ impl Photo {
         let largest = self.sizes[self.sizes.len() - 1];
         let (w, h) = self.sizes[which];
         let larger = (f64::from(crop.0) / f64::from(w)).max(f64::from(crop.1) / f64::from(h)).max(1.0);
-        let size = ((f64::from(w) * larger).ceil() as u32, (f64::from(h) * larger).ceil() as u32);
+        let size = ((f64::from(w) * larger).ceil_to::<u32>(), (f64::from(h) * larger).ceil_to::<u32>());
         let plane = |plane: &Vec<u8>| {
             if size == largest { plane.clone() } else { furrow_output::resize_gray(largest.0, largest.1, plane, size) }
         };
         let planes = self.planes.iter().map(plane).collect();
-        let labels = vec![IGNORE; size.0 as usize * size.1 as usize];
+        let labels = vec![IGNORE; size.0.to_usize() * size.1.to_usize()];
         (size, Example { name: String::new(), planes, labels, plants: Vec::new() })
     }
 }
@@ -119,6 +120,7 @@ impl Photo {
 mod tests {
     use super::*;
     use crate::data::Normalization;
+    use furrow_base::math::ToFloat;
 
     fn order(batch: usize) -> BatchSettings {
         BatchSettings {
@@ -134,7 +136,7 @@ mod tests {
 
     fn photos() -> Photos {
         let mut photos = Photos::new(&Band::RGB, (64, 48), Resize::LongSides(vec![96, 64]));
-        let plane = |k: usize| (0..128 * 96).map(|i| if i % 128 > 60 { 40 + 50 * k as u8 } else { 20 }).collect();
+        let plane = |k: usize| (0..128 * 96).map(|i| if i % 128 > 60 { 40 + 50 * k.to_u8() } else { 20 }).collect();
         photos.add((128, 96), &[plane(0), plane(1), plane(2)]).unwrap();
         photos
     }
@@ -150,7 +152,7 @@ mod tests {
         assert_eq!(views.plain.len(), 4 * 32 * 24 * 3);
         assert_ne!(views.plain, views.changed);
         for (plain, changed) in views.plain.chunks_exact(32 * 24 * 3).zip(views.changed.chunks_exact(32 * 24 * 3)) {
-            let mean = |v: &[f32]| v.iter().sum::<f32>() / v.len() as f32;
+            let mean = |v: &[f32]| v.iter().sum::<f32>() / v.len().to_f32();
             let (a, b) = (mean(plain), mean(changed));
             let sum =
                 |f: &dyn Fn(f32, f32) -> f32| plain.iter().zip(changed).map(|(x, y)| f(x - a, y - b)).sum::<f32>();
@@ -169,7 +171,7 @@ mod tests {
         assert_ne!(before, photos.checksum());
         let (size, example) = photos.all[1].at(0, (32, 24));
         assert!(size.0 >= 32 && size.1 >= 24 && size.1 > size.0, "{size:?}");
-        assert_eq!(example.labels.len(), (size.0 * size.1) as usize);
+        assert_eq!(example.labels.len(), (size.0 * size.1).to_usize());
         for step in 0..20 {
             assert_eq!(photos.views(&order(2), step).changed.len(), 2 * 32 * 24 * 3);
         }

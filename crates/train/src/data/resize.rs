@@ -5,6 +5,7 @@
 //! over these ("multi-scale inference"), because the size of plants in a photograph from an unknown height is unknown.
 
 use super::Normalization;
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -77,7 +78,8 @@ impl Resize {
     /// # Errors
     /// If a size is larger than 4096 pixels, except for [`Self::Stretch`].
     pub fn sizes(&self, trained: (u32, u32), (width, height): (u32, u32)) -> Result<Vec<(u32, u32)>> {
-        let near = |side: u32, factor: f64| ((f64::from(side) * factor / f64::from(STEP)).round() as u32).max(1) * STEP;
+        let near =
+            |side: u32, factor: f64| (f64::from(side) * factor / f64::from(STEP)).round_to::<u32>().max(1) * STEP;
         let scaled = |factor: f64| (near(width, factor), near(height, factor));
         let sizes = match self {
             Self::Stretch => vec![trained],
@@ -119,7 +121,7 @@ pub fn inputs(
         let resized: Vec<Vec<u8>> =
             planes.iter().map(|p| furrow_output::resize_gray(width, height, p, *size)).collect();
         let pixel = |i: usize| resized.iter().map(move |p| f32::from(p[i]) / 255.0);
-        let mut pixels: Vec<f32> = (0..size.0 as usize * size.1 as usize).flat_map(pixel).collect();
+        let mut pixels: Vec<f32> = (0..size.0.to_usize() * size.1.to_usize()).flat_map(pixel).collect();
         how.apply(&mut pixels, planes.len());
         Input { size: *size, pixels }
     };

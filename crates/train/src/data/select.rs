@@ -2,6 +2,7 @@
 //! label masks by 1.4 pixels. Every form may end with `*4` to oversample: each image occurs four times per epoch.
 
 use super::margin;
+use furrow_base::math::ToInt;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_dataset::Set;
@@ -81,7 +82,7 @@ impl Selection {
             Pick::All => (0..count).collect(),
             Pick::Split(wanted) => (0..count).filter(|k| set.recipe.split_of(*k) == wanted).collect(),
             Pick::Range(from, to) if to <= count => (from..to).collect(),
-            Pick::Every(first, of) => (first..count).step_by(of as usize).collect(),
+            Pick::Every(first, of) => (first..count).step_by(of.to_usize()).collect(),
             Pick::Random(n) if n <= count => sample(count, n, seed),
             Pick::Range(..) | Pick::Random(_) => {
                 return Err(Error::misuse(format!("the set has {count} images, too few for this selection"))
@@ -89,7 +90,7 @@ impl Selection {
                     .help(format!("a range ends before its second number: 0..{count} picks all images")));
             }
         };
-        let all = numbers.iter().copied().cycle().take(numbers.len() * self.repeat as usize).collect();
+        let all = numbers.iter().copied().cycle().take(numbers.len() * self.repeat.to_usize()).collect();
         Ok((set, all))
     }
 
@@ -157,11 +158,11 @@ impl Pick {
 fn sample(count: u64, n: u64, seed: u64) -> Vec<u64> {
     let mut stream = Stream::of(seed, 0, Purpose::Training, 0);
     let mut all: Vec<u64> = (0..count).collect();
-    for i in 0..n as usize {
+    for i in 0..n.to_usize() {
         let other = i + stream.index(all.len() - i);
         all.swap(i, other);
     }
-    all.truncate(n as usize);
+    all.truncate(n.to_usize());
     all.sort_unstable();
     all
 }

@@ -4,6 +4,7 @@
 //! table of one per cent of crop would take it for a result.
 
 use crate::run::ModelCard;
+use furrow_base::math::ToFloat;
 use serde::{Deserialize, Serialize};
 
 /// Smallest plausible fraction of crop among the vegetation pixels of a set of photographs. A crop that was sown and has emerged covers
@@ -36,8 +37,8 @@ impl Implausible {
         }
         let all: u64 = pixels.iter().sum();
         let plants: u64 = pixels.iter().skip(1).sum();
-        let vegetation = plants as f64 / all.max(1) as f64;
-        let crop_of_vegetation = *pixels.get(crop)? as f64 / plants.max(1) as f64;
+        let vegetation = plants.to_f64() / all.max(1).to_f64();
+        let crop_of_vegetation = pixels.get(crop)?.to_f64() / plants.max(1).to_f64();
         let found = vegetation >= LEAST_VEGETATION && crop_of_vegetation < LEAST_CROP;
         found.then(|| Self { crop_of_vegetation, vegetation, beside: OTHER.into() })
     }

@@ -420,6 +420,7 @@ impl Prediction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToInt;
     use std::cell::Cell;
     use std::cmp::Ordering;
 
@@ -456,7 +457,7 @@ mod tests {
         let compared = Cell::new(0);
         let items: Vec<u64> = (0..n).chain(0..n).map(|i| i * 2_654_435_761 % n).collect();
         let kept = first_of_each(items.clone(), |item| Counted(*item, &compared));
-        assert_eq!(kept, items[..n as usize]);
+        assert_eq!(kept, items[..n.to_usize()]);
         assert!(compared.get() < 4 * 2 * n * 12, "{} comparisons", compared.get());
     }
 }

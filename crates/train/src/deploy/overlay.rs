@@ -1,12 +1,14 @@
 //! Overlay of a prediction on its image, for visual inspection: each region is tinted with its class colour and outlined in it.
 
+use furrow_base::math::{RoundTo, ToInt};
+
 /// Opacity of the class colour inside a region, 0 to 1.
 const TINT: f32 = 0.35;
 
 /// Returns the image `rgb` with its predicted `classes` blended over it. `width` is the row length in pixels; `colors` holds one sRGB
 /// colour per class. Pixels of class 0 (soil) are left unchanged.
 pub fn draw(rgb: &[[u8; 3]], classes: &[u8], width: u32, colors: &[[u8; 3]]) -> Vec<[u8; 3]> {
-    let width = width as usize;
+    let width = width.to_usize();
     let tinted = |(i, pixel): (usize, &[u8; 3])| {
         let class = classes[i];
         if class == 0 {
@@ -21,7 +23,7 @@ pub fn draw(rgb: &[[u8; 3]], classes: &[u8], width: u32, colors: &[[u8; 3]]) -> 
         if edge {
             return color;
         }
-        std::array::from_fn(|c| (f32::from(pixel[c]) * (1.0 - TINT) + f32::from(color[c]) * TINT).round() as u8)
+        std::array::from_fn(|c| (f32::from(pixel[c]) * (1.0 - TINT) + f32::from(color[c]) * TINT).round_to::<u8>())
     };
     rgb.iter().enumerate().map(tinted).collect()
 }

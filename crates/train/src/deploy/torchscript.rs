@@ -10,6 +10,7 @@ use crate::data::Normalization;
 use crate::data::normalise::LEAST;
 use crate::run::{TrainedModel, write_json};
 use crate::torch::{Model, Pass, Placement, Precision, failed, guarded};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::place_atomically;
 use std::path::{Path, PathBuf};
@@ -42,7 +43,7 @@ fn trace(trained: &TrainedModel, (width, height): (u32, u32), path: &Path) -> Re
     let mut model = Model::with(card.network, bands, card.classes.len(), &trained.values, place)?;
     model.check_inference(1, (width, height))?;
     model.freeze();
-    let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands as i64], (Kind::Uint8, Device::Cpu));
+    let example = Tensor::zeros([1, i64::from(height), i64::from(width), bands.to_i64()], (Kind::Uint8, Device::Cpu));
     let taken_out = InputNormalization::of(&card.normalization);
     let mut forward = |x: &[Tensor]| vec![model.walk(&taken_out.from(&x[0]), Pass::Inference)];
     let module = tch::no_grad(|| CModule::create_by_tracing("furrow", "forward", &[example], &mut forward));
@@ -64,7 +65,7 @@ impl InputNormalization<'_> {
     fn of(how: &Normalization) -> Self {
         match how {
             Normalization::Fixed { mean, sd } => {
-                let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len() as i64, 1, 1]));
+                let [mean, sd] = [mean, sd].map(|v| Tensor::from_slice(v).view([1, v.len().to_i64(), 1, 1]));
                 Self::Fixed(mean, sd)
             }
             Normalization::Band => Self::Own(&[2, 3]),

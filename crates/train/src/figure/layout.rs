@@ -2,6 +2,7 @@
 
 use super::thumbnail::{Thumbnail, painted};
 use furrow_base::Result;
+use furrow_base::math::ToInt;
 use furrow_output::ImageData;
 
 /// Gap between the cells, pixels.
@@ -29,17 +30,17 @@ impl Figure {
 /// prediction. All columns have the width of the widest shot; the cell of an unknown ground truth stays white.
 pub fn compose(thumbnails: &[Thumbnail], palette: &[[u8; 3]], errors: bool) -> Figure {
     let rows: Vec<Vec<Vec<[u8; 3]>>> = thumbnails.iter().map(|thumbnail| cells(thumbnail, palette, errors)).collect();
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0).to_u32();
     let column = thumbnails.iter().map(|thumbnail| thumbnail.width).max().unwrap_or(0);
     let width = (columns * (column + GAP)).saturating_sub(GAP);
     let height = thumbnails.iter().map(|thumbnail| thumbnail.height + GAP).sum::<u32>().saturating_sub(GAP);
-    let mut rgb = vec![[255; 3]; width as usize * height as usize];
+    let mut rgb = vec![[255; 3]; width.to_usize() * height.to_usize()];
     let mut top = 0;
     for (thumbnail, row) in thumbnails.iter().zip(&rows) {
         for (k, cell) in row.iter().enumerate().filter(|(_, cell)| !cell.is_empty()) {
-            let left = k * (column + GAP) as usize;
-            for (y, line) in cell.chunks_exact(thumbnail.width as usize).enumerate() {
-                let from = (top as usize + y) * width as usize + left;
+            let left = k * (column + GAP).to_usize();
+            for (y, line) in cell.chunks_exact(thumbnail.width.to_usize()).enumerate() {
+                let from = (top.to_usize() + y) * width.to_usize() + left;
                 rgb[from..from + line.len()].copy_from_slice(line);
             }
         }

@@ -4,6 +4,7 @@ use super::thumbnail::{CONFUSED, INVENTED, MISSED, Thumbnail};
 use crate::measure::report::ImageScores;
 use crate::measure::{Confusion, Interval, Report};
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_dataset::model::sample::IGNORE;
 use furrow_output::ImageData;
 use furrow_report::chart::{Chart, Effect, forest};
@@ -211,7 +212,7 @@ fn figures(report: &Report) -> Markup {
     let plants = report.classes.iter().zip(&s.classes).skip(1);
     all.extend(plants.map(|(name, class)| score("class_iou", format!("{name} I/U"), class.iou)));
     all.push(score("vegetation_iou", "vegetation I/U".into(), s.vegetation.iou));
-    let images = report.images.len() as u64;
+    let images = report.images.len().to_u64();
     all.push(Number::count("images", images, if images == 1 { "image" } else { "images" }));
     if let Some(seconds) = &report.seconds {
         let shown = format!("{} ms", number(1000.0 * seconds.median));
@@ -255,7 +256,7 @@ fn scores(report: &Report) -> Markup {
             }
         }
         p {
-            "Small numbers: 95 % intervals over resamples of " (count(report.images.len() as u64, "image", "images")) "."
+            "Small numbers: 95 % intervals over resamples of " (count(report.images.len().to_u64(), "image", "images")) "."
             @if report.ignored > 0 { " " (count(report.ignored, "pixel", "pixels")) " without a label are not counted." }
         }
     }
@@ -265,7 +266,7 @@ fn scores(report: &Report) -> Markup {
 fn matrix(matrix: &Confusion, classes: &[String]) -> Markup {
     let cell = |truth: usize, predicted: usize| {
         let (n, all) = (matrix.at(truth, predicted), matrix.truth(truth));
-        let part = n as f64 / all.max(1) as f64;
+        let part = n.to_f64() / all.max(1).to_f64();
         let tint = if truth == predicted { "var(--crop)" } else { "var(--weed)" };
         // The square root keeps small fractions visible.
         let style = format!("background:color-mix(in srgb, {tint} {:.1}%, transparent)", 60.0 * part.sqrt());
@@ -293,7 +294,7 @@ fn each_image(report: &Report) -> Markup {
     let table = Table { title: String::new(), ..report.image_table() };
     html! {
         details {
-            summary { "Each of " (count(report.images.len() as u64, "image", "images")) ", the worst first" }
+            summary { "Each of " (count(report.images.len().to_u64(), "image", "images")) ", the worst first" }
             div.wide { (table.html()) }
         }
     }

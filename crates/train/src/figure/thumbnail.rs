@@ -1,5 +1,6 @@
 //! An image with its ground truth and predictions, for visual inspection.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_dataset::model::sample::IGNORE;
 
 /// sRGB colour of pixels without a label.
@@ -60,12 +61,12 @@ impl Thumbnail {
         let gray: Vec<f32> = self.rgb.iter().map(|rgb| rgb.iter().map(|v| f32::from(*v)).sum::<f32>() / 3.0).collect();
         let mut sorted = gray.clone();
         sorted.sort_by(f32::total_cmp);
-        let brightest = sorted.get((BRIGHT * sorted.len() as f64) as usize).map_or(1.0, |v| v.max(1.0));
+        let brightest = sorted.get((BRIGHT * sorted.len().to_f64()).trunc_to::<usize>()).map_or(1.0, |v| v.max(1.0));
         let pixels = gray.iter().zip(&self.truth).zip(&self.predictions[prediction]);
         pixels
             .map(|((gray, truth), predicted)| match (*truth, *predicted) {
                 (IGNORE, _) => NO_LABEL,
-                (t, p) if t == p => [((gray / brightest).min(1.0) * DIM[usize::from(t > 0)]) as u8; 3],
+                (t, p) if t == p => [((gray / brightest).min(1.0) * DIM[usize::from(t > 0)]).trunc_to::<u8>(); 3],
                 (_, 0) => MISSED,
                 (0, _) => INVENTED,
                 _ => CONFUSED,
@@ -81,9 +82,10 @@ pub(super) fn painted(map: &[u8], palette: &[[u8; 3]]) -> Vec<[u8; 3]> {
 
 /// Resamples a map to another size: each pixel takes the source pixel that contains its centre.
 fn nearest((width, height): (u32, u32), map: &[u8], (w, h): (u32, u32)) -> Vec<u8> {
-    let of =
-        |k: u32, small: u32, large: u32| ((2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small))) as usize;
-    let row = |y: u32| of(y, h, height) * width as usize;
+    let of = |k: u32, small: u32, large: u32| {
+        ((2 * u64::from(k) + 1) * u64::from(large) / (2 * u64::from(small))).to_usize()
+    };
+    let row = |y: u32| of(y, h, height) * width.to_usize();
     (0..h).flat_map(|y| (0..w).map(move |x| map[row(y) + of(x, w, width)])).collect()
 }
 

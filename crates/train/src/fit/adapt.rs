@@ -19,6 +19,7 @@ use crate::data::{Batch, Views, paste};
 use crate::refine::Seen;
 use crate::torch::Model;
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::sample::IGNORE;
 use std::collections::BTreeMap;
@@ -38,7 +39,7 @@ pub(super) fn batch(
     let mut photos = Batch { images: rendered.images, pixels: views.changed, labels };
     paste(rendered, &mut photos, &mut Stream::of(plan.seed, number, Purpose::Training, 4));
     let labelled = photos.labels.iter().filter(|label| **label != IGNORE).count();
-    let share = labelled as f64 / photos.labels.len().max(1) as f64;
+    let share = labelled.to_f64() / photos.labels.len().max(1).to_f64();
     Ok((photos, share))
 }
 
@@ -50,7 +51,7 @@ fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec
     if refine.is_none() {
         return teacher.predict_with_probability(pixels, size);
     }
-    let area = size.0 as usize * size.1 as usize;
+    let area = size.0.to_usize() * size.1.to_usize();
     let mut probabilities = teacher.probabilities(pixels, size, size)?;
     let images = pixels.chunks_exact(area * bands.len()).zip(probabilities.chunks_exact_mut(area * teacher.classes));
     let (mut labels, mut sure) = (Vec::new(), Vec::new());
@@ -60,7 +61,7 @@ fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec
             let each = probabilities.iter().skip(at).step_by(area).enumerate();
             let (class, p) =
                 each.fold((0, f32::NEG_INFINITY), |best, (class, p)| if *p > best.1 { (class, *p) } else { best });
-            labels.push(class as u8);
+            labels.push(class.to_u8());
             sure.push(p);
         }
     }
@@ -74,7 +75,7 @@ fn keep_surest(labels: &mut [u8], sure: &[f32], keep: f64) {
         classes.entry(*class).or_default().push(at);
     }
     for mut places in classes.into_values() {
-        let kept = ((keep * places.len() as f64).round() as usize).min(places.len());
+        let kept = (keep * places.len().to_f64()).round_to::<usize>().min(places.len());
         if kept < places.len() {
             places.select_nth_unstable_by(kept, |a, b| sure[*b].total_cmp(&sure[*a]).then(a.cmp(b)));
         }

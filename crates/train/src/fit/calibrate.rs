@@ -7,6 +7,7 @@
 use crate::data::{Normalization, Store, augment};
 use crate::torch::Model;
 use crate::weights::Array;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::sample::IGNORE;
 
@@ -24,7 +25,7 @@ const ROUNDS: usize = 3;
 pub fn calibrate(model: &Model, store: &Store, normalization: &Normalization, images: u64) -> Result<Vec<Array>> {
     let shape = store.shape();
     let (mut values, mut labels) = (Vec::new(), Vec::new());
-    let images = (images as usize).min(store.len());
+    let images = images.to_usize().min(store.len());
     for k in 0..images {
         let example = store.get(k * store.len() / images)?;
         let mut pixels = augment::interleave(&example, 1);
@@ -62,7 +63,7 @@ fn offsets(values: &[f32], labels: &[u8], classes: usize) -> Vec<f32> {
                 let (value, other) =
                     others.fold((f32::NEG_INFINITY, 0), |best, next| if next.0 > best.0 { next } else { best });
                 overlap.count(other, usize::from(*label), true);
-                leads.push((pixel[class] - value, other as u8, *label));
+                leads.push((pixel[class] - value, other.to_u8(), *label));
             }
             leads.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
             let mut best = (f64::NEG_INFINITY, offsets[class]);
@@ -103,7 +104,7 @@ impl Overlap<'_> {
     fn mean(&self) -> f64 {
         let held = (0..self.labelled.len()).filter(|class| self.labelled[*class] > 0);
         let each =
-            held.map(|c| self.correct[c] as f64 / (self.labelled[c] + self.predicted[c] - self.correct[c]) as f64);
+            held.map(|c| self.correct[c].to_f64() / (self.labelled[c] + self.predicted[c] - self.correct[c]).to_f64());
         let (sum, n) = each.fold((0.0, 0.0f64), |(sum, n), value| (sum + value, n + 1.0));
         sum / n.max(1.0)
     }
@@ -124,7 +125,7 @@ mod tests {
         let draw = |added: [f32; 3], stream: &mut Stream| -> Vec<f32> {
             let of = |class: usize, label: u8, noise: f64| {
                 let logarithm: f32 = [0.86f32, 0.1, 0.04][class].ln();
-                logarithm + added[class] + if usize::from(label) == class { 4.0 } else { 0.0 } + noise as f32
+                logarithm + added[class] + if usize::from(label) == class { 4.0 } else { 0.0 } + noise.to_f32()
             };
             labels.iter().flat_map(|l| [0, 1, 2].map(|class| of(class, *l, 1.2 * stream.normal()))).collect()
         };

@@ -3,6 +3,7 @@
 
 use crate::weights::{self, Array};
 use furrow_base::error::Kind;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -62,7 +63,7 @@ impl History {
     /// Returns the number of validation passes after the best one.
     pub fn since_best(&self) -> u64 {
         let best = self.best().map_or(0, |b| b.step);
-        self.validation.iter().filter(|pass| pass.step > best).count() as u64
+        self.validation.iter().filter(|pass| pass.step > best).count().to_u64()
     }
 }
 
@@ -163,7 +164,7 @@ mod tests {
         let passes = [0.3, 0.5, 0.5, 0.4].iter().enumerate();
         let validation = passes
             .map(|(i, m)| ValidationPass {
-                step: i as u64,
+                step: i.to_u64(),
                 ga: 0.9,
                 miou: *m,
                 iou: vec![Some(*m), None],

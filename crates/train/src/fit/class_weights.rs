@@ -2,6 +2,7 @@
 
 use crate::data::Store;
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 use serde::{Deserialize, Serialize};
 
 /// Class weights of the loss.
@@ -55,7 +56,7 @@ impl ClassWeights {
             Self::Annealed => (0.5 - done).max(0.0),
             Self::None => 0.0,
         };
-        rarities.iter().map(|rarity| rarity.map_or(0.0, |r| r.powf(power) as f32)).collect()
+        rarities.iter().map(|rarity| rarity.map_or(0.0, |r| r.powf(power).to_f32())).collect()
     }
 }
 
@@ -74,7 +75,7 @@ fn rarities_of(images: &[Vec<u64>], classes: usize) -> Vec<Option<f64>> {
     let frequency = |class: usize| {
         let holding = images.iter().filter(|counts| counts[class] > 0);
         let (own, all) = holding.fold((0, 0), |(own, all), c| (own + c[class], all + c.iter().sum::<u64>()));
-        (own > 0).then(|| own as f64 / all as f64)
+        (own > 0).then(|| own.to_f64() / all.to_f64())
     };
     let frequencies: Vec<Option<f64>> = (0..classes).map(frequency).collect();
     let mut there: Vec<f64> = frequencies.iter().copied().flatten().collect();

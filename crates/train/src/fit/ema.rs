@@ -8,6 +8,7 @@
 use crate::torch::Model;
 use crate::weights::Array;
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 
 /// Network with averaged weights, next to the network that is trained.
 pub struct Ema {
@@ -37,7 +38,7 @@ impl Ema {
 
 /// Returns the decay of a step: at most `most`, smaller in the first steps.
 fn decay(most: f64, step: u64) -> f64 {
-    most.min((1.0 + step as f64) / (10.0 + step as f64))
+    most.min((1.0 + step.to_f64()) / (10.0 + step.to_f64()))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! and the soft Dice loss are those of a micro-batch.
 
 use crate::torch::Model;
+use furrow_base::math::ToFloat;
 use tch::Tensor;
 
 /// Sums of gradients over micro-batches, for each parameter.
@@ -49,7 +50,7 @@ impl Gradients {
     #[must_use]
     pub fn mean(mut self) -> Self {
         if self.batches > 1 {
-            let share = 1.0 / self.batches as f64;
+            let share = 1.0 / self.batches.to_f64();
             tch::no_grad(|| {
                 for sum in self.sums.iter_mut().filter(|sum| sum.defined()) {
                     let _ = sum.g_mul_scalar_(share);
@@ -65,6 +66,7 @@ mod tests {
     use super::*;
     use crate::net::Network;
     use crate::torch::{Pass, Placement, Precision};
+    use furrow_base::math::ToInt;
     use furrow_base::sampling::{Purpose, Stream};
     use tch::{Device, Kind, Reduction};
 
@@ -76,12 +78,12 @@ mod tests {
     fn small_batches_one_after_the_other_are_a_large_one() {
         let model = Model::new(Network::BasicSegnet, 3, 2, 4, SINGLE);
         let mut stream = Stream::of(3, 0, Purpose::Test, 0);
-        let pixels: Vec<f32> = (0..3 * 32 * 32 * 3).map(|_| stream.normal() as f32).collect();
+        let pixels: Vec<f32> = (0..3 * 32 * 32 * 3).map(|_| stream.normal().to_f32()).collect();
         let labels: Vec<i64> = (0..3 * 32 * 32).map(|_| i64::from(stream.chance(0.3))).collect();
         let loss = |range: std::ops::Range<usize>| {
             let x = model.images(&pixels[range.start * 3072..range.end * 3072], (32, 32));
             let y =
-                Tensor::from_slice(&labels[range.start * 1024..range.end * 1024]).view([range.len() as i64, 32, 32]);
+                Tensor::from_slice(&labels[range.start * 1024..range.end * 1024]).view([range.len().to_i64(), 32, 32]);
             let none: Option<Tensor> = None;
             model.forward(&x, Pass::Inference).cross_entropy_loss(&y, none, Reduction::Mean, 255, 0.0)
         };

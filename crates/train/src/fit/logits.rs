@@ -10,6 +10,7 @@
 use super::calibrate::HEAD;
 use crate::data::Store;
 use crate::weights::Array;
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 
 /// Adjusts the biases of the last convolution for the class frequencies in the store. The bias of the first class stays unchanged:
@@ -31,7 +32,7 @@ pub fn adjust(values: &mut [Array], store: &Store, classes: usize, tau: f64) -> 
 /// one of them has no pixels.
 fn offset(counts: &[u64], tau: f64) -> f32 {
     let (first, others) = (counts[0], counts[1..].iter().sum::<u64>());
-    if first > 0 && others > 0 { (tau * (first as f64 / others as f64).ln()) as f32 } else { 0.0 }
+    if first > 0 && others > 0 { (tau * (first.to_f64() / others.to_f64()).ln()).to_f32() } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -43,7 +44,7 @@ mod tests {
     fn the_offset_is_the_logarithm_of_the_frequencies_ratio() {
         for tau in [0.0, 0.5, 1.0] {
             let offset = offset(&[1000, 99, 0, 1], tau);
-            assert!((offset - tau as f32 * 10f32.ln()).abs() < 1e-5, "{offset}");
+            assert!((offset - tau.to_f32() * 10f32.ln()).abs() < 1e-5, "{offset}");
         }
         assert_eq!((offset(&[0, 5], 1.0), offset(&[5, 0], 1.0), offset(&[5], 1.0)), (0.0, 0.0, 0.0));
     }
@@ -59,8 +60,8 @@ mod tests {
         let errors = [0, 1].map(|class: usize| {
             let mut wrong = [0u32; 2];
             for _ in 0..20_000 {
-                let x = stream.normal() as f32 + class as f32 * 1.5;
-                let lead = -0.5 * (x - 1.5).powi(2) + 0.5 * x * x + (counts[1] as f32 / counts[0] as f32).ln();
+                let x = stream.normal().to_f32() + class.to_f32() * 1.5;
+                let lead = -0.5 * (x - 1.5).powi(2) + 0.5 * x * x + (counts[1].to_f32() / counts[0].to_f32()).ln();
                 for (wrong, shift) in wrong.iter_mut().zip([0.0, shift]) {
                     *wrong += u32::from((lead + shift > 0.0) != (class == 1));
                 }

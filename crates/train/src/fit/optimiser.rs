@@ -5,6 +5,7 @@ use super::hyper::OptimiserKind;
 use crate::torch::{Model, laid, values};
 use crate::weights::Array;
 use furrow_base::Result;
+use furrow_base::math::ToInt;
 use std::collections::BTreeMap;
 use tch::Tensor;
 
@@ -27,7 +28,7 @@ impl Optimiser {
     pub fn new(kind: OptimiserKind, decay: f64, steps: u64, memory: &[Array], model: &Model) -> Self {
         let laid = |array: &Array| (array.name.clone(), laid(&array.shape, &array.values, model.place.device));
         let all = memory.iter().map(laid).collect();
-        Self { kind, decay, steps: steps as i32, memory: all }
+        Self { kind, decay, steps: steps.to_i32(), memory: all }
     }
 
     /// Makes one step with the learning rate `rate`; the rate of the encoder is `encoder` times that.
@@ -79,7 +80,7 @@ impl Optimiser {
     /// Returns the state tensors, sorted by name.
     pub fn arrays(&self) -> Result<Vec<Array>> {
         let array = |(name, tensor): (&String, &Tensor)| {
-            let shape = tensor.size().iter().map(|n| *n as usize).collect();
+            let shape = tensor.size().iter().map(|n| n.to_usize()).collect();
             Ok(Array { name: name.clone(), shape, values: values(tensor)? })
         };
         self.memory.iter().map(array).collect()

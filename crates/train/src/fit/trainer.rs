@@ -15,6 +15,7 @@ use crate::figure::{Figure, Thumbnails, compose};
 use crate::measure::{Confusion, Scores};
 use crate::torch::{Model, Pass, Placement, classes, failed};
 use crate::weights::Array;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::sample::IGNORE;
 use std::path::Path;
@@ -136,7 +137,7 @@ pub fn train(
         if out_of_patience(&at) {
             break "patience";
         }
-        if plan.seconds.is_some_and(|most| at.seconds >= most as f64) {
+        if plan.seconds.is_some_and(|most| at.seconds >= most.to_f64()) {
             break "time";
         }
         if callbacks.stop.load(Ordering::Relaxed) {
@@ -155,8 +156,8 @@ pub fn train(
             }
             _ => Vec::new(),
         };
-        let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most as f64);
-        let done = in_time.max(at.step as f64 / hyper.steps as f64);
+        let in_time = plan.seconds.map_or(0.0, |most| at.seconds / most.to_f64());
+        let done = in_time.max(at.step.to_f64() / hyper.steps.to_f64());
         let rate = hyper.rate * hyper.schedule.share(done);
         let weights = Tensor::from_slice(&hyper.class_weights.weights(&rarities, done)).to_device(place.device);
         let encoder = if at.step < hyper.freeze { 0.0 } else { hyper.encoder_rate };
@@ -173,7 +174,7 @@ pub fn train(
         }
         if at.step % every == 0 && at.pending.1 > 0 {
             let (sum, n) = std::mem::take(&mut at.pending);
-            let point = LossPoint { step: at.step, loss: sum / n as f64, rate };
+            let point = LossPoint { step: at.step, loss: sum / n.to_f64(), rate };
             log.loss(&point)?;
             at.history.losses.push(point);
             log.csv(&at.history)?;
@@ -270,13 +271,13 @@ fn step(
         return Ok(None);
     }
     optimiser.step(gradients.mean(), rate, encoder);
-    Ok(Some(losses.iter().sum::<f64>() / losses.len() as f64))
+    Ok(Some(losses.iter().sum::<f64>() / losses.len().to_f64()))
 }
 
 /// Converts labels to the tensor that the loss expects: images × height × width, 64-bit integers.
 fn labels(model: &Model, labels: &[u8], images: usize, (width, height): (u32, u32)) -> Tensor {
     let flat = Tensor::from_slice(labels).to_device(model.place.device).to_kind(Kind::Int64);
-    flat.view([images as i64, i64::from(height), i64::from(width)])
+    flat.view([images.to_i64(), i64::from(height), i64::from(width)])
 }
 
 /// Makes a validation pass: computes the scores of the network on all validation images together, and an image of some
@@ -314,6 +315,6 @@ fn validate(
     let number = |v: Option<f64>| v.unwrap_or(0.0);
     let (ga, miou) = (number(scores.global_accuracy), number(scores.mean_iou));
     let iou = scores.classes.iter().map(|c| c.iou).collect();
-    let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len() as f64);
+    let loss = (!losses.is_empty()).then(|| losses.iter().sum::<f64>() / losses.len().to_f64());
     Ok((ValidationPass { step, ga, miou, iou, loss }, compose(&thumbnails.kept(), &plan.classes.colors(), false)))
 }

@@ -14,6 +14,7 @@
 //! neighbours are not boundary pixels because of them.
 
 use super::scores::ratio;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_dataset::model::sample::IGNORE;
 use serde::{Deserialize, Serialize};
 
@@ -37,16 +38,16 @@ impl Boundary {
     /// Counts the boundary pixels of each class in one image. Both maps contain `width * height` classes below `classes`; the truth may
     /// also contain 255.
     pub fn of(classes: usize, width: usize, height: usize, truth: &[u8], predicted: &[u8]) -> Vec<Self> {
-        let tolerance = TOLERANCE * (width as f64).hypot(height as f64);
-        (0..classes as u8)
+        let tolerance = TOLERANCE * width.to_f64().hypot(height.to_f64());
+        (0..classes.to_u8())
             .map(|class| {
                 let outlines = [truth, predicted].map(|map| outline(width, height, map, truth, class));
                 let [true_matched, predicted_matched] =
                     [(0, 1), (1, 0)].map(|(of, by)| matched(width, height, &outlines[of], &outlines[by], tolerance));
                 Self {
-                    truth: outlines[0].len() as u64,
+                    truth: outlines[0].len().to_u64(),
                     truth_matched: true_matched,
-                    predicted: outlines[1].len() as u64,
+                    predicted: outlines[1].len().to_u64(),
                     predicted_matched,
                 }
             })
@@ -103,15 +104,15 @@ fn matched(width: usize, height: usize, outline: &[usize], other: &[usize], tole
         return 0;
     }
     let columns = column_distances(width, height, other);
-    let (reach, square) = (tolerance.floor() as usize, tolerance * tolerance);
+    let (reach, square) = (tolerance.floor_to::<usize>(), tolerance * tolerance);
     let near = |at: usize| {
         let (x, y) = (at % width, at / width);
         (x.saturating_sub(reach)..=(x + reach).min(width - 1)).any(|column| {
-            let (dx, dy) = (x.abs_diff(column) as f64, f64::from(columns[y * width + column]));
+            let (dx, dy) = (x.abs_diff(column).to_f64(), f64::from(columns[y * width + column]));
             dx * dx + dy * dy <= square
         })
     };
-    outline.iter().filter(|at| near(**at)).count() as u64
+    outline.iter().filter(|at| near(**at)).count().to_u64()
 }
 
 /// Returns the distance of each pixel to the nearest marked pixel of its column, in pixels; `u32::MAX` if the column has none.

@@ -1,5 +1,7 @@
 //! Connected components of an image.
 
+use furrow_base::math::ToInt;
+
 /// Connected regions of an image. Pixels are neighbours across sides and corners (8-connected), because thin leaves may be diagonal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Components {
@@ -41,7 +43,7 @@ impl Components {
                     meet(x + 1 < width && above[x + 1] == here[x], at + 1 - width);
                 }
                 if label == 0 {
-                    label = parents.len() as u32;
+                    label = parents.len().to_u32();
                     parents.push(label);
                 }
                 labels[at] = label;
@@ -50,22 +52,22 @@ impl Components {
         let mut numbers = vec![0_u32; parents.len()];
         let mut areas: Vec<u32> = Vec::new();
         for label in labels.iter_mut().filter(|label| **label > 0) {
-            let root = root(&mut parents, *label) as usize;
+            let root = root(&mut parents, *label).to_usize();
             if numbers[root] == 0 {
                 areas.push(0);
-                numbers[root] = areas.len() as u32;
+                numbers[root] = areas.len().to_u32();
             }
             *label = numbers[root];
-            areas[*label as usize - 1] += 1;
+            areas[label.to_usize() - 1] += 1;
         }
         Self { labels, areas }
     }
 }
 
 fn root(parents: &mut [u32], mut label: u32) -> u32 {
-    while parents[label as usize] != label {
-        let grandparent = parents[parents[label as usize] as usize];
-        parents[label as usize] = grandparent;
+    while parents[label.to_usize()] != label {
+        let grandparent = parents[parents[label.to_usize()].to_usize()];
+        parents[label.to_usize()] = grandparent;
         label = grandparent;
     }
     label
@@ -74,6 +76,6 @@ fn root(parents: &mut [u32], mut label: u32) -> u32 {
 /// Joins two roots and returns the common root.
 fn join(parents: &mut [u32], a: u32, b: u32) -> u32 {
     let (low, high) = (a.min(b), a.max(b));
-    parents[high as usize] = low;
+    parents[high.to_usize()] = low;
     low
 }

@@ -6,6 +6,7 @@ use super::confusion::Confusion;
 use super::report::{BoundaryScores, ClassBoundary, ClassSizes, ImageScores, Report, Seconds};
 use super::scores::{Measures, Scores, mean};
 use super::size::Sizes;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_dataset::model::sample::IGNORE;
 
@@ -82,7 +83,7 @@ impl Evaluation {
     pub fn evaluate(&self, prediction: &Prediction<'_>) -> Result<EvaluatedImage> {
         let Prediction { name, width, height, truth, predicted, plants, seconds } = *prediction;
         let wrong = |what: String| Error::input(format!("{name}: {what}"));
-        let (w, h) = (width as usize, height as usize);
+        let (w, h) = (width.to_usize(), height.to_usize());
         let maps = [
             ("truth", truth.len()),
             ("prediction", predicted.len()),
@@ -97,7 +98,7 @@ impl Evaluation {
             name: name.to_owned(),
             width,
             height,
-            ignored: truth.len() as u64 - confusion.total(),
+            ignored: truth.len().to_u64() - confusion.total(),
             seconds,
             boundaries: Boundary::of(self.classes.len(), w, h, truth, predicted),
             sizes: Sizes::of(&self.plants, (w, h), truth, predicted, plants),
@@ -172,8 +173,8 @@ fn seconds(mut all: Vec<f64>) -> Option<Seconds> {
     all.sort_by(f64::total_cmp);
     let n = all.len();
     (n > 0).then(|| Seconds {
-        images: n as u64,
-        mean: all.iter().sum::<f64>() / n as f64,
+        images: n.to_u64(),
+        mean: all.iter().sum::<f64>() / n.to_f64(),
         median: f64::midpoint(all[(n - 1) / 2], all[n / 2]),
     })
 }

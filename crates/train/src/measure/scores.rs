@@ -16,6 +16,7 @@
 //! that over the classes of truth or prediction: predicting a class that does not occur lowers it.
 
 use super::confusion::Confusion;
+use furrow_base::math::ToFloat;
 use serde::{Deserialize, Serialize};
 
 /// One value for each score: the score itself, or information about it such as a confidence interval.
@@ -119,7 +120,7 @@ impl<T> ClassMeasures<T> {
 
 /// Returns `part / whole`, or `None` if `whole` is 0.
 pub fn ratio(part: u64, whole: u64) -> Option<f64> {
-    (whole > 0).then(|| part as f64 / whole as f64)
+    (whole > 0).then(|| part.to_f64() / whole.to_f64())
 }
 
 /// Returns the mean of the values that are not `None`, or `None` if there are none.

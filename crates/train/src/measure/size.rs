@@ -20,6 +20,7 @@
 
 use super::components::Components;
 use super::scores::ratio;
+use furrow_base::math::ToInt;
 use furrow_dataset::model::sample::IGNORE;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -29,7 +30,7 @@ const BINS: usize = 16;
 
 /// Returns the bin of a size of at least 1 pixel.
 fn bin(pixels: u32) -> usize {
-    pixels.max(1).ilog2() as usize / 2
+    pixels.max(1).ilog2().to_usize() / 2
 }
 
 /// Counts of the plants of a class in a bin.
@@ -103,11 +104,11 @@ impl Sizes {
         // Region and plant of each correctly predicted pixel, to find the plant that each region covers most.
         let mut covers: Vec<(u32, u32)> = Vec::new();
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            let k = *region as usize - 1;
+            let k = region.to_usize() - 1;
             class_of[k] = predicted[at];
             if truth[at] == predicted[at] {
-                plants[owners[at] as usize - 1].found += 1;
-                covers.push((k as u32, owners[at] - 1));
+                plants[owners[at].to_usize() - 1].found += 1;
+                covers.push((k.to_u32(), owners[at] - 1));
             } else {
                 wrong[k] += 1;
             }
@@ -117,7 +118,7 @@ impl Sizes {
         for of_region in covers.chunk_by(|a, b| a.0 == b.0) {
             let most = of_region.chunk_by(|a, b| a.1 == b.1).reduce(|a, b| if b.len() > a.len() { b } else { a });
             if let Some((region, plant)) = most.and_then(|pairs| pairs.first()) {
-                matched[*region as usize] = plants[*plant as usize].pixels;
+                matched[region.to_usize()] = plants[plant.to_usize()].pixels;
             }
         }
         let mut out = Self::new(plant_classes.len());
@@ -182,15 +183,15 @@ fn plants(
     for at in (0..truth.len()).filter(|at| is_plant(truth[*at])) {
         let class = truth[at];
         let owner = match number(at) {
-            0 => &mut of_region[loose.labels[at] as usize - 1],
+            0 => &mut of_region[loose.labels[at].to_usize() - 1],
             n => named.entry((n, class)).or_default(),
         };
         if *owner == 0 {
             plants.push(Plant { class, pixels: 0, found: 0 });
-            *owner = plants.len() as u32;
+            *owner = plants.len().to_u32();
         }
         owners[at] = *owner;
-        plants[*owner as usize - 1].pixels += 1;
+        plants[owner.to_usize() - 1].pixels += 1;
     }
     (owners, plants)
 }

@@ -1,6 +1,7 @@
 //! Size of the values of a forward pass, found by walking the network without computing it.
 
 use super::{Conv, Network, Norm, Operations};
+use furrow_base::math::ToFloat;
 use std::cell::Cell;
 use std::rc::Rc;
 
@@ -59,7 +60,7 @@ impl Map {
     }
 
     fn numbers(&self) -> f64 {
-        self.channels as f64 * self.height * self.width
+        self.channels.to_f64() * self.height * self.width
     }
 
     fn with(&self, channels: usize, height: f64, width: f64) -> Self {
@@ -93,7 +94,7 @@ impl Operations for Walk {
     type PoolIndices = (Map, Map, [f64; 2]);
 
     fn conv(&mut self, x: &Map, _name: &str, conv: Conv) -> Map {
-        let stride = conv.stride as f64;
+        let stride = conv.stride.to_f64();
         let (before, after) = conv.padding();
         if before != after {
             x.briefly(x.numbers());
@@ -139,7 +140,7 @@ impl Operations for Walk {
     }
 
     fn to_multiple(&mut self, x: &Map, pixels: usize) -> Map {
-        let up = |side: f64| (side / pixels as f64).ceil() * pixels as f64;
+        let up = |side: f64| (side / pixels.to_f64()).ceil() * pixels.to_f64();
         x.with(x.channels, up(x.height), up(x.width))
     }
 
@@ -161,8 +162,8 @@ impl Operations for Walk {
     }
 
     fn attention(&mut self, x: &Map, channels: usize, heads: usize) -> Map {
-        if x.width <= MULTIPLIED_OUT as f64 {
-            x.briefly(2.0 * heads as f64 * x.width * x.width);
+        if x.width <= MULTIPLIED_OUT.to_f64() {
+            x.briefly(2.0 * heads.to_f64() * x.width * x.width);
         }
         x.with(channels, 1.0, x.width)
     }

@@ -2,6 +2,7 @@
 
 use super::{Conv, Network, Norm, Operations};
 use crate::weights::Array;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 
@@ -61,10 +62,10 @@ impl Parameter {
     pub fn begin(&self, seed: u64, place: usize) -> Vec<f32> {
         match self.role {
             Role::Weight => {
-                let mut stream = Stream::of(seed, place as u64, Purpose::Training, 3);
+                let mut stream = Stream::of(seed, place.to_u64(), Purpose::Training, 3);
                 let fan_in: usize = self.shape.iter().skip(1).product();
-                let sd = (2.0 / fan_in.max(1) as f64).sqrt();
-                (0..self.len()).map(|_| (sd * stream.normal()) as f32).collect()
+                let sd = (2.0 / fan_in.max(1).to_f64()).sqrt();
+                (0..self.len()).map(|_| (sd * stream.normal()).to_f32()).collect()
             }
             Role::Gain | Role::Variance => vec![1.0; self.len()],
             Role::Bias | Role::Shift | Role::Mean => vec![0.0; self.len()],
@@ -232,7 +233,7 @@ mod tests {
         }
         let weight = &parameters(Network::Segnet, 3, 3)[6];
         let values = weight.begin(1, 6);
-        let variance = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>() / values.len().to_f64();
         assert!((variance * 576.0 / 2.0 - 1.0).abs() < 0.05, "{} {variance}", weight.name);
     }
 }

@@ -13,6 +13,7 @@
 use super::{Network, Parameter, lite_unet, parameters, segnet, unet, vit_unet};
 use crate::data::Band;
 use crate::weights::{self, Array};
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -138,7 +139,7 @@ fn values(network: Network, parameter: &Parameter, bands: Option<&[Band]>, found
 
 /// Converts kernels of red, green and blue to kernels of these bands; `kernel` is the number of values per channel.
 fn for_bands(values: &[f32], kernel: usize, bands: &[Band]) -> Vec<f32> {
-    let scale = 3.0 / bands.len() as f32;
+    let scale = 3.0 / bands.len().to_f32();
     let mut kernels = Vec::with_capacity(values.len() / 3 * bands.len());
     for output in values.chunks_exact(3 * kernel) {
         for band in bands {
@@ -169,7 +170,7 @@ mod tests {
             Some(Array {
                 name: name(p)?,
                 shape: p.shape.clone(),
-                values: (0..p.len()).map(|k| (i + k) as f32).collect(),
+                values: (0..p.len()).map(|k| (i + k).to_f32()).collect(),
             })
         };
         parameters(network, 3, 3).iter().enumerate().filter(|(_, p)| p.is_encoder()).filter_map(array).collect()
@@ -220,7 +221,7 @@ mod tests {
         let list = parameters(Network::LiteUnet, 3, 3);
         for ((i, parameter), array) in list.iter().enumerate().zip(&begun) {
             let expected = if parameter.is_encoder() {
-                array.values[0] == i as f32
+                array.values[0] == i.to_f32()
             } else {
                 array.values == parameter.begin(1, i)
             };
@@ -231,8 +232,8 @@ mod tests {
             let bands = Band::list(bands).unwrap();
             from.begin(Network::LiteUnet, &bands, 3, 1).unwrap()[0].values[..9 * bands.len()].to_vec()
         };
-        let colour = |first: f32, scale: f32| (0..9).map(|i| scale * (first + i as f32)).collect::<Vec<_>>();
-        assert_eq!(kernel("rgb"), (0..27).map(|i| i as f32).collect::<Vec<_>>());
+        let colour = |first: f32, scale: f32| (0..9).map(|i| scale * (first + i.to_f32())).collect::<Vec<_>>();
+        assert_eq!(kernel("rgb"), (0..27).map(ToFloat::to_f32).collect::<Vec<_>>());
         assert_eq!(kernel("nir,blue"), [colour(9.0, 1.5), colour(18.0, 1.5)].concat());
         assert_eq!(kernel("nir"), colour(9.0, 3.0));
         let sum = |values: Vec<f32>| values.iter().sum::<f32>();
@@ -336,7 +337,7 @@ mod tests {
         let array = |(k, (name, (_, shape))): (usize, (&String, &(String, Vec<usize>)))| Array {
             name: name.clone(),
             shape: shape.clone(),
-            values: vec![k as f32; shape.iter().product()],
+            values: vec![k.to_f32(); shape.iter().product()],
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("resnet18.safetensors");
@@ -344,7 +345,7 @@ mod tests {
         let begun = Pretrained::File(path).begin(Network::Unet, &Band::RGB, 3, 1).unwrap();
         for (k, (name, (ours, _))) in known.iter().enumerate() {
             let array = begun.iter().find(|array| array.name == *ours).unwrap();
-            assert!(array.values.iter().all(|v| *v == k as f32), "{ours} does not start with the values of {name}");
+            assert!(array.values.iter().all(|v| *v == k.to_f32()), "{ours} does not start with the values of {name}");
         }
     }
 }

@@ -134,9 +134,10 @@ pub(super) fn laid(name: &str, array: &Array, found: &[Array]) -> Result<Array, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
 
     fn array(name: &str, shape: &[usize]) -> Array {
-        let values = (0..shape.iter().product::<usize>()).map(|i| (i % 8191) as f32).collect();
+        let values = (0..shape.iter().product::<usize>()).map(|i| (i % 8191).to_f32()).collect();
         Array { name: name.into(), shape: shape.into(), values }
     }
 

@@ -8,6 +8,8 @@
 //! Colours are the opponent colours (R + 2 G + B) / 4, G − (R + B) / 2 and R − B, each standardized by its mean and standard
 //! deviation in the image, so that exposure, white balance and contrast do not matter.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
+
 /// Number of bins of the colour grid along each axis.
 const BINS: usize = 24;
 /// Half width of the grid along each axis, standard deviations; colours beyond it count in the outermost bins.
@@ -33,9 +35,9 @@ pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilitie
         let own: f64 = plants.iter().skip(at).step_by(n).map(|p| f64::from(*p)).sum();
         let odds = (1.0 - WEIGHT) * log_odds(own) + WEIGHT * log_odds(alike[usize::from(bins[at])]);
         let plant = 1.0 / (1.0 + (-odds).exp());
-        *soil = (1.0 - plant) as f32;
+        *soil = (1.0 - plant).to_f32();
         for p in plants.iter_mut().skip(at).step_by(n) {
-            *p = if own > 0.0 { f64::from(*p) * plant / own } else { plant / classes as f64 } as f32;
+            *p = (if own > 0.0 { f64::from(*p) * plant / own } else { plant / classes.to_f64() }).to_f32();
         }
     }
 }
@@ -57,18 +59,18 @@ fn bins(pixels: &[f32], bands: usize, rgb: [usize; 3]) -> Vec<u16> {
             *sum = (sum.0 + value, sum.1 + value * value);
         }
     }
-    let n = (pixels.len() / bands).max(1) as f64;
+    let n = (pixels.len() / bands).max(1).to_f64();
     let scales = sums.map(|(sum, squares)| {
         let mean = sum / n;
-        (mean as f32, ((squares / n - mean * mean).max(0.0).sqrt() as f32).max(f32::EPSILON))
+        (mean.to_f32(), (squares / n - mean * mean).max(0.0).sqrt().to_f32().max(f32::EPSILON))
     });
     let bin = |value: f32, (mean, sd): (f32, f32)| {
-        let place = ((value - mean) / sd + REACH) * (BINS as f32 / (2.0 * REACH));
-        (place.max(0.0) as usize).min(BINS - 1)
+        let place = ((value - mean) / sd + REACH) * (BINS.to_f32() / (2.0 * REACH));
+        place.max(0.0).trunc_to::<usize>().min(BINS - 1)
     };
     let of = |pixel: &[f32]| {
         let values = opponent(pixel);
-        (0..3).fold(0, |at, axis| at * BINS + bin(values[axis], scales[axis])) as u16
+        (0..3).fold(0, |at, axis| at * BINS + bin(values[axis], scales[axis])).to_u16()
     };
     pixels.chunks_exact(bands).map(of).collect()
 }
@@ -115,8 +117,8 @@ mod tests {
         let leaves: Vec<bool> = (0..n).map(|at| at % 5 == 0).collect();
         for (at, leaf) in leaves.iter().enumerate() {
             let color = if *leaf { [0.25f32, 0.45, 0.15] } else { [0.4, 0.33, 0.27] };
-            let light = 1.0 + 0.25 * stream.normal() as f32;
-            pixels.extend((0..3).map(|c| exposure[c] * (light * color[c] + 0.02 * stream.normal() as f32)));
+            let light = 1.0 + 0.25 * stream.normal().to_f32();
+            pixels.extend((0..3).map(|c| exposure[c] * (light * color[c] + 0.02 * stream.normal().to_f32())));
             let plant = if stream.chance(if *leaf { found } else { taken }) { 0.9 } else { 0.2 };
             probabilities[at] = 1.0 - plant;
             probabilities[n + at] = 0.75 * plant;
@@ -128,7 +130,7 @@ mod tests {
     fn iou(leaves: &[bool], soil: &[f32]) -> f64 {
         let both = leaves.iter().zip(soil).filter(|(leaf, soil)| **leaf && **soil < 0.5).count();
         let either = leaves.iter().zip(soil).filter(|(leaf, soil)| **leaf || **soil < 0.5).count();
-        both as f64 / either as f64
+        both.to_f64() / either.to_f64()
     }
 
     /// Rationale: completing partly found leaves is the purpose of the step. Expected: if two thirds of the leaf pixels were found,

@@ -19,6 +19,7 @@ mod plants;
 mod rows;
 
 use super::data::Band;
+use furrow_base::math::ToInt;
 use furrow_dataset::model::classes::Classes;
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +57,7 @@ pub struct Seen<'a> {
 
 impl Seen<'_> {
     fn extent(&self) -> (usize, usize) {
-        (self.size.0 as usize, self.size.1 as usize)
+        (self.size.0.to_usize(), self.size.1.to_usize())
     }
 }
 

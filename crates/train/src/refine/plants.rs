@@ -10,6 +10,7 @@
 
 use super::rows::Rows;
 use crate::measure::components::Components;
+use furrow_base::math::ToInt;
 
 /// Weight of the distance to the nearest row, where there are rows: log odds per half row spacing.
 const PLACE: f64 = 50.0;
@@ -42,7 +43,7 @@ impl PlantRegions {
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
             for class in 1..classes {
                 let p = finest.unwrap_or(probabilities)[class * n + at];
-                sums[(*region as usize - 1) * classes + class] += f64::from(p);
+                sums[(region.to_usize() - 1) * classes + class] += f64::from(p);
             }
         }
         Self { regions, size, classes, sums }
@@ -77,7 +78,7 @@ impl PlantRegions {
     pub(super) fn write(&self, probabilities: &mut [f32], won: impl Fn(usize, usize) -> usize) {
         let n = self.size.0 * self.size.1;
         for (at, region) in self.regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            let (own, won) = (best(at, n, probabilities), won(at, *region as usize - 1));
+            let (own, won) = (best(at, n, probabilities), won(at, region.to_usize() - 1));
             let highest = probabilities[own * n + at];
             (1..self.classes)
                 .for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });

@@ -8,6 +8,7 @@
 //! scores that the same regions reach when each is moved to a random position (toroidal shifts).
 
 use crate::measure::components::Components;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::rng::mix;
 use std::f64::consts::PI;
 
@@ -63,10 +64,10 @@ impl Rows {
         if plants.places.is_empty() {
             return None;
         }
-        let angles: Vec<f64> = (0..ANGLES).map(|k| k as f64 * PI / ANGLES as f64).collect();
+        let angles: Vec<f64> = (0..ANGLES).map(|k| k.to_f64() * PI / ANGLES.to_f64()).collect();
         let lines: Vec<(f64, f64)> = SPACINGS
             .iter()
-            .flat_map(|(spacing, phases)| (0..*phases).map(move |k| (*spacing, k as f64 / *phases as f64 * spacing)))
+            .flat_map(|(spacing, phases)| (0..*phases).map(move |k| (*spacing, k.to_f64() / phases.to_f64() * spacing)))
             .collect();
         let area = plants.all(&angles);
         let kernels = kernels(&lines);
@@ -74,14 +75,14 @@ impl Rows {
         let placed = |placement: u64| {
             let at = |region: u32, axis: u64, cells: usize| {
                 let random = mix((placement << 32) + 2 * u64::from(region) + axis) >> 11;
-                (random as f64 / (1u64 << 53) as f64 * cells as f64) as usize
+                (random.to_f64() / (1u64 << 53).to_f64() * cells.to_f64()).trunc_to::<usize>()
             };
             let shift = |region: u32| (at(region, 0, plants.size.0), at(region, 1, plants.size.1));
             best(&plants.profiles(&angles, shift), &area, &kernels).score
         };
         let scores: Vec<f64> = (0..PLACEMENTS).map(placed).collect();
-        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
-        let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / scores.len() as f64;
+        let mean = scores.iter().sum::<f64>() / scores.len().to_f64();
+        let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / scores.len().to_f64();
         let surplus = (coarse.score - mean) / (variance.sqrt() + NOISE);
 
         let (steps, step) = FINE_ANGLES;
@@ -99,12 +100,12 @@ impl Rows {
     /// Returns the mean distance of each region's pixels to the nearest row, in half row spacings: 0 on a row, 1 half way between two rows.
     pub(super) fn distances(&self, regions: &Components, (width, height): (usize, usize)) -> Vec<f64> {
         let (sin, cos) = self.angle.sin_cos();
-        let longer = width.max(height) as f64;
+        let longer = width.max(height).to_f64();
         let mut sums = vec![0.0; regions.areas.len()];
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            let x = (at % width) as f64 + 0.5 - width as f64 / 2.0;
-            let y = (at / width) as f64 + 0.5 - height as f64 / 2.0;
-            sums[*region as usize - 1] += from_line((x * cos + y * sin) / longer, (self.spacing, self.phase));
+            let x = (at % width).to_f64() + 0.5 - width.to_f64() / 2.0;
+            let y = (at / width).to_f64() + 0.5 - height.to_f64() / 2.0;
+            sums[region.to_usize() - 1] += from_line((x * cos + y * sin) / longer, (self.spacing, self.phase));
         }
         sums.iter().zip(&regions.areas).map(|(sum, area)| sum / f64::from(*area)).collect()
     }
@@ -133,24 +134,25 @@ impl Cells {
         let longer = width.max(height).max(1);
         let step = (longer / CELLS).max(1);
         let size = (width.div_ceil(step), height.div_ceil(step));
-        let least = LEAST * (width * height) as f64;
+        let least = LEAST * (width * height).to_f64();
         let mut counts = std::collections::BTreeMap::new();
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            if f64::from(regions.areas[*region as usize - 1]) >= least {
+            if f64::from(regions.areas[region.to_usize() - 1]) >= least {
                 *counts.entry((*region, at / width / step, at % width / step)).or_insert(0u32) += 1;
             }
         }
-        let weight = |region: u32, count: u32| f64::from(count) / f64::from(regions.areas[region as usize - 1]).sqrt();
+        let weight =
+            |region: u32, count: u32| f64::from(count) / f64::from(regions.areas[region.to_usize() - 1]).sqrt();
         let places = counts.iter().map(|(&(region, y, x), count)| (region, x, y, weight(region, *count))).collect();
-        let (half, longer) = (step as f64 / 2.0, longer as f64);
-        let first = ((half - width as f64 / 2.0) / longer, (half - height as f64 / 2.0) / longer);
-        Self { size, places, first, side: step as f64 / longer }
+        let (half, longer) = (step.to_f64() / 2.0, longer.to_f64());
+        let first = ((half - width.to_f64() / 2.0) / longer, (half - height.to_f64() / 2.0) / longer);
+        Self { size, places, first, side: step.to_f64() / longer }
     }
 
     fn bin(&self, (x, y): (usize, usize), (sin, cos): (f64, f64)) -> usize {
-        let (x, y) = (self.first.0 + x as f64 * self.side, self.first.1 + y as f64 * self.side);
-        let bin = (x * cos + y * sin + REACH) * (BINS as f64 / (2.0 * REACH));
-        (bin.max(0.0) as usize).min(BINS - 1)
+        let (x, y) = (self.first.0 + x.to_f64() * self.side, self.first.1 + y.to_f64() * self.side);
+        let bin = (x * cos + y * sin + REACH) * (BINS.to_f64() / (2.0 * REACH));
+        bin.max(0.0).trunc_to::<usize>().min(BINS - 1)
     }
 
     /// Returns the fraction of the plants' weight in each bin across the lines, for each angle. `shift` moves each region by a
@@ -186,7 +188,7 @@ impl Cells {
 /// Returns one kernel over the bins per (spacing, phase): a Gaussian of the distance to the nearest line.
 fn kernels(lines: &[(f64, f64)]) -> Vec<[f64; BINS]> {
     let value = |bin: usize, line| {
-        let place = (bin as f64 + 0.5) / BINS as f64 * 2.0 * REACH - REACH;
+        let place = (bin.to_f64() + 0.5) / BINS.to_f64() * 2.0 * REACH - REACH;
         (-0.5 * (from_line(place, line) / WIDTH).powi(2)).exp()
     };
     lines.iter().map(|line| std::array::from_fn(|bin| value(bin, *line))).collect()
@@ -223,7 +225,7 @@ mod tests {
     /// Returns the regions of a 480 × 360 image with squares of 7 × 7 pixels centred at `places`.
     fn regions(places: &[(f64, f64)]) -> Components {
         Components::of(480, 360, |at| {
-            let (x, y) = ((at % 480) as f64, (at / 480) as f64);
+            let (x, y) = ((at % 480).to_f64(), (at / 480).to_f64());
             places.iter().any(|(px, py)| (x - px).abs() <= 3.0 && (y - py).abs() <= 3.0).then_some(())
         })
     }
@@ -246,7 +248,9 @@ mod tests {
         assert!((rows.angle.to_degrees() - 25.0).abs() <= 1.0, "{rows:?}");
         assert!((rows.spacing * 480.0 / 90.0 - 1.0).abs() < 0.03 && rows.surplus > 6.0, "{rows:?}");
         let distances = rows.distances(&regions, (480, 360));
-        let of = |(x, y): &(f64, f64)| distances[regions.labels[*y as usize * 480 + *x as usize] as usize - 1];
+        let of = |(x, y): &(f64, f64)| {
+            distances[regions.labels[y.trunc_to::<usize>() * 480 + x.trunc_to::<usize>()].to_usize() - 1]
+        };
         assert!(crops.iter().all(|plant| of(plant) < 0.25), "{distances:?}");
         assert!(weeds.iter().all(|plant| of(plant) > 0.8), "{distances:?}");
     }

@@ -14,6 +14,7 @@ use crate::figure::{Plot, Thumbnail};
 use crate::measure::Report;
 use crate::run;
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_compare::{Band, Comparison, Options, Pairs, Region};
 use furrow_dataset::Set;
 use furrow_dataset::make::timing_log;
@@ -87,7 +88,7 @@ pub(super) fn table(bound: &BoundExperiment, seen: &[Seen], out: &Path) -> Resul
                 Cell::number(ratio, 2),
                 Cell::number(distances[train].as_ref().map(|d| d.flip), 3),
                 Cell::number(distances[train].as_ref().map(|d| d.ciede2000), 2),
-                Cell::Count(pairs.iter().filter(evaluated).count() as u64),
+                Cell::Count(pairs.iter().filter(evaluated).count().to_u64()),
             ];
             let cells = (0..experiment.test.len()).flat_map(|test| {
                 let pairs = &pairs;
@@ -143,7 +144,7 @@ fn cost(bound: &BoundExperiment, train: &TrainSet) -> Result<Option<f64>> {
     let Some(part) = train.from.first() else { return Ok(None) };
     let mut last: BTreeMap<u64, f64> = BTreeMap::new();
     for row in timing_log::rows(bound.folder(part.set))?.into_iter().filter(|row| row.draw_s > 0.0) {
-        last.insert(row.index, row.seconds * row.threads as f64 / row.at_once.max(1) as f64);
+        last.insert(row.index, row.seconds * row.threads.to_f64() / row.at_once.max(1).to_f64());
     }
     Ok(mean(&last.into_values().collect::<Vec<_>>()))
 }
@@ -183,7 +184,7 @@ impl DatasetPair {
         if same(x) != same(y) {
             return Ok(None);
         }
-        let images = sets[0].recipe.count.min(sets[1].recipe.count) as usize;
+        let images = sets[0].recipe.count.min(sets[1].recipe.count).to_usize();
         let prints = [sets[0].recipe.fingerprint()?, sets[1].recipe.fingerprint()?];
         Ok(Some(Self { folders: [a.into(), b.into()], prints, images: images.min(MEASURED) }))
     }
@@ -199,7 +200,7 @@ fn known(bound: &BoundExperiment, out: &Path, base: usize, train: usize) -> Resu
     let path = place(bound, out, train);
     let Some(both) = DatasetPair::of(bound, base, train)?.filter(|_| path.is_file()) else { return Ok(None) };
     let found = run::read_json::<Distance>(&path).ok();
-    Ok(found.filter(|d| d.of == both.prints && d.images == both.images as u64))
+    Ok(found.filter(|d| d.of == both.prints && d.images == both.images.to_u64()))
 }
 
 /// Measures and stores the distances that are missing.
@@ -213,7 +214,7 @@ pub(super) fn measure(bound: &BoundExperiment, out: &Path) -> Result<()> {
         let [a, b] = &both.folders;
         let mut found = Pairs::find(a, b, None)?;
         found.pairs.truncate(both.images);
-        let images = found.pairs.len() as u64;
+        let images = found.pairs.len().to_u64();
         let compared = Comparison::of(found, &Options { shown: 0, ..Options::default() }, &|| ())?;
         let whole = compared.means.iter().find(|m| (m.band, m.region) == (Band::Rgb, Region::All));
         let Some((flip, color)) = whole.and_then(|m| Some((m.flip.as_ref()?.mean, m.ciede2000.as_ref()?.mean))) else {
@@ -266,7 +267,7 @@ impl CentreCrop {
         let (w, h) = sample.size();
         let (width, height) = (w.min(SHOWN.0), h.min(SHOWN.1));
         let (left, top) = ((w - width) / 2, (h - height) / 2);
-        let places = (top..top + height).flat_map(|y| (left..left + width).map(move |x| (y * w + x) as usize));
+        let places = (top..top + height).flat_map(|y| (left..left + width).map(move |x| (y * w + x).to_usize()));
         let (rgb, labels) = places.map(|i| (sample.rgb[i], sample.semantics[i])).unzip();
         Ok(Self { width, height, rgb, labels })
     }
@@ -277,9 +278,9 @@ impl CentreCrop {
             name,
             width: 2 * self.width + GAP,
             height: self.height,
-            rgb: joined(&self.rgb, &right.rgb, self.width as usize, [255; 3]),
+            rgb: joined(&self.rgb, &right.rgb, self.width.to_usize(), [255; 3]),
             truth: Vec::new(),
-            predictions: vec![joined(&self.labels, &right.labels, self.width as usize, u8::MAX)],
+            predictions: vec![joined(&self.labels, &right.labels, self.width.to_usize(), u8::MAX)],
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::figure;
 use crate::measure::Report;
 use crate::run::{self, Results};
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_dataset::model::classes::Classes;
 use furrow_output::{write_atomically, write_together};
 use furrow_report::{Cell, Table};
@@ -93,7 +94,7 @@ impl Line<'_> {
 
     /// Returns the number of evaluated runs: the minimum over the test sets.
     fn done(&self, tests: usize) -> u64 {
-        let evaluated = |test: usize| self.seen.iter().filter(|s| s.reports[test].is_some()).count() as u64;
+        let evaluated = |test: usize| self.seen.iter().filter(|s| s.reports[test].is_some()).count().to_u64();
         (0..tests).map(evaluated).min().unwrap_or(0)
     }
 
@@ -223,7 +224,7 @@ pub fn listing(bound: &BoundExperiment, out: &Path) -> Result<Table> {
         };
         let evaluated = s.reports.iter().flatten().count();
         table.push([
-            Cell::Count(i as u64),
+            Cell::Count(i.to_u64()),
             Cell::text(row.learner.name()),
             Cell::text(&experiment.train[row.train].name),
             seed(&row),
@@ -250,7 +251,7 @@ fn runs(experiment: &Experiment, seen: &[Seen]) -> Table {
     let last = ["vegetation I/U", "vegetation P", "vegetation R"].map(str::to_owned);
     let mut table = Table::new(format!("Runs ({})", scale(experiment)), fixed.into_iter().chain(classes).chain(last));
     for s in seen {
-        let steps = |v: Option<u64>| Cell::number(v.map(|v| v as f64), 0);
+        let steps = |v: Option<u64>| Cell::number(v.map(ToFloat::to_f64), 0);
         for (test, report) in experiment.test.iter().zip(&s.reports) {
             let begin = [
                 Cell::text(s.row.learner.name()),

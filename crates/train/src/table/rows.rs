@@ -3,6 +3,7 @@
 use super::experiment::Experiment;
 use crate::baseline::Kind;
 use crate::net::Network;
+use furrow_base::math::ToInt;
 use furrow_dataset::make::generate::Shard;
 use std::path::{Path, PathBuf};
 
@@ -68,7 +69,7 @@ pub fn rows(experiment: &Experiment) -> Vec<Row> {
 /// Returns the rows of a shard, each with its index among all rows.
 pub(super) fn of_shard(experiment: &Experiment, shard: Shard) -> Vec<(usize, Row)> {
     let numbered = rows(experiment).into_iter().enumerate();
-    numbered.filter(|(i, _)| *i as u64 % shard.of == shard.number).collect()
+    numbered.filter(|(i, _)| i.to_u64() % shard.of == shard.number).collect()
 }
 
 #[cfg(test)]

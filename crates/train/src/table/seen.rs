@@ -6,6 +6,7 @@ use super::rows::Row;
 use crate::measure::Report;
 use crate::run::{self, Results};
 use furrow_base::Result;
+use furrow_base::math::ToFloat;
 use std::path::Path;
 
 /// Number of decimals of percentages.
@@ -43,13 +44,13 @@ pub(super) fn see(experiment: &Experiment, row: Row, out: &Path, warnings: &mut 
 
 /// Returns the mean; `None` for an empty slice.
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len().to_f64())
 }
 
 /// Returns the sample standard deviation (n − 1); `None` for fewer than two values.
 pub(super) fn spread(values: &[f64]) -> Option<f64> {
     let middle = mean(values).filter(|_| values.len() > 1)?;
-    Some((values.iter().map(|v| (v - middle).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt())
+    Some((values.iter().map(|v| (v - middle).powi(2)).sum::<f64>() / (values.len() - 1).to_f64()).sqrt())
 }
 
 /// Returns the median; `None` for an empty vector.

@@ -4,6 +4,7 @@ use super::experiment::{Experiment, ImageSelection, Source};
 use super::names::unknown;
 use crate::data::Selection;
 use furrow_base::error::Kind;
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_dataset::import::masks::{Folders, Masks};
 use furrow_dataset::import::{self, Source as _};
@@ -176,7 +177,7 @@ impl BoundExperiment {
             };
             let done = status.map_or(0, |status| status.done);
             let [name, from, size] = [name.clone(), from, size].map(Cell::text);
-            table.push([name, from, size, Cell::number(images.map(|n| n as f64), 0), Cell::Count(done)]);
+            table.push([name, from, size, Cell::number(images.map(ToFloat::to_f64), 0), Cell::Count(done)]);
         }
         Ok(table)
     }

@@ -12,6 +12,7 @@ use crate::fit::Plan;
 use crate::measure::Report;
 use crate::net::Network;
 use crate::run::{self, Identity, Results, TrainedModel};
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_dataset::make::generate::Shard;
 use furrow_output::{remove_unfinished, remove_unfinished_in, write_atomically};
@@ -390,7 +391,7 @@ fn left(all: &[&RowWork<'_>], order: &TableOptions<'_>) -> Result<Option<f64>> {
     }
     let mean = |of: &dyn Fn(Network) -> bool| {
         let some: Vec<f64> = known.iter().filter(|(n, _)| of(*n)).map(|(_, s)| *s).collect();
-        (!some.is_empty()).then(|| some.iter().sum::<f64>() / some.len() as f64)
+        (!some.is_empty()).then(|| some.iter().sum::<f64>() / some.len().to_f64())
     };
     let open = all.iter().filter(|w| !w.is_done()).filter_map(|w| w.network());
     Ok(open.map(|(network, _)| mean(&|n| n == network).or_else(|| mean(&|_| true))).sum())

@@ -2,6 +2,7 @@
 
 use super::device::Precision;
 use crate::net::{Conv, MULTIPLIED_OUT, Norm, Operations, is_encoder};
+use furrow_base::math::{ToFloat, ToInt};
 use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
 
@@ -45,8 +46,8 @@ impl Operations for Compute<'_> {
     fn conv(&mut self, x: &Tensor, name: &str, conv: Conv) -> Tensor {
         let weight = self.rounded(&self.tensors[&format!("{name}.weight")]);
         let bias = conv.bias.then(|| self.rounded(&self.tensors[&format!("{name}.bias")]));
-        let (stride, groups) = (conv.stride as i64, conv.groups as i64);
-        let (before, after) = (conv.padding().0 as i64, conv.padding().1 as i64);
+        let (stride, groups) = (conv.stride.to_i64(), conv.groups.to_i64());
+        let (before, after) = (conv.padding().0.to_i64(), conv.padding().1.to_i64());
         let x = self.rounded(x);
         let (x, pad) =
             if before == after { (x, before) } else { (x.constant_pad_nd([before, after, before, after]), 0) };
@@ -99,7 +100,7 @@ impl Operations for Compute<'_> {
     }
 
     fn to_multiple(&mut self, x: &Tensor, pixels: usize) -> Tensor {
-        let pixels = pixels as i64;
+        let pixels = pixels.to_i64();
         let to = size(x).map(|side| (side + pixels - 1) / pixels * pixels);
         if to == size(x) { x.shallow_clone() } else { x.upsample_bilinear2d(to, false, None, None) }
     }
@@ -109,7 +110,7 @@ impl Operations for Compute<'_> {
         let [height, width] = size(x);
         let placed = x + position.upsample_bicubic2d([height, width], false, None, None);
         // The number of images is left open (-1), because a trace would record it as a constant.
-        let patches = placed.reshape([-1, channels as i64, 1, height * width]);
+        let patches = placed.reshape([-1, channels.to_i64(), 1, height * width]);
         Tensor::cat(&[&class.expand_as(&patches.narrow(3, 0, 1)), &patches], 3)
     }
 
@@ -124,7 +125,7 @@ impl Operations for Compute<'_> {
         // An unnecessary conversion would record the device in a trace.
         let x = if x.kind() == Kind::Float { x.shallow_clone() } else { x.to_kind(Kind::Float) };
         let lying = x.permute([0, 2, 3, 1]);
-        lying.layer_norm([norm.channels as i64], gain, shift, norm.epsilon, true).permute([0, 3, 1, 2])
+        lying.layer_norm([norm.channels.to_i64()], gain, shift, norm.epsilon, true).permute([0, 3, 1, 2])
     }
 
     fn gelu(&mut self, x: &Tensor) -> Tensor {
@@ -134,20 +135,20 @@ impl Operations for Compute<'_> {
     /// Up to [`MULTIPLIED_OUT`] tokens, attention uses explicit matrix products, which every version of PyTorch can trace. The products of
     /// more tokens would exceed the memory.
     fn attention(&mut self, x: &Tensor, channels: usize, heads: usize) -> Tensor {
-        let (channels, heads, count) = (channels as i64, heads as i64, x.size()[3]);
+        let (channels, heads, count) = (channels.to_i64(), heads.to_i64(), x.size()[3]);
         let split = x.reshape([-1, 3, heads, channels / heads, count]).transpose(3, 4);
         let [query, key, value] = [0, 1, 2].map(|part| split.select(1, part));
-        let y = if count > MULTIPLIED_OUT as i64 {
+        let y = if count > MULTIPLIED_OUT.to_i64() {
             Tensor::scaled_dot_product_attention(&query, &key, &value, None::<&Tensor>, 0.0, false, None, false)
         } else {
-            let products = query.matmul(&key.transpose(2, 3)) * (heads as f64 / channels as f64).sqrt();
+            let products = query.matmul(&key.transpose(2, 3)) * (heads.to_f64() / channels.to_f64()).sqrt();
             products.softmax(-1, None::<Kind>).matmul(&value)
         };
         y.transpose(2, 3).reshape([-1, channels, 1, count])
     }
 
     fn scale(&mut self, x: &Tensor, name: &str, channels: usize) -> Tensor {
-        x * self.tensors[&format!("{name}.gamma")].view([1, channels as i64, 1, 1])
+        x * self.tensors[&format!("{name}.gamma")].view([1, channels.to_i64(), 1, 1])
     }
 
     fn features(&mut self, x: &Tensor, halvings: usize) {

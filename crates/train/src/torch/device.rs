@@ -1,5 +1,6 @@
 //! Device and precision of networks.
 
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -78,7 +79,7 @@ pub fn find(name: &str) -> Result<Device> {
         return Err(start_again());
     }
     let devices = tch::Cuda::device_count();
-    if (number as i64) < devices {
+    if number.to_i64() < devices {
         return Ok(Device::Cuda(number));
     }
     Err(missing(format!("libtorch sees {devices} CUDA devices")))
@@ -106,5 +107,5 @@ fn start_again() -> Error {
 
 /// Sets the number of compute threads. On a CPU it affects the last bits of results.
 pub fn set_threads(threads: usize) {
-    tch::set_num_threads(threads as i32);
+    tch::set_num_threads(threads.to_i32());
 }

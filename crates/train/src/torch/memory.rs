@@ -2,6 +2,7 @@
 
 use super::{Model, Precision};
 use crate::net::{Footprint, Parameter};
+use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
 use furrow_field::estimate::{gib, usual_memory};
 
@@ -15,16 +16,16 @@ const COPIES: f64 = 18.0;
 impl Model {
     /// Returns an error if inference of `images` images of this width and height would take too much memory.
     pub fn check_inference(&self, images: usize, size: (u32, u32)) -> Result<()> {
-        let values = INFERENCE * self.footprint(size).peak * images as f64 * self.bytes();
+        let values = INFERENCE * self.footprint(size).peak * images.to_f64() * self.bytes();
         self.check(values, size, "use smaller images, --resize with shorter sides, or a smaller --batch")
     }
 
     /// Returns an error if training on `images` images of this width and height at once would take too much memory.
     pub fn check_training(&self, images: usize, size: (u32, u32)) -> Result<()> {
         let Footprint { peak, all } = self.footprint(size);
-        let values = (all + peak) * images as f64 * self.bytes();
+        let values = (all + peak) * images.to_f64() * self.bytes();
         let parameters: usize = self.list.iter().map(Parameter::len).sum();
-        let whole = values + COPIES * parameters as f64 * 4.0;
+        let whole = values + COPIES * parameters.to_f64() * 4.0;
         self.check(whole, size, "use a smaller --batch or --size; --accumulate keeps the number of images of a step")
     }
 
@@ -41,7 +42,7 @@ impl Model {
     }
 
     fn check(&self, bytes: f64, (width, height): (u32, u32), help: &str) -> Result<()> {
-        let limit = usual_memory() as f64;
+        let limit = usual_memory().to_f64();
         // The memory of a GPU is not known here; libtorch reports its end.
         if self.place.device.is_cuda() || bytes <= limit {
             return Ok(());

@@ -12,6 +12,7 @@ use super::net::{Network, Parameter, fitting, parameters};
 use super::refine::Features;
 use super::weights::Array;
 use compute::Compute;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use std::collections::BTreeMap;
 /// The bindings of libtorch that networks are computed with.
@@ -137,8 +138,8 @@ impl Model {
         };
         let (height, width) = (fine.size()[2], fine.size()[3]);
         let all = tch::no_grad(|| Tensor::cat(&[fine, &coarse.upsample_nearest2d([height, width], None, None)], 1));
-        let planes = values(&all)?.chunks_exact((width * height) as usize).map(<[f32]>::to_vec).collect();
-        Ok((scores.to_kind(Kind::Float), Features { size: (width as usize, height as usize), planes }))
+        let planes = values(&all)?.chunks_exact((width * height).to_usize()).map(<[f32]>::to_vec).collect();
+        Ok((scores.to_kind(Kind::Float), Features { size: (width.to_usize(), height.to_usize()), planes }))
     }
 
     /// Predicts the class of each pixel like [`Self::predict`], and returns its probability as well.
@@ -158,15 +159,15 @@ impl Model {
 
     /// Returns images like [`Self::images`], or an error if the network would take more memory for them than the machine has.
     fn input(&self, pixels: &[f32], size: (u32, u32)) -> Result<Tensor> {
-        let images = pixels.len() / (self.bands * size.0 as usize * size.1 as usize).max(1);
+        let images = pixels.len() / (self.bands * size.0.to_usize() * size.1.to_usize()).max(1);
         self.check_inference(images, size)?;
         Ok(self.images(pixels, size))
     }
 
     /// Returns images (stored as in [`Self::predict`]) as a tensor of images × bands × height × width on the device.
     pub fn images(&self, pixels: &[f32], (width, height): (u32, u32)) -> Tensor {
-        let bands = self.bands as i64;
-        let images = pixels.len() as i64 / (bands * i64::from(width) * i64::from(height));
+        let bands = self.bands.to_i64();
+        let images = pixels.len().to_i64() / (bands * i64::from(width) * i64::from(height));
         let lying = Tensor::from_slice(pixels).view([images, i64::from(height), i64::from(width), bands]);
         lying.to_device(self.place.device).permute([0, 3, 1, 2])
     }
@@ -196,7 +197,7 @@ fn tensor(parameter: &Parameter, values: &[f32], device: Device) -> Tensor {
 
 /// Copies values to a device, in the memory layout of weights.
 pub(super) fn laid(shape: &[usize], values: &[f32], device: Device) -> Tensor {
-    let shape: Vec<i64> = shape.iter().map(|n| *n as i64).collect();
+    let shape: Vec<i64> = shape.iter().map(|n| n.to_i64()).collect();
     let plain = Tensor::from_slice(values).view(shape.as_slice()).to_device(device);
     if shape.len() == 4 { channels_last(&plain) } else { plain }
 }
@@ -209,6 +210,7 @@ fn channels_last(x: &Tensor) -> Tensor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
 
     /// Expected: every network gives features with cells of 8 and of 16 pixels, in cells of 8, with the channels of its encoder there;
     /// the scores are the same as without features. Source: the networks' tables of channels.
@@ -216,7 +218,7 @@ mod tests {
     fn every_network_names_its_encoder() {
         let place = Placement { device: Device::Cpu, precision: Precision::Single };
         let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256, 384 + 384]);
-        let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17) as f32 / 17.0).collect();
+        let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17).to_f32() / 17.0).collect();
         let shallow = Model::new(Network::TinyUnet, 3, 3, 1, place).scores_and_features(&pixels, size);
         assert!(shallow.is_err_and(|error| error.to_string().contains("gives no features of its encoder")));
         let deep = Network::ALL.iter().filter(|network| **network != Network::TinyUnet);

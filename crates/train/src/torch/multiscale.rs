@@ -4,6 +4,7 @@ use super::{Model, values};
 use crate::data::Band;
 use crate::data::resize::Input;
 use crate::refine::{Appearance, Examples, Features, Refine, Seen};
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use tch::Kind;
 
@@ -27,7 +28,7 @@ pub struct Scores {
 impl Scores {
     /// Converts the values to probabilities.
     fn normalize(&mut self) {
-        let n = self.size.0 as usize * self.size.1 as usize;
+        let n = self.size.0.to_usize() * self.size.1.to_usize();
         let values = &mut self.values;
         for at in 0..n {
             let places = (at..values.len()).step_by(n);
@@ -116,7 +117,7 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
             add(&mut mean, found);
         }
         for sum in &mut mean {
-            *sum /= models.len() as f32;
+            *sum /= models.len().to_f32();
         }
         if input.size == size && inputs.len() > 1 {
             finest = Some(mean.clone());

@@ -114,13 +114,14 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToInt;
 
     /// Expected: images put into a sheet are recovered from it, also in the second line of columns; below each image a
     /// bar of its length starts at its left edge, followed by text; each column has text above it.
     #[test]
     fn pictures_are_found_where_they_were_put() {
         let layout = Layout { rows: 2, size: 40 };
-        let thumbnail = |n: usize| vec![[n as u8, 1, 2]; 1600];
+        let thumbnail = |n: usize| vec![[n.to_u8(), 1, 2]; 1600];
         let bar = |pixels| Bar { pixels, words: "5".into() };
         let column = |i: usize| Column {
             words: "BB".into(),

@@ -13,7 +13,7 @@ use crate::quality::threads;
 use contact_sheet::{Bar, Column, ContactSheet, Layout, Thumbnail};
 use furrow_base::geometry::Window;
 use furrow_base::input::shipped;
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3};
 use furrow_base::sampling::Points;
 use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
@@ -123,26 +123,26 @@ impl Args {
         }
         let path = self.out.join(page.file_stem().unwrap_or_default()).with_extension("png");
         let (spp, size) = (self.spp, self.size);
-        let layout = Layout { rows: view::KINDS, size: size as usize };
+        let layout = Layout { rows: view::KINDS, size: size.to_usize() };
         let from: Vec<&str> = stages.iter().map(|(.., of)| of.as_str()).collect();
         let from = format!("{}\nspp: {spp}\nsize: {size}\ntext: stages and bars\nview: the plant", from.join("\n"));
         let kept = std::fs::read(&path).is_ok_and(|old| contains(&old, from.as_bytes()));
         if !kept {
             let mut columns = Vec::new();
             for (plant, views, _) in &stages {
-                let thumbnail = |view| Ok((self.shoot(page, plant.bbch, view, signals)?, bar(view, size as usize)));
+                let thumbnail = |view| Ok((self.shoot(page, plant.bbch, view, signals)?, bar(view, size.to_usize())));
                 let thumbnails = views.iter().map(thumbnail).collect::<Result<Vec<(Thumbnail, Bar)>>>()?;
                 columns.push(Column { words: format!("BBCH {}", plant.bbch), thumbnails });
             }
             let sheet = layout.compose(&columns);
-            let (width, height) = (sheet.width as u32, sheet.height as u32);
+            let (width, height) = (sheet.width.to_u32(), sheet.height.to_u32());
             furrow_output::write_png(&path, width, height, &ImageData::Rgb(&sheet.pixels), &from)?;
         }
         if !self.quiet {
             furrow_cli::message!("{}: {} stages{}", page.display(), stages.len(), if kept { ", kept" } else { "" });
         }
         let (width, height, pixels) = furrow_output::read_rgb(&path)?;
-        let sheet = ContactSheet { width: width as usize, height: height as usize, pixels };
+        let sheet = ContactSheet { width: width.to_usize(), height: height.to_usize(), pixels };
         let stages = stages.into_iter().enumerate().map(|(i, (plant, views, _))| {
             let look = |(k, view): (usize, &View)| {
                 let thumbnail = layout.part(&sheet, (i, k));
@@ -191,7 +191,7 @@ impl Args {
     /// Renders one image.
     fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Thumbnail> {
         let field = self.field(page, bbch, Some(view))?;
-        let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1) as u32)?;
+        let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1).to_u32())?;
         let world = World { scene: &field.scene, geometry: &geometry };
         let window = Window::full(self.size, self.size);
         let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: Points::Sobol };
@@ -214,7 +214,7 @@ fn points(field: &Field) -> Vec<Vec3> {
 /// Scale bar of a round length for an image of `size` pixels.
 fn bar(view: &View, size: usize) -> Bar {
     let mm = page::round_length(page::LONGEST * view.width_mm());
-    Bar { pixels: (size as f32 * mm / view.width_mm()).round() as usize, words: format!("{mm} mm") }
+    Bar { pixels: (size.to_f32() * mm / view.width_mm()).round_to::<usize>(), words: format!("{mm} mm") }
 }
 
 #[cfg(test)]

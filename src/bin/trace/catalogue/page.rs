@@ -1,5 +1,6 @@
 //! Self-contained HTML page with all species at all growth stages.
 
+use furrow_base::math::ToInt;
 use furrow_field::PlantRecord;
 use furrow_field::desc::{Role, SpeciesDesc};
 use furrow_report::{Cell, Page, Table, data_url, number, section};
@@ -90,7 +91,7 @@ fn table(stages: &[Stage]) -> Table {
         table.push([
             Cell::text(format!("BBCH {}", plant.bbch)),
             Cell::Shown(number(f64::from(plant.age_days))),
-            Cell::Count(plant.leaf_axes.len() as u64),
+            Cell::Count(plant.leaf_axes.len().to_u64()),
             mm(longest),
             mm(plant.height),
             mm(2.0 * plant.radius),

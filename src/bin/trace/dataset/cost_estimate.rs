@@ -3,6 +3,7 @@
 
 use crate::growing::Line;
 use furrow_base::Result;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Order;
@@ -16,7 +17,7 @@ const CORES: u32 = 8;
 /// Safety factor on the memory requested from a scheduler, which kills jobs that exceed it.
 const SPARE: f64 = 1.25;
 /// Bytes per GiB.
-const GIB: f64 = (1_u64 << 30) as f64;
+const GIB: f64 = (1_u32 << 30) as f64;
 
 /// Whether to render or only estimate.
 #[derive(clap::Args)]
@@ -80,9 +81,9 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> 
     probes.sort();
     let [fewer, more] = cost.spp;
     let samples = if fewer == more { more.to_string() } else { format!("{fewer} and {more}") };
-    let with = count(threads as u64, "thread", "threads");
+    let with = count(threads.to_u64(), "thread", "threads");
     let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
-    let memory = (cost.memory(CORES as usize) as f64 * SPARE / GIB).ceil().max(1.0);
+    let memory = (cost.memory(CORES.to_usize()).to_f64() * SPARE / GIB).ceil().max(1.0);
     vec![
         row("from", format!("{} with {samples} samples per pixel", listed(&probes))),
         row(
@@ -96,16 +97,16 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> 
                 part(core_s - sample_s - grow_s)
             ),
         ),
-        row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads as f64))),
-        row("disk", format!("{} GB ({} MB)", number(bytes as f64 / 1e9), number(bytes as f64 / 1e6))),
-        row("files", format!("{} ({}{of_fields})", number(files as f64), count(images, "image", "images"))),
+        row("here", format!("{} hours with {with}", number(core_s / 3600.0 / threads.to_f64()))),
+        row("disk", format!("{} GB ({} MB)", number(bytes.to_f64() / 1e9), number(bytes.to_f64() / 1e6))),
+        row("files", format!("{} ({}{of_fields})", number(files.to_f64()), count(images, "image", "images"))),
         row(
             "memory",
             format!(
                 "{} GiB for one image at a time, {} GiB with {}",
-                number(cost.memory(1) as f64 / GIB),
-                number(cost.memory(threads) as f64 / GIB),
-                count(threads as u64, "core", "cores")
+                number(cost.memory(1).to_f64() / GIB),
+                number(cost.memory(threads).to_f64() / GIB),
+                count(threads.to_u64(), "core", "cores")
             ),
         ),
         row(
@@ -114,7 +115,7 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> 
                 "trace dataset emit {} --scheduler slurm --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
                 folder.display(),
                 cost.shards(CORES),
-                number(core_s / 3600.0 / f64::from(CORES) / cost.shards(CORES) as f64)
+                number(core_s / 3600.0 / f64::from(CORES) / cost.shards(CORES).to_f64())
             ),
         ),
     ]

@@ -3,6 +3,7 @@
 use super::progress::Progress;
 use crate::quality::threads;
 use clap::ValueEnum;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -112,7 +113,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         furrow_cli::message!("warning: {warning}");
     }
     let progress = Progress::new(Instant::now(), args.quiet);
-    progress.expect(source.images().len() as u64);
+    progress.expect(source.images().len().to_u64());
     let order = ImportSettings { split: args.split, licence: args.licence.clone() };
     let done = |_| progress.add();
     let stop = signals.catch();

@@ -1,6 +1,7 @@
 //! Progress of a dataset: a bar on a terminal, or an occasional line in a log.
 
 use crate::growing;
+use furrow_base::math::ToFloat;
 use furrow_dataset::make::time_left::TimeLeft;
 use furrow_field::assemble::BuildProgress;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -80,17 +81,17 @@ impl Progress {
     fn rate(&self, done: u64) -> String {
         let seconds = self.begin.elapsed().as_secs_f64();
         let at_this_rate = || {
-            let left = self.total.load(Ordering::Relaxed).saturating_sub(done) as f64;
-            Duration::from_secs_f64(left * seconds / done.max(1) as f64)
+            let left = self.total.load(Ordering::Relaxed).saturating_sub(done).to_f64();
+            Duration::from_secs_f64(left * seconds / done.max(1).to_f64())
         };
         let left = self.time_left.as_deref().and_then(TimeLeft::left).unwrap_or_else(at_this_rate);
-        format!("{:.0} images per hour, {} left", 3600.0 * done as f64 / seconds.max(1e-9), HumanDuration(left))
+        format!("{:.0} images per hour, {} left", 3600.0 * done.to_f64() / seconds.max(1e-9), HumanDuration(left))
     }
 
     /// Removes the bar. Returns the number of finished images, and images per hour.
     pub(crate) fn finish(&self) -> (u64, f64) {
         self.bar.finish_and_clear();
         let done = self.done.load(Ordering::Relaxed);
-        (done, 3600.0 * done as f64 / self.begin.elapsed().as_secs_f64().max(1e-9))
+        (done, 3600.0 * done.to_f64() / self.begin.elapsed().as_secs_f64().max(1e-9))
     }
 }

@@ -3,6 +3,7 @@
 use super::progress::Progress;
 use crate::field::MemoryArgs;
 use crate::quality::threads;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -149,7 +150,7 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
     let (soon, now) = signals.catch_graceful();
     let (growing, time_left) = (Arc::default(), Arc::default());
     let progress = Progress::of_fields(begin, quiet, &growing, &time_left);
-    let total = |n: usize| progress.expect(n as u64);
+    let total = |n: usize| progress.expect(n.to_u64());
     let done = |_| progress.add();
     let warn = |words: &str| progress.pause(|| furrow_cli::message!("warning: {words}"));
     let callbacks = Callbacks { begin: &total, warn: &warn, done: &done, soon, now };

@@ -1,5 +1,6 @@
 //! The displayed image: pixels of the four views, and inspection of single pixels.
 
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use furrow_grow::plant::OrganKind;
 use furrow_job::{Field, Renderer, View};
@@ -97,7 +98,7 @@ impl LiveImage {
                 // Near is bright; no surface is black.
                 let gray = |d: &f32| {
                     let share = if d.is_finite() { (far - d) / (far - near).max(1e-9) } else { 0.0 };
-                    (share * 255.0 + 0.5) as u8
+                    (share * 255.0 + 0.5).trunc_to::<u8>()
                 };
                 let depths: Vec<u8> = self.labels.depth.iter().map(gray).collect();
                 encode(&Png::Gray(&depths))
@@ -109,10 +110,10 @@ impl LiveImage {
     /// Describes the centre of a pixel: class, plant and leaf, species, organ and depth.
     pub(super) fn at(&self, (x, y): (u32, u32)) -> Result<Value> {
         self.check((x, y))?;
-        let i = (y * self.photograph.width + x) as usize;
+        let i = (y * self.photograph.width + x).to_usize();
         let grown = self.field.grown();
         let (tag, part, depth) = (self.labels.tags[i], self.labels.parts[i], self.labels.depth[i]);
-        let organ = grown.kinds.get(part as usize).and_then(|kind| kind.organ());
+        let organ = grown.kinds.get(part.to_usize()).and_then(|kind| kind.organ());
         let plant = grown.plants.iter().find(|plant| plant.number == tag.plant);
         Ok(json!({
             "x": x,

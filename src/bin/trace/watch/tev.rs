@@ -79,7 +79,7 @@ impl Tev {
 mod tests {
     use super::*;
     use furrow_base::geometry::Window;
-    use furrow_base::math::Spectrum;
+    use furrow_base::math::{Spectrum, ToInt};
     use furrow_render::film::Pixel;
     use std::io::Read;
     use std::net::TcpListener;
@@ -100,7 +100,7 @@ mod tests {
         let mut kinds = Vec::new();
         let mut rest = bytes.as_slice();
         while let Some((length, _)) = rest.split_first_chunk::<4>() {
-            let (message, after) = rest.split_at(u32::from_le_bytes(*length) as usize);
+            let (message, after) = rest.split_at(u32::from_le_bytes(*length).to_usize());
             kinds.push(message[4]);
             rest = after;
             if message[4] == 6 {

@@ -8,6 +8,7 @@ use super::session::{PageRequest, Session};
 use super::sliders::{sliders, with};
 use super::tev::Tev;
 use furrow_base::error::Kind;
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::ron_file::RonFile;
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
@@ -133,7 +134,7 @@ impl Worker {
         let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
         let field = scene.clone().width(guess).field(wish.index)?;
         let camera = &field.grown().scene.camera;
-        let own = (f64::from(camera.width()) / f64::from(camera.scale())).round() as u32;
+        let own = (f64::from(camera.width()) / f64::from(camera.scale())).round_to::<u32>();
         self.own_width = Some(own);
         let wanted = own.min(wish.width);
         if wanted == guess { Ok(field) } else { scene.clone().width(wanted).field(wish.index) }
@@ -180,7 +181,7 @@ impl Worker {
         let width = self.own_width.unwrap_or(contact_sheet::WIDTH).min(contact_sheet::WIDTH);
         // The sheet shows other fields, so it has a preview cache separate from the image's.
         let scene = scene.clone().width(width).preview(&Preview::default());
-        for index in session.shown(|shown| shown.sheet.pictures.len() as u64)..contact_sheet::COUNT {
+        for index in session.shown(|shown| shown.sheet.pictures.len().to_u64())..contact_sheet::COUNT {
             if session.outdated().load(Ordering::Relaxed) {
                 return Err(Error::interrupted());
             }

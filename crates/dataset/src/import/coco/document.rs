@@ -5,6 +5,7 @@
 
 use super::spot;
 use crate::model::rle::Rle;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::{Error, Result, input};
 use serde::de::{Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -149,9 +150,9 @@ impl<'de> Deserialize<'de> for Whole {
 
 /// Returns the whole number that a float holds exactly.
 fn whole<E: serde::de::Error>(n: f64) -> std::result::Result<i64, E> {
-    const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
-    if n.fract() == 0.0 && n.abs() <= EXACT {
-        Ok(n as i64)
+    let exact = (1_u64 << f64::MANTISSA_DIGITS).to_f64();
+    if n.fract() == 0.0 && n.abs() <= exact {
+        Ok(n.trunc_to::<i64>())
     } else {
         Err(E::custom(format!("{n:?} is no whole number")))
     }
@@ -176,7 +177,7 @@ impl<'de> Deserialize<'de> for Flag {
             }
 
             fn visit_u64<E: serde::de::Error>(self, n: u64) -> std::result::Result<Flag, E> {
-                self.visit_f64(n as f64)
+                self.visit_f64(n.to_f64())
             }
 
             fn visit_f64<E: serde::de::Error>(self, n: f64) -> std::result::Result<Flag, E> {
@@ -271,11 +272,11 @@ impl<'de> Deserialize<'de> for Element {
             }
 
             fn visit_u64<E>(self, n: u64) -> std::result::Result<Element, E> {
-                Ok(Element::Number(n as f64))
+                Ok(Element::Number(n.to_f64()))
             }
 
             fn visit_i64<E>(self, n: i64) -> std::result::Result<Element, E> {
-                Ok(Element::Number(n as f64))
+                Ok(Element::Number(n.to_f64()))
             }
 
             fn visit_f64<E>(self, n: f64) -> std::result::Result<Element, E> {

@@ -24,6 +24,7 @@ use crate::model::record::{Keypoint, PointState};
 use crate::model::split::Split;
 use crate::model::warnings;
 use document::{Annotation, Category, Document, Id, Segmentation};
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use furrow_render::scene::tag::Class;
 use sha2::{Digest, Sha256};
@@ -356,7 +357,7 @@ type Points = BTreeMap<(u32, u16), [Option<Keypoint>; 3]>;
 
 /// Rasterizes the annotations of an image. Returns the classes, the plants and leaves, and their keypoints.
 fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec<u8>, Instances, Points)> {
-    let n = w as usize * h as usize;
+    let n = w.to_usize() * h.to_usize();
     let (mut semantics, mut plants, mut leaves) = (vec![Class::Soil as u8; n], vec![0_u32; n], vec![0_u32; n]);
     let mut masks: Vec<(usize, Vec<u32>)> = Vec::new();
     for (k, thing) in image.things.iter().enumerate() {
@@ -367,8 +368,8 @@ fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec
     let numbers = plant_numbers(&image.things, crowds);
     for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning != Meaning::Leaf) {
         for i in pixels {
-            semantics[*i as usize] = image.things[*k].meaning.number();
-            plants[*i as usize] = numbers[*k];
+            semantics[i.to_usize()] = image.things[*k].meaning.number();
+            plants[i.to_usize()] = numbers[*k];
         }
     }
     let mut owners = vec![0; image.things.len()];
@@ -376,7 +377,7 @@ fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec
     for (k, pixels) in masks.iter().filter(|(k, _)| image.things[*k].meaning == Meaning::Leaf) {
         let mut votes: BTreeMap<u32, u64> = BTreeMap::new();
         for i in pixels {
-            *votes.entry(plants[*i as usize]).or_default() += 1;
+            *votes.entry(plants[i.to_usize()]).or_default() += 1;
         }
         votes.remove(&0);
         // If plants have equal votes, takes the one with the lowest number.
@@ -384,8 +385,8 @@ fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec
             votes.into_iter().max_by_key(|(plant, n)| (*n, std::cmp::Reverse(*plant))).map_or(0, |(plant, _)| plant);
         owners[*k] = owner;
         for i in pixels {
-            if plants[*i as usize] == owner {
-                leaves[*i as usize] = *k as u32 + 1;
+            if plants[i.to_usize()] == owner {
+                leaves[i.to_usize()] = k.to_u32() + 1;
             } else {
                 beyond += 1;
             }
@@ -406,7 +407,7 @@ fn painted(image: &Annotated, (w, h): (u32, u32), crowds: Crowds) -> Result<(Vec
     let mut points = Points::new();
     for (k, thing) in image.things.iter().enumerate() {
         let leaf = thing.meaning == Meaning::Leaf;
-        let own = if leaf { (owners[k], k as u32 + 1) } else { (numbers[k], 0) };
+        let own = if leaf { (owners[k], k.to_u32() + 1) } else { (numbers[k], 0) };
         if let Some(place) = found.numbers.get(&own) {
             points.insert(*place, thing.points);
         }
@@ -473,7 +474,7 @@ fn pixels((w, h): (u32, u32), thing: &Thing) -> Result<Vec<u32>> {
     if rle.size != [h, w] {
         return Err(wrong(format!("it is {} × {} pixels, its image {w} × {h}", rle.size[1], rle.size[0])));
     }
-    Ok(rle.pixels().map_err(|e| wrong(e.to_string()))?.map(|pixel| pixel as u32).collect())
+    Ok(rle.pixels().map_err(|e| wrong(e.to_string()))?.map(ToInt::to_u32).collect())
 }
 
 /// Returns the pixels whose centres are inside at least one of the polygons by the even-odd rule, by ascending index.
@@ -485,8 +486,8 @@ fn inside(w: u32, h: u32, polygons: &[Vec<f64>]) -> Vec<u32> {
     for line in crossings.chunk_by(|a, b| (a.row, a.polygon) == (b.row, b.polygon)) {
         for [from, to] in line.as_chunks::<2>().0 {
             // The pixels whose centres are between the two crossings.
-            let first = (from.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
-            let end = (to.x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+            let first = (from.x - 0.5).ceil().clamp(0.0, f64::from(w)).trunc_to::<u32>();
+            let end = (to.x - 0.5).ceil().clamp(0.0, f64::from(w)).trunc_to::<u32>();
             all.extend((first..end).map(|x| from.row * w + x));
         }
     }
@@ -523,7 +524,7 @@ fn crossings(h: u32, polygon: usize, corners: &[f64]) -> Vec<Crossing> {
 /// Returns the rows that an edge from height `y0` to `y1` may cross, extended by one row at each end because of
 /// rounding.
 fn rows(h: u32, y0: f64, y1: f64) -> std::ops::Range<u32> {
-    let held = |y: f64| y.clamp(0.0, f64::from(h)) as u32;
+    let held = |y: f64| y.clamp(0.0, f64::from(h)).trunc_to::<u32>();
     held((y0.min(y1) - 1.5).floor())..held((y0.max(y1) + 0.5).ceil())
 }
 
@@ -561,7 +562,7 @@ mod tests {
                 }
                 crossings.sort_by(f64::total_cmp);
                 for [from, to] in crossings.as_chunks::<2>().0 {
-                    let column = |x: f64| (x - 0.5).ceil().clamp(0.0, f64::from(w)) as u32;
+                    let column = |x: f64| (x - 0.5).ceil().clamp(0.0, f64::from(w)).trunc_to::<u32>();
                     all.extend((column(*from)..column(*to)).map(|x| row * w + x));
                 }
             }
@@ -577,7 +578,7 @@ mod tests {
     fn edges_cross_the_rows_that_a_plain_scan_finds() {
         let mut s = furrow_base::sampling::Stream::of(5, 0, furrow_base::sampling::Purpose::Test, 0);
         for round in 0..300 {
-            let (w, h) = (1 + s.index(30) as u32, 1 + s.index(30) as u32);
+            let (w, h) = (1 + s.index(30).to_u32(), 1 + s.index(30).to_u32());
             let mut polygon = |n: usize| -> Vec<f64> {
                 let mut value = || {
                     let v = s.range(-6.0, 36.0);

@@ -2,6 +2,7 @@
 
 use crate::model::split::Split;
 use furrow_base::input::Scope;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -48,7 +49,7 @@ fn percent_decoded(text: &str) -> String {
     let (mut all, mut at) = (Vec::with_capacity(bytes.len()), 0);
     while let Some(byte) = bytes.get(at) {
         let code = (*byte == b'%').then(|| Some(digit(bytes.get(at + 1))? * 16 + digit(bytes.get(at + 2))?)).flatten();
-        all.push(code.map_or(*byte, |code| code as u8));
+        all.push(code.map_or(*byte, ToInt::to_u8));
         at += if code.is_some() { 3 } else { 1 };
     }
     String::from_utf8(all).unwrap_or_else(|_| text.to_owned())

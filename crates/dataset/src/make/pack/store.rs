@@ -12,6 +12,7 @@ use crate::read::packs::Packing;
 use crate::read::packs::record::PackRecord;
 use crate::read::set::{Set, SetWriter};
 use furrow_base::input::below;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::{is_unfinished, remove_unfinished_in};
 use rayon::prelude::*;
@@ -134,7 +135,7 @@ fn written(set: &Set, id: Id) -> Result<()> {
             for path in native::in_order(image.files.keys().filter(|path| native::is_native(path))) {
                 let file = below(folder, path)?;
                 let bytes = furrow_base::input::contents(&file).map_err(Error::io(&file))?;
-                members.insert(entry_name(path), (archive.get_ref().written() + BLOCK, bytes.len() as u64));
+                members.insert(entry_name(path), (archive.get_ref().written() + BLOCK, bytes.len().to_u64()));
                 append(&mut archive, path, &bytes).map_err(Error::io(&file))?;
             }
         }

@@ -20,6 +20,7 @@ pub mod record;
 
 use crate::model::recipe::Recipe;
 use crate::model::split::Split;
+use furrow_base::math::ToInt;
 
 /// Maximum number of images in a pack; the record of a pack is read into memory.
 pub const MOST: u64 = 100_000;
@@ -121,7 +122,7 @@ impl Recipe {
     /// Returns the number of work units.
     pub fn units(&self) -> u64 {
         let unpacked = || self.count.checked_sub(1).map_or(0, |last| self.growing_of(last) + 1);
-        Packing::of(self).map_or_else(unpacked, |packing| packing.all().count() as u64)
+        Packing::of(self).map_or_else(unpacked, |packing| packing.all().count().to_u64())
     }
 }
 
@@ -140,10 +141,10 @@ mod tests {
             let packing = Packing::of(&recipe).unwrap();
             let mut seen = Vec::new();
             for (place, id) in packing.all().enumerate() {
-                assert_eq!(packing.place(id), place as u64);
+                assert_eq!(packing.place(id), place.to_u64());
                 let images = packing.images(id);
                 let last = packing.count(id.split) == id.number + 1;
-                assert!(!images.is_empty() && (last || images.len() as u64 == pack), "{id:?}: {images:?}");
+                assert!(!images.is_empty() && (last || images.len().to_u64() == pack), "{id:?}: {images:?}");
                 assert!(images.iter().all(|k| packing.id(*k) == id && recipe.split_of(*k) == id.split));
                 seen.extend(images);
             }

@@ -11,6 +11,7 @@ use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native;
 use furrow_base::Result;
 use furrow_base::input;
+use furrow_base::math::ToInt;
 use furrow_output::write_atomically;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -155,7 +156,7 @@ impl Packs {
         file.seek(SeekFrom::Start(offset))?;
         let mut bytes = Vec::new();
         file.take(length).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 == length { Ok(bytes) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+        if bytes.len().to_u64() == length { Ok(bytes) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
     fn member(&self, folder: &Path, id: Id, path: &str) -> io::Result<(Arc<PackRecord>, (u64, u64))> {
@@ -224,14 +225,14 @@ mod tests {
     fn what_is_in_use_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let of = |number| Id { split: Split::Train, number };
-        for number in 0..=MOST_KEPT as u64 {
+        for number in 0..=MOST_KEPT.to_u64() {
             let id = of(number);
             let record =
                 PackRecord { pack: id.name(), tar: Checksum::of(b"x"), members: BTreeMap::new(), images: Vec::new() };
             record.write(folder.path(), id).unwrap();
         }
         let packs = Packs::default();
-        for number in 1..=MOST_KEPT as u64 {
+        for number in 1..=MOST_KEPT.to_u64() {
             assert!(packs.get(folder.path(), of(0)).is_some() && packs.get(folder.path(), of(number)).is_some());
         }
         // A cached record needs no file.

@@ -5,6 +5,7 @@ use super::super::files::Files;
 use super::super::parts::MOST_TRIANGLES;
 use super::super::settle::ModelError;
 use super::super::uri::{Target, follow};
+use furrow_base::math::{ToFloat, ToInt};
 use std::borrow::Cow;
 
 /// Component type of signed 8-bit numbers.
@@ -70,7 +71,7 @@ impl<'a> Accessors<'a> {
             UNSIGNED_BYTE => one(f32::from(e[i]), 255.0),
             SHORT => one(f32::from(half(e, i).cast_signed()), 32767.0),
             UNSIGNED_SHORT => one(f32::from(half(e, i)), 65535.0),
-            UNSIGNED_INT => word(e, i) as f32,
+            UNSIGNED_INT => word(e, i).to_f32(),
             _ => f32::from_bits(word(e, i)),
         };
         let size = N * width(component_type).unwrap_or(1);
@@ -124,7 +125,7 @@ impl<'a> Accessors<'a> {
                 integers::<1>(&places, kind).ok_or_else(|| words("has sparse indices that are not integers"))?;
             let values = part(&sparse.values, size)?;
             for ([place], value) in places.into_iter().zip(values.chunks_exact(size)) {
-                let at = (place as usize).checked_mul(size).and_then(|at| bytes.get_mut(at..)?.get_mut(..size));
+                let at = place.to_usize().checked_mul(size).and_then(|at| bytes.get_mut(at..)?.get_mut(..size));
                 at.ok_or_else(|| words("has a sparse element past its end"))?.copy_from_slice(value);
             }
         }

@@ -11,7 +11,7 @@ use super::super::uri::{Target, follow};
 use super::accessors::Accessors;
 use super::passed_over::warn_of_material;
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2};
 use furrow_optics::texture::{ColorSpace, Header, NormalMap, Texture, Wrap};
 use furrow_optics::texture::{NormalTexture, Surface, Transmission};
 use serde::de::DeserializeOwned;
@@ -170,8 +170,8 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
         let least = (least * 255.0).ceil();
         appearance.absent = least > 255.0;
         if let (Some(Pictured { image, texture }), false) = (picture, appearance.absent) {
-            let mask = || texture.alpha_mask_from(least as u8).map(Arc::new);
-            appearance.surface.mask.clone_from(self.masks.entry((*image, least as u8)).or_insert_with(mask));
+            let mask = || texture.alpha_mask_from(least.trunc_to::<u8>()).map(Arc::new);
+            appearance.surface.mask.clone_from(self.masks.entry((*image, least.trunc_to::<u8>())).or_insert_with(mask));
         }
     }
 
@@ -297,5 +297,5 @@ fn extension<T: DeserializeOwned>(of: &Map<String, Value>, name: &str) -> Result
 }
 
 fn number(of: &Value, key: &str) -> Option<f32> {
-    of.get(key).and_then(Value::as_f64).map(|x| fraction(x as f32))
+    of.get(key).and_then(Value::as_f64).map(|x| fraction(x.to_f32()))
 }

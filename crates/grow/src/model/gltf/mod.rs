@@ -20,7 +20,7 @@ use super::settle::{ModelError, faceted, into_one_tile};
 use accessors::Accessors;
 use appearance::{Appearance, AppearanceReader};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{DMat4, Vec2, Vec3};
+use furrow_base::math::{DMat4, ToInt, Vec2, Vec3};
 use furrow_optics::texture::Surface;
 use pose::{Pose, bound, morph, placement};
 use std::collections::BTreeMap;
@@ -195,9 +195,9 @@ impl Reader<'_> {
         }
         let corners: Vec<u32> = match primitive.indices {
             Some(indices) => accessors.whole::<1>(indices)?.into_iter().map(|[i]| i).collect(),
-            None => (0..positions.len() as u32).collect(),
+            None => (0..positions.len().to_u32()).collect(),
         };
-        if let Some(i) = corners.iter().find(|i| **i as usize >= positions.len()) {
+        if let Some(i) = corners.iter().find(|i| i.to_usize() >= positions.len()) {
             return Err(format!("`{name}` refers to vertex {i}, but has {}", positions.len()).into());
         }
         if uvs.len() != positions.len() {

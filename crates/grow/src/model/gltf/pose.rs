@@ -4,7 +4,7 @@ use super::super::document::{Document, Node, Primitive, item};
 use super::super::settle::ModelError;
 use super::accessors::Accessors;
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{DMat3, DMat4, DQuat, DVec3, Vec3};
+use furrow_base::math::{DMat3, DMat4, DQuat, DVec3, ToFloat, ToInt, Vec3};
 
 /// Largest difference of the matrices of a skin that leaves its mesh where the mesh's own node puts it.
 const AT_REST: f64 = 1e-5;
@@ -40,7 +40,7 @@ pub(super) fn morph<const N: usize>(
             return Err(what.into());
         }
         for (value, by) in values.as_flattened_mut().iter_mut().zip(by.as_flattened()) {
-            *value = (f64::from(*value) + weight * f64::from(*by)) as f32;
+            *value = (f64::from(*value) + weight * f64::from(*by)).to_f32();
         }
         changed = true;
     }
@@ -84,7 +84,7 @@ impl Pose {
             let sum: f64 = bound.iter().map(|(_, weight)| f64::from(*weight)).sum();
             let mut matrix = if sum > 0.0 { DMat4::ZERO } else { *to };
             for (joint, weight) in bound.iter().filter(|_| sum > 0.0) {
-                matrix += *item(&self.0, *joint as usize, "joint")? * (f64::from(*weight) / sum);
+                matrix += *item(&self.0, joint.to_usize(), "joint")? * (f64::from(*weight) / sum);
             }
             mesh.positions[k] = matrix.transform_point3(mesh.positions[k].as_dvec3()).as_vec3();
             if let Some(normal) = mesh.normals.get_mut(k) {

@@ -6,7 +6,7 @@ use super::super::settle::{ModelError, faceted, too_many_triangles};
 use super::lines::{Statement, statements};
 use super::polygon::{Cut, normal, triangles};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{DMat4, DVec3, Vec3, vec2};
+use furrow_base::math::{DMat4, DVec3, ToFloat, ToInt, Vec3, vec2};
 use std::collections::{BTreeMap, HashMap};
 
 /// Keywords that change neither the shape nor the colour.
@@ -85,7 +85,7 @@ impl Faces {
                         notes.add("passed over: colours of vertices");
                     }
                 }
-                "vt" => all.uvs.push(statement.numbers::<2>(1)?.map(|x| x as f32)),
+                "vt" => all.uvs.push(statement.numbers::<2>(1)?.map(ToFloat::to_f32)),
                 "vn" => all.normals.push(DVec3::from(statement.numbers::<3>(3)?).as_vec3()),
                 "f" | "fo" => polygons.extend(all.face(&statement, &mut state, notes)?),
                 "o" | "g" => {
@@ -145,7 +145,7 @@ impl Faces {
     fn cut(&mut self, polygon: Polygon, notes: &mut Notes) -> Result<(), ModelError> {
         let Polygon { piece, line, corners } = polygon;
         let there = |corner: &&Corner| {
-            let within = |index: Option<u32>, n: usize| index.is_none_or(|index| (index as usize) < n);
+            let within = |index: Option<u32>, n: usize| index.is_none_or(|index| index.to_usize() < n);
             within(Some(corner.position), self.positions.len())
                 && within(corner.uv, self.uvs.len())
                 && within(corner.normal, self.normals.len())
@@ -153,7 +153,7 @@ impl Faces {
         if !corners.iter().all(|corner| there(&corner)) {
             return Err(format!("line {line}: a corner of the face refers to a missing element").into());
         }
-        let at: Vec<DVec3> = corners.iter().map(|corner| self.positions[corner.position as usize]).collect();
+        let at: Vec<DVec3> = corners.iter().map(|corner| self.positions[corner.position.to_usize()]).collect();
         let piece = &mut self.pieces[piece];
         let triangles = match triangles(&at) {
             Cut::Whole(triangles) => triangles,
@@ -187,18 +187,18 @@ impl Faces {
             let uv = corner.uv.filter(|_| piece.textured);
             let normal = corner.normal.filter(|_| piece.shading == Shading::Stored);
             *known.entry((corner.position, uv, normal)).or_insert_with(|| {
-                mesh.positions.push((self.positions[corner.position as usize] - origin).as_vec3());
-                let [u, v] = uv.map_or([0.0, 1.0], |uv| self.uvs[uv as usize]);
+                mesh.positions.push((self.positions[corner.position.to_usize()] - origin).as_vec3());
+                let [u, v] = uv.map_or([0.0, 1.0], |uv| self.uvs[uv.to_usize()]);
                 mesh.uvs.push(vec2(u, 1.0 - v));
                 match (piece.shading, normal) {
                     (Shading::Smooth(group), _) => {
                         let sum = self.smooth.get(&(corner.position, group)).copied().unwrap_or_default();
                         mesh.normals.push(sum.normalize_or_zero().as_vec3());
                     }
-                    (_, Some(normal)) => mesh.normals.push(self.normals[normal as usize]),
+                    (_, Some(normal)) => mesh.normals.push(self.normals[normal.to_usize()]),
                     (_, None) => {}
                 }
-                mesh.positions.len() as u32 - 1
+                mesh.positions.len().to_u32() - 1
             })
         };
         let triangles = piece.triangles.iter().map(|t| [vertex(&t[0]), vertex(&t[1]), vertex(&t[2])]).collect();
@@ -219,7 +219,7 @@ fn corner(of: &Statement<'_>, word: &str, counts: [usize; 3]) -> Result<Corner, 
         indices.iter_mut().zip(&mut parts).zip(counts).filter(|((_, part), _)| !part.is_empty())
     {
         let number: i64 = part.parse().map_err(|_| of.wrong(&format!("the corner `{word}` is not a face's corner")))?;
-        let place = if number < 0 { number + count as i64 } else { number - 1 };
+        let place = if number < 0 { number + count.to_i64() } else { number - 1 };
         let missing = || of.wrong(&format!("the corner `{word}` refers to a missing element"));
         *index = Some(u32::try_from(place).map_err(|_| missing())?);
     }

@@ -3,7 +3,7 @@
 use super::super::tests::{self, png};
 use super::super::{Model, Up};
 use furrow_base::Result;
-use furrow_base::math::{Vec3, vec2, vec3};
+use furrow_base::math::{ToInt, Vec3, vec2, vec3};
 
 const SQUARE: &str = "mtllib m.mtl\no leaf\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl green\nf 1/1 2/2 3/3 4/4\n";
 const GREEN: &str = "newmtl green\nKd 0.1 0.5 0.1\n";
@@ -60,7 +60,8 @@ fn text_of_other_programs_is_read() {
         assert_eq!((model.surfaces[0].color, area(&model)), ([0.1, 0.5, 0.1], 1.0));
     }
     // A name in ISO 8859-1 in both files is the same name.
-    let name = |text: &str| text.replace("green", "gr\u{fc}n").chars().map(|c| c as u32 as u8).collect::<Vec<u8>>();
+    let name =
+        |text: &str| text.replace("green", "gr\u{fc}n").chars().map(|c| u32::from(c).to_u8()).collect::<Vec<u8>>();
     assert_eq!(load(&name(SQUARE), &name(GREEN)).unwrap().warnings, Vec::<String>::new());
     assert!(load(b"\xff\xfev\0", b"").unwrap_err().to_string().contains("UTF-16"));
 }

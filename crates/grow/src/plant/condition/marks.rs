@@ -7,7 +7,7 @@ mod until;
 use super::Condition;
 use crate::plant::ConditionDesc;
 use furrow_base::geometry::{AlphaMask, Margin};
-use furrow_base::math::{Vec2, lerp, vec2};
+use furrow_base::math::{ToFloat, Vec2, lerp, vec2};
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::texture::marks::{Marks, Patch, SPECK_MM, Tear};
@@ -76,7 +76,7 @@ impl Bearer<'_> {
         let tears = (0..s.poisson(f64::from(condition.tears * often))).filter_map(|_| tear(self, &mut s)).collect();
         let low = (-self.height.max(0.0) / LOW).exp();
         let mut s = of(7);
-        let uneven = |s: &mut Stream| (0.4 * s.normal() as f32).exp();
+        let uneven = |s: &mut Stream| (0.4 * s.normal().to_f32()).exp();
         // Old leaves turn yellow first, with random variation between leaves of equal age.
         let chlorosis = (condition.chlorosis * self.age.powf(1.5) * uneven(&mut s)).min(1.0);
         let scorch_mm = scorch_mm(condition, self, &mut of(10)) * uneven(&mut s);
@@ -120,9 +120,9 @@ fn scorch_mm(condition: &Condition, bearer: &Bearer<'_>, s: &mut Stream) -> f32 
 /// Returns the area of the blade according to its mask, mm², estimated on a grid of 24 × 24 points.
 fn area(bearer: &Bearer<'_>) -> f32 {
     const SIDE: usize = 24;
-    let at = |i: usize| (i as f32 + 0.5) / SIDE as f32;
+    let at = |i: usize| (i.to_f32() + 0.5) / SIDE.to_f32();
     let opaque = |k: &usize| bearer.mask.is_none_or(|m| m.opaque_at(vec2(at(k % SIDE), at(k / SIDE))));
-    let share = (0..SIDE * SIDE).filter(opaque).count() as f32 / (SIDE * SIDE) as f32;
+    let share = (0..SIDE * SIDE).filter(opaque).count().to_f32() / (SIDE * SIDE).to_f32();
     bearer.image_mm.x * bearer.image_mm.y * share
 }
 
@@ -184,7 +184,7 @@ fn edge(bearer: &Bearer<'_>, s: &mut Stream) -> Option<(Vec2, f32)> {
     let half = 0.5 * bearer.image_mm.x;
     let steps = 200;
     (0..steps)
-        .map(|i| vec2(side * half * (1.0 - i as f32 / steps as f32), y))
+        .map(|i| vec2(side * half * (1.0 - i.to_f32() / steps.to_f32()), y))
         .find(|p| there(bearer, *p))
         .map(|p| (p, side))
 }
@@ -196,7 +196,7 @@ fn bite(bearer: &Bearer<'_>, radii: &Vary<Positive<1000>>, holes: &mut Vec<Patch
         let radius = radii.draw32(s).min(0.22 * narrow(bearer));
         holes.push(ragged(at, radius, s));
         let y = at.y + 1.1 * radius;
-        let reach = (0..200).map(|i| vec2(side * 0.5 * bearer.image_mm.x * (1.0 - i as f32 / 200.0), y));
+        let reach = (0..200).map(|i| vec2(side * 0.5 * bearer.image_mm.x * (1.0 - i.to_f32() / 200.0), y));
         let Some(next) = reach.into_iter().find(|p| there(bearer, *p)) else { return };
         at = next;
     }

@@ -12,6 +12,7 @@ mod posture;
 pub use marks::Bearer;
 pub(super) use posture::Posture;
 
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -207,7 +208,7 @@ impl ConditionDesc {
     /// Returns the factor on the species file's chlorophyll for a leaf of relative age `age` (0 the youngest, 1 the
     /// oldest).
     pub fn green(&self, condition: &Condition, age: f32, leaf: &Stream) -> f32 {
-        let spread = self.green_sd.f32() * leaf.child(Purpose::Condition, 20).normal() as f32;
+        let spread = self.green_sd.f32() * leaf.child(Purpose::Condition, 20).normal().to_f32();
         // The youngest third of the leaves is still forming chlorophyll.
         let young = (1.0 - 3.0 * age).max(0.0);
         condition.greenness * ((1.0 + spread) * (1.0 - condition.pale_young * young)).clamp(0.25, 1.6)
@@ -215,7 +216,7 @@ impl ConditionDesc {
 
     /// Returns the factor on the roughness of a leaf's gloss.
     pub fn gloss(&self, leaf: &Stream) -> f32 {
-        (self.gloss_sd.f32() * leaf.child(Purpose::Condition, 21).normal() as f32).exp().clamp(0.5, 2.0)
+        (self.gloss_sd.f32() * leaf.child(Purpose::Condition, 21).normal().to_f32()).exp().clamp(0.5, 2.0)
     }
 }
 

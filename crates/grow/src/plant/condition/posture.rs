@@ -5,7 +5,7 @@
 
 use super::{Condition, ConditionDesc, leaf_stream};
 use crate::plant::growth::LeafState;
-use furrow_base::math::lerp;
+use furrow_base::math::{ToFloat, lerp};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Angles at full wilt, degrees: between stalk and axis, arch of the stalk, nod and bend of the blade, and downward
@@ -30,7 +30,7 @@ impl<'a> Posture<'a> {
         let last = leaves.iter().map(|l| l.number).max().unwrap_or(1);
         for leaf in leaves {
             let mut s = leaf_stream(self.stream, leaf.number).child(Purpose::Condition, 22);
-            let mut normal = || s.normal().clamp(-2.5, 2.5) as f32;
+            let mut normal = || s.normal().clamp(-2.5, 2.5).to_f32();
             leaf.width *= (self.desc.width_sd.f32() * normal()).exp();
             let sd = self.desc.bend_sd.f32();
             leaf.bend *= (sd * normal()).exp();

@@ -5,7 +5,7 @@ use super::head::GOLDEN;
 use super::mesher::{FlowerMesher, Sheet, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Vec3, lerp};
+use furrow_base::math::{RoundTo, ToFloat, Vec3, lerp};
 use furrow_base::sampling::Stream;
 
 /// Builds a maize ear.
@@ -16,12 +16,12 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, s
     let outline = Outline::Power { a: 0.45, b: 0.6 };
     let body = Solid { base, frame, length: 0.97 * size, width, flat: 0.95, outline, notch: 0.0 };
     pen.solid(OrganKind::Ear, material, &body);
-    let count = husks.get() as u32;
+    let count = husks.get().trunc_to::<u32>();
     for k in 0..count {
-        let (sin, cos) = (GOLDEN * k as f32).sin_cos();
+        let (sin, cos) = (GOLDEN * k.to_f32()).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         // The outermost husks are the shortest, and their tips point away from the ear.
-        let share = (k as f32 + 0.5) / count as f32;
+        let share = (k.to_f32() + 0.5) / count.to_f32();
         let length = size * lerp(0.72, 1.06, share) * stream.range32(0.94, 1.06);
         let off = stream.range32(0.0, 0.3) * (1.0 - share);
         let sheet = Sheet {
@@ -39,8 +39,8 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, s
     }
     let tip = base + frame.z * (0.93 * size);
     let reach = silk.draw32(stream) * size;
-    for k in 0..silks.get() as u32 {
-        let (sin, cos) = (GOLDEN * k as f32).sin_cos();
+    for k in 0..silks.get().trunc_to::<u32>() {
+        let (sin, cos) = (GOLDEN * k.to_f32()).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         let length = reach * stream.range32(0.6, 1.2);
         // Silks rise, spread apart and hang.

@@ -4,6 +4,7 @@ use super::desc::{Bloom, FlowerDesc};
 use super::mesher::{FlowerMesher, ROUND, Solid};
 use super::ring;
 use crate::plant::organ::OrganKind;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::sampling::Stream;
 use std::f32::consts::TAU;
 
@@ -24,9 +25,9 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, s
     if kind == OrganKind::Bud {
         return;
     }
-    let count = stamens.get() as u32;
+    let count = stamens.get().trunc_to::<u32>();
     for i in 0..count {
-        let (sin, cos) = (TAU * i as f32 / count as f32 + stream.range32(-0.2, 0.2)).sin_cos();
+        let (sin, cos) = (TAU * i.to_f32() / count.to_f32() + stream.range32(-0.2, 0.2)).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         let length = 0.5 * size * stamen.f32() * stream.range32(0.85, 1.15);
         let along = (out * stream.range32(0.35, 0.75) + frame.z).normalize_or(frame.z);

@@ -1,7 +1,7 @@
 //! Flowers and fruits in a species file, and the bounds of their numbers of triangles.
 
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Frame, Vec3};
+use furrow_base::math::{Frame, ToFloat, Vec3};
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -354,7 +354,7 @@ impl FlowerDesc {
     pub(in crate::plant) fn check(&self) -> Result<(), (String, String)> {
         let most = self.most_triangles();
         if let Self::Corolla { rings, .. } | Self::Head { rings, .. } = self
-            && rings.len() as f64 > MOST_RINGS
+            && rings.len().to_f64() > MOST_RINGS
         {
             let message = format!("{} rings: a flower has at most {MOST_RINGS}", rings.len());
             return Err((message, "write fewer rings, or more sheets in each".into()));

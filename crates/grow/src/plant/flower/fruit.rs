@@ -5,6 +5,7 @@ use super::desc::{Bloom, FlowerDesc};
 use super::mesher::{FlowerMesher, ROUND, Sheet, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::sampling::Stream;
 use std::f32::consts::TAU;
 
@@ -36,13 +37,13 @@ pub(super) fn capsule(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher
     let body = Solid { base, frame, length: size - 0.5 * thick, width, flat: 1.0, outline: *outline, notch: 0.0 };
     pen.solid(OrganKind::Pod, material, &body);
     let seat = base + frame.z * (size - thick);
-    let count = rays.draw(stream).round().max(1.0) as u32;
+    let count = rays.draw(stream).round().max(1.0).trunc_to::<u32>();
     let spin = stream.range32(0.0, TAU);
     let lid = Solid { base: seat, length: thick, width: across, outline: Outline::Power { a: 0.12, b: 0.3 }, ..body };
     pen.lobed(OrganKind::Pod, material, &lid, count, (0.14, spin));
-    let wide = 0.16 * TAU * across / count.max(8) as f32;
+    let wide = 0.16 * TAU * across / count.max(8).to_f32();
     for i in 0..count {
-        let (sin, cos) = (spin + TAU * i as f32 / count as f32).sin_cos();
+        let (sin, cos) = (spin + TAU * i.to_f32() / count.to_f32()).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         // Rays are half sunk into the disc, which is highest at its centre, where they meet.
         let ray = [(0.03, 0.96), (0.3, 0.9), (0.46, 0.68)]
@@ -58,10 +59,10 @@ pub(super) fn berry(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, 
     let length = aspect.f32() * size;
     let body = Solid { base, frame, length, width: size, flat: 1.0, outline: ROUND, notch: 0.0 };
     pen.solid(OrganKind::Berry, material, &body);
-    let count = sepals.get() as u32;
+    let count = sepals.get().trunc_to::<u32>();
     let spin = stream.range32(0.0, TAU);
     for i in 0..count {
-        let (sin, cos) = (spin + TAU * i as f32 / count as f32).sin_cos();
+        let (sin, cos) = (spin + TAU * i.to_f32() / count.to_f32()).sin_cos();
         let sheet = Sheet {
             base: base - frame.z * (0.01 * size),
             out: frame.x * cos + frame.y * sin,

@@ -8,7 +8,7 @@ use super::mesher::{FlowerMesher, Solid};
 use super::{corolla, ring};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Frame, Vec3, lerp};
+use furrow_base::math::{Frame, RoundTo, ToFloat, Vec3, lerp};
 use furrow_base::sampling::Stream;
 
 /// Golden angle, radians.
@@ -39,21 +39,21 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, s
     let outline = Outline::Power { a: 0.02, b: 0.5 };
     let under = if kind == OrganKind::Bud { young_material } else { disc_material };
     pen.solid(kind, under, &Solid { base, length: height.max(0.02 * radius), outline, ..bowl });
-    let n = florets.get() as u32;
+    let n = florets.get().trunc_to::<u32>();
     // Florets open from the outermost inwards; in a bud all are closed.
-    let closed = lerp(1.0, young.draw32(stream), opening) * n as f32;
+    let closed = lerp(1.0, young.draw32(stream), opening) * n.to_f32();
     let spin = stream.range32(0.0, std::f32::consts::TAU);
-    let spacing = radius * (std::f32::consts::PI / n as f32).sqrt();
+    let spacing = radius * (std::f32::consts::PI / n.to_f32()).sqrt();
     for k in 0..n {
-        let share = (k as f32 + 0.5) / n as f32;
-        let (sin, cos) = (spin + GOLDEN * k as f32).sin_cos();
+        let share = (k.to_f32() + 0.5) / n.to_f32();
+        let (sin, cos) = (spin + GOLDEN * k.to_f32()).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         let r = radius * share.sqrt();
         let place = base + out * r + frame.z * (height * (1.0 - share));
         // Normal of the paraboloid.
         let normal = (frame.z + out * (2.0 * height * share.sqrt() / radius)).normalize_or(frame.z);
-        let open = (k as f32) >= closed;
-        let rise = spacing * if open { 1.5 } else { 0.8 } * (1.0 + 0.12 * stream.normal() as f32);
+        let open = k.to_f32() >= closed;
+        let rise = spacing * if open { 1.5 } else { 0.8 } * (1.0 + 0.12 * stream.normal().to_f32());
         let material = if open { disc_material } else { young_material };
         floret(pen, kind, material, place, normal, (0.9 * spacing, rise));
     }

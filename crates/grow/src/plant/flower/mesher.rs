@@ -12,7 +12,7 @@ use crate::plant::skeleton::Weights;
 use crate::plant::tube::{self, Profile};
 use furrow_base::geometry::Mesh;
 use furrow_base::geometry::outline::{self, Outline};
-use furrow_base::math::{Frame, Vec3, vec2};
+use furrow_base::math::{Frame, RoundTo, ToFloat, ToInt, Vec3, vec2};
 use std::f32::consts::TAU;
 
 /// Builder of the meshes of a plant's flowers.
@@ -132,7 +132,7 @@ impl FlowerMesher {
 
     /// Returns the number of cells along `length`, between `least` and `most`.
     fn cells(&self, length: f32, least: f32, most: f32) -> u32 {
-        (length / self.cell).round().clamp(least, most) as u32
+        (length / self.cell).round().clamp(least, most).trunc_to::<u32>()
     }
 
     /// Adds a sheet. Its texture coordinates are those of a leaf's texture.
@@ -144,11 +144,11 @@ impl FlowerMesher {
         let mut rest = RestMesh::default();
         let mut near = None;
         for i in 0..=rows {
-            let t = 0.02 + 0.965 * i as f32 / rows as f32;
+            let t = 0.02 + 0.965 * i.to_f32() / rows.to_f32();
             let half = (sheet.outline.half_width(t) * sheet.width).max(0.04 * sheet.width);
-            let first = rest.positions.len() as u32;
+            let first = rest.positions.len().to_u32();
             for j in 0..=columns {
-                let q = 2.0 * j as f32 / columns as f32 - 1.0;
+                let q = 2.0 * j.to_f32() / columns.to_f32() - 1.0;
                 let reach = t * (1.0 - sheet.notch * notch(q));
                 let (place, normal) = sheet.middle(reach);
                 let p = place + side * (q * half) + normal * (sheet.hollow * q * q * half);
@@ -178,7 +178,7 @@ impl FlowerMesher {
         lobes: u32,
         (deep, first): (f32, f32),
     ) {
-        let lobe = |turn: f32| 1.0 - deep * (1.0 - (0.5 * lobes as f32 * (turn - first)).cos().abs());
+        let lobe = |turn: f32| 1.0 - deep * (1.0 - (0.5 * lobes.to_f32() * (turn - first)).cos().abs());
         self.turned(kind, material, solid, LOBE_SIDES * lobes, lobe);
     }
 
@@ -189,18 +189,18 @@ impl FlowerMesher {
         let mut rest = RestMesh::default();
         let mut near = None;
         for i in 0..=rows {
-            let t = 0.5 - 0.5 * (std::f32::consts::PI * i as f32 / rows as f32).cos();
+            let t = 0.5 - 0.5 * (std::f32::consts::PI * i.to_f32() / rows.to_f32()).cos();
             let half = (solid.outline.half_width(t) * solid.width).max(0.01 * solid.width);
-            let first = rest.positions.len() as u32;
+            let first = rest.positions.len().to_u32();
             for k in 0..=sides {
-                let turn = TAU * k as f32 / sides as f32;
+                let turn = TAU * k.to_f32() / sides.to_f32();
                 let (sin, cos) = turn.sin_cos();
                 let half = half * factor(turn);
                 let across = cos * 2.0 * solid.outline.half_width(t);
                 let along = solid.length * t * (1.0 - solid.notch * notch(across) * t);
                 let f = &solid.frame;
                 let p = solid.base + f.z * along + f.x * (half * cos) + f.y * (half * solid.flat * sin);
-                rest.corner(p, vec2(k as f32 / sides as f32, 1.0 - t), Weights::default());
+                rest.corner(p, vec2(k.to_f32() / sides.to_f32(), 1.0 - t), Weights::default());
             }
             if let Some(near) = near {
                 rest.stitch(near, first, sides);
@@ -227,13 +227,13 @@ impl FlowerMesher {
 
     fn tube(&self, points: &[Vec3], radii: (f32, f32)) -> Mesh {
         let sides = self.cells(6.0 * radii.0, 3.0, 10.0);
-        let last = points.len().saturating_sub(1).max(1) as f32;
+        let last = points.len().saturating_sub(1).max(1).to_f32();
         let mut rings = Vec::with_capacity(points.len() + 3);
         let mut along = Vec3::Z;
         for (i, point) in points.iter().enumerate() {
             let (before, after) = (points[i.saturating_sub(1)], points[(i + 1).min(points.len() - 1)]);
             along = (after - before).normalize_or(along);
-            let radius = radii.0 + (radii.1 - radii.0) * i as f32 / last;
+            let radius = radii.0 + (radii.1 - radii.0) * i.to_f32() / last;
             rings.push(axis::ring(*point, along, radius, Profile::Channelled(1.0)));
         }
         axis::dome(&mut rings, along, radii.1, 1.0);

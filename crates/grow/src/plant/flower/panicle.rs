@@ -5,7 +5,7 @@ use super::head::GOLDEN;
 use super::mesher::{FlowerMesher, Solid};
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Frame, Vec3, lerp};
+use furrow_base::math::{Frame, RoundTo, ToFloat, Vec3, lerp};
 use furrow_base::sampling::Stream;
 
 /// Number of segments of a branch.
@@ -21,11 +21,11 @@ pub(super) fn grow(flower: &FlowerDesc, bloom: &Bloom, pen: &mut FlowerMesher, s
     // The branches of a closed tassel are close to its rachis.
     let spread = lerp(0.15, 1.0, bloom.opening);
     let draw = Spikelets { per_metre: spikelets.f32() / size, length: spikelet.f32() * size, material };
-    let count = branches.draw(stream) as u32;
+    let count = branches.draw(stream).trunc_to::<u32>();
     draw.along(pen, stream, base, frame.z, size, (zone.f32(), 0.0));
     for k in 0..count {
-        let share = (k as f32 + 0.5) / count as f32;
-        let (sin, cos) = (GOLDEN * k as f32 + stream.range32(-0.3, 0.3)).sin_cos();
+        let share = (k.to_f32() + 0.5) / count.to_f32();
+        let (sin, cos) = (GOLDEN * k.to_f32() + stream.range32(-0.3, 0.3)).sin_cos();
         let out = frame.x * cos + frame.y * sin;
         let angle = angle_deg.draw32(stream).to_radians() * spread;
         let bend = bend_deg.draw32(stream).to_radians() * spread;
@@ -56,24 +56,24 @@ impl Spikelets<'_> {
     ) {
         let level = ahead.with_z(0.0).normalize_or(Vec3::X);
         let start = ahead.z.clamp(-1.0, 1.0).asin();
-        let step = length / PIECES as f32;
+        let step = length / PIECES.to_f32();
         let (mut points, mut ways) = (vec![base], vec![ahead]);
         for i in 0..PIECES {
-            let elevation = start - bend * ((i as f32 + 0.5) / PIECES as f32).powi(2);
+            let elevation = start - bend * ((i.to_f32() + 0.5) / PIECES.to_f32()).powi(2);
             let way = if bend == 0.0 { ahead } else { level * elevation.cos() + Vec3::Z * elevation.sin() };
             points.push(points[i] + way * step);
             ways.push(way);
         }
         let thick = 0.16 * self.length;
         pen.strand(OrganKind::Tassel, self.material, &points, (thick, 0.5 * thick));
-        let count = (self.per_metre * length * (1.0 - bare)) as u32;
+        let count = (self.per_metre * length * (1.0 - bare)).trunc_to::<u32>();
         for k in 0..count {
-            let t = lerp(bare, 1.0, (k as f32 + 0.5) / count as f32) * PIECES as f32;
-            let i = (t as usize).min(PIECES - 1);
-            let place = points[i].lerp(points[i + 1], t - i as f32);
+            let t = lerp(bare, 1.0, (k.to_f32() + 0.5) / count.to_f32()) * PIECES.to_f32();
+            let i = t.trunc_to::<usize>().min(PIECES - 1);
+            let place = points[i].lerp(points[i + 1], t - i.to_f32());
             let way = ways[i + 1];
             let about = Frame::about(way);
-            let (sin, cos) = (GOLDEN * k as f32).sin_cos();
+            let (sin, cos) = (GOLDEN * k.to_f32()).sin_cos();
             let out = about.x * cos + about.y * sin;
             let lean = stream.range32(0.35, 0.75);
             let along = (way + out * lean).normalize_or(way);

@@ -3,7 +3,7 @@
 use super::desc::{Bloom, RingDesc};
 use super::mesher::{FlowerMesher, Sheet};
 use crate::plant::organ::OrganKind;
-use furrow_base::math::lerp;
+use furrow_base::math::{RoundTo, ToFloat, lerp};
 use furrow_base::sampling::Stream;
 use std::f32::consts::{PI, TAU};
 
@@ -22,26 +22,26 @@ pub(super) fn grow(
     let whole = rings.iter().all(|ring| ring.arc_deg.get() >= 360.0);
     let spin = if whole { stream.range32(0.0, TAU) } else { stream.range32(-0.1, 0.1) };
     for (k, ring) in rings.iter().enumerate() {
-        let count = ring.count.draw(stream).max(1.0) as u32;
+        let count = ring.count.draw(stream).max(1.0).trunc_to::<u32>();
         let (arc, middle) = (ring.arc_deg.f32().to_radians(), ring.turn_deg.f32().to_radians());
         // The sheets of one ring cover the gaps of the previous ring.
-        let offset = if k % 2 == 1 && whole { PI / count as f32 } else { 0.0 };
+        let offset = if k % 2 == 1 && whole { PI / count.to_f32() } else { 0.0 };
         for i in 0..count {
             let place = if ring.arc_deg.get() >= 360.0 {
-                arc * i as f32 / count as f32
+                arc * i.to_f32() / count.to_f32()
             } else {
-                arc * ((i as f32 + 0.5) / count as f32 - 0.5) * count as f32 / (count.max(2) - 1) as f32
+                arc * ((i.to_f32() + 0.5) / count.to_f32() - 0.5) * count.to_f32() / (count.max(2) - 1).to_f32()
             };
-            let stray = 0.12 * stream.normal() as f32 * (TAU / count.max(5) as f32);
+            let stray = 0.12 * stream.normal().to_f32() * (TAU / count.max(5).to_f32());
             let (sin, cos) = (spin + middle + offset + place + stray).sin_cos();
             let out = bloom.frame.x * cos + bloom.frame.y * sin;
             let (cup, bend) = (ring.cup_deg.draw32(stream).to_radians(), ring.bend_deg.draw32(stream).to_radians());
-            let size = 1.0 + 0.05 * stream.normal() as f32;
+            let size = 1.0 + 0.05 * stream.normal().to_f32();
             let open = bloom.opening;
             let whole = (0.5 * bloom.size - start).max(0.05 * bloom.size) * ring.length.f32() * size;
             let length = whole * lerp(ring.bud.f32(), 1.0, open);
             let sheet = Sheet {
-                base: bloom.base + out * start + bloom.frame.z * (0.004 * k as f32 * bloom.size),
+                base: bloom.base + out * start + bloom.frame.z * (0.004 * k.to_f32() * bloom.size),
                 out,
                 up: bloom.frame.z,
                 length,

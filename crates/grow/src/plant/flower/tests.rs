@@ -3,7 +3,7 @@
 use super::*;
 use crate::plant::organ::{Organ, OrganKind};
 use furrow_base::geometry::Mesh;
-use furrow_base::math::{Frame, Vec3};
+use furrow_base::math::{Frame, ToFloat, Vec3};
 use furrow_base::sampling::Purpose;
 
 const SIZE: f32 = 0.03;
@@ -21,7 +21,7 @@ fn draw(text: &str, opening: f32, seed: u64) -> (FlowerDesc, Vec<Organ>) {
         assert_eq!(organ.leaf, 0);
     }
     let triangles: usize = organs.iter().map(|o| o.mesh.triangles.len()).sum();
-    assert!(triangles as f64 <= desc.most_triangles(), "{triangles} of {}", desc.most_triangles());
+    assert!(triangles.to_f64() <= desc.most_triangles(), "{triangles} of {}", desc.most_triangles());
     (desc, organs)
 }
 

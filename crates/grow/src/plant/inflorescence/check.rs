@@ -4,6 +4,7 @@ use super::desc::{InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat};
 use crate::plant::flower::desc::FlowerDesc;
 use crate::plant::kind::LeafKind;
 use crate::plant::stage::StageDesc;
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Step, choose};
 use std::collections::BTreeMap;
 
@@ -61,7 +62,7 @@ pub(in crate::plant) fn stage(
         return Err((at, message, "write fewer axes, or fewer leaves on each".into()));
     }
     let number = count(|axis| axis.flowers.iter().map(|f| f.count.largest().ceil()).sum());
-    if number > MOST_FLOWERS as f64 || numbers.iter().sum::<f64>() > MOST_AXES as f64 {
+    if number > MOST_FLOWERS.to_f64() || numbers.iter().sum::<f64>() > MOST_AXES.to_f64() {
         let axes: f64 = numbers.iter().sum();
         let message = format!("up to {axes} flowering axes with {number} flowers at BBCH {}", stage.bbch);
         let help = format!("a plant has at most {MOST_AXES} flowering axes and {MOST_FLOWERS} flowers");

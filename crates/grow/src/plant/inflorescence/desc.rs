@@ -1,5 +1,6 @@
 //! Flowering axes in a species file: scapes, flowering branches, the peduncles of heads and ears.
 
+use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ pub enum Seat {
 
 /// Reads the number of a leaf.
 fn leaf<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    Num::<PositiveCount>::deserialize(deserializer).map(|number| number.get() as u32)
+    Num::<PositiveCount>::deserialize(deserializer).map(|number| number.get().trunc_to::<u32>())
 }
 
 /// Leaves along a flowering axis.

@@ -24,7 +24,7 @@ use super::leaf::{self, Lower};
 use super::organ::{self, Organ, OrganKind, StemLine, StemPosition};
 use super::stage::BUD;
 use desc::{FlowersDesc, InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat, StemLeafDesc};
-use furrow_base::math::{Frame, Vec3, lerp};
+use furrow_base::math::{Frame, RoundTo, ToFloat, ToInt, Vec3, lerp};
 use furrow_base::ron_file::{Bound, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use seat::AxisSite;
@@ -50,15 +50,15 @@ struct BuiltAxis {
 impl BuiltAxis {
     /// Returns the position on the plant's stems of a point at a fraction of its length.
     fn on(&self, share: f32) -> StemPosition {
-        StemPosition { line: self.line, at: share.clamp(0.0, 1.0) * (self.points.len() - 1) as f32 }
+        StemPosition { line: self.line, at: share.clamp(0.0, 1.0) * (self.points.len() - 1).to_f32() }
     }
 
     /// Returns point, direction and radius at a fraction of its length.
     fn at(&self, share: f32) -> (Vec3, Vec3, f32) {
         let last = self.points.len() - 1;
-        let t = share.clamp(0.0, 1.0) * last as f32;
-        let i = (t as usize).min(last - 1);
-        let point = self.points[i].lerp(self.points[i + 1], t - i as f32);
+        let t = share.clamp(0.0, 1.0) * last.to_f32();
+        let i = t.trunc_to::<usize>().min(last - 1);
+        let point = self.points[i].lerp(self.points[i + 1], t - i.to_f32());
         (point, self.ways[i.min(self.ways.len() - 1)], lerp(self.radii.0, self.radii.1, share))
     }
 }
@@ -86,7 +86,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, growth: &Growth<'_>, cell: f32) {
     let mut grown: Vec<Vec<BuiltAxis>> = Vec::new();
     for (k, desc) in to.inflorescences.iter().enumerate() {
         let ends = (from.inflorescences.get(k), desc);
-        let stream = growth.stream.child(Purpose::Plant, STREAM).child(Purpose::Plant, k as u64);
+        let stream = growth.stream.child(Purpose::Plant, STREAM).child(Purpose::Plant, k.to_u64());
         let axes = grower.sort(k, ends, &stream, &tips, &grown);
         grown.push(axes);
     }
@@ -114,9 +114,9 @@ impl<'a> AxisBuilder<'a, '_> {
         grown: &[Vec<BuiltAxis>],
     ) -> Vec<BuiltAxis> {
         let between = self.growth.between;
-        let count = |stream: &Stream| between.draw(ends, Some(0.0), stream, 0, |d| &d.count).round() as usize;
-        let most = between.to.inflorescences[sort].count.largest().round() as usize;
-        let most = most.max(between.from.inflorescences.get(sort).map_or(0, |d| d.count.largest().round() as usize));
+        let count = |stream: &Stream| between.draw(ends, Some(0.0), stream, 0, |d| &d.count).round_to::<usize>();
+        let most = between.to.inflorescences[sort].count.largest().round_to::<usize>();
+        let most = most.max(between.from.inflorescences.get(sort).map_or(0, |d| d.count.largest().round_to::<usize>()));
         // Place, relative size, and index among all axes that this description may give.
         let mut places: Vec<(AxisSite, f32, usize)> = Vec::new();
         let base = |nth: usize, place: AxisSite, stream: &Stream, places: &mut Vec<(AxisSite, f32, usize)>| {
@@ -126,13 +126,13 @@ impl<'a> AxisBuilder<'a, '_> {
             Seat::Tip => tips.iter().take(1).for_each(|tip| base(0, *tip, stream, &mut places)),
             Seat::Tips => {
                 for (k, tip) in tips.iter().enumerate() {
-                    base(k, *tip, &stream.child(Purpose::Plant, k as u64), &mut places);
+                    base(k, *tip, &stream.child(Purpose::Plant, k.to_u64()), &mut places);
                 }
             }
             Seat::Axils { first, last } => {
                 for number in *first..=*last {
                     if let Some(axil) = seat::axil(self.organs, number) {
-                        let nth = (number - first) as usize;
+                        let nth = (number - first).to_usize();
                         base(nth, axil, &stream.child(Purpose::Leaf, u64::from(number)), &mut places);
                     }
                 }
@@ -151,10 +151,10 @@ impl<'a> AxisBuilder<'a, '_> {
                     for i in 0..count {
                         let share = spaced(i, count);
                         let (point, along, _) = parent.at(lerp(from, to, share));
-                        let out = seat::across(along, parent.spin + GOLDEN * i as f32);
+                        let out = seat::across(along, parent.spin + GOLDEN * i.to_f32());
                         let size = lerp(1.0, self.blend(ends, |d| d.top.f32()), share);
                         let on = Some(parent.on(lerp(from, to, share)));
-                        places.push((AxisSite { point, along, out: Some(out), on }, size, k as usize * most + i));
+                        places.push((AxisSite { point, along, out: Some(out), on }, size, k.to_usize() * most + i));
                     }
                 }
             }
@@ -165,7 +165,7 @@ impl<'a> AxisBuilder<'a, '_> {
                 break;
             }
             self.axes += 1;
-            let own = stream.child(Purpose::Plant, 1 << 20 | nth as u64);
+            let own = stream.child(Purpose::Plant, 1 << 20 | nth.to_u64());
             if let Some(axis) = self.axis((sort, nth), ends, &own, (place, size)) {
                 all.push(axis);
             }
@@ -208,7 +208,7 @@ impl<'a> AxisBuilder<'a, '_> {
         let bend = self.draw(ends, None, (own, 4), |d| &d.bend_deg).to_radians();
         let mut stream = own.child(Purpose::Plant, 10);
         let spin = stream.range32(0.0, std::f32::consts::TAU);
-        let out = place.out.unwrap_or_else(|| seat::across(place.along, spin + GOLDEN * nth as f32));
+        let out = place.out.unwrap_or_else(|| seat::across(place.along, spin + GOLDEN * nth.to_f32()));
         let along = (place.along * angle.cos() + out * angle.sin()).normalize_or(place.along);
         let radius = (0.5 * width).max(1.2e-4);
         let radii = (radius, radius * self.blend(ends, |d| d.taper.f32()));
@@ -222,11 +222,11 @@ impl<'a> AxisBuilder<'a, '_> {
         self.pen.stem(material, line, axis.radii);
         for (k, leaves) in ends.1.leaves.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.leaves.get(k)), leaves);
-            self.leaves((sort, nth, k), ends, &own.child(Purpose::Leaf, k as u64), &axis);
+            self.leaves((sort, nth, k), ends, &own.child(Purpose::Leaf, k.to_u64()), &axis);
         }
         for (k, flowers) in ends.1.flowers.iter().enumerate() {
             let ends = (ends.0.and_then(|d| d.flowers.get(k)), flowers);
-            self.flowers(ends, &own.child(Purpose::Plant, 100 + k as u64), &axis, material);
+            self.flowers(ends, &own.child(Purpose::Plant, 100 + k.to_u64()), &axis, material);
         }
         Some(axis)
     }
@@ -239,16 +239,16 @@ impl<'a> AxisBuilder<'a, '_> {
         stream: &Stream,
         axis: &BuiltAxis,
     ) {
-        let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round() as usize;
+        let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round_to::<usize>();
         let (low, high) = (self.blend(ends, |d| d.from.f32()), self.blend(ends, |d| d.to.f32()));
         let top = self.blend(ends, |d| d.top.f32());
         let Some((name, kind)) = self.growth.desc.kinds.get_key_value(&ends.1.kind) else { return };
         for i in 0..count {
             let Some(number) = self.growth.numbers.on_axis(sort, nth, row, i) else { return };
-            let own = stream.child(Purpose::Leaf, i as u64);
+            let own = stream.child(Purpose::Leaf, i.to_u64());
             let share = spaced(i, count);
             let (point, along, radius) = axis.at(lerp(low, high, share));
-            let out = seat::across(along, axis.spin + GOLDEN * i as f32);
+            let out = seat::across(along, axis.spin + GOLDEN * i.to_f32());
             let mut sized = own.child(Purpose::Leaf, 50);
             let size = self.growth.desc.size.draw32(&mut sized) * self.growth.vigour * lerp(1.0, top, share);
             let blade = self.draw(ends, Some(0.0), (&own, 1), |d| &d.blade_mm) * MM * size;
@@ -282,7 +282,7 @@ impl<'a> AxisBuilder<'a, '_> {
 
     /// Builds the flowers of an axis on their stalks.
     fn flowers(&mut self, ends: Ends<'a, FlowersDesc>, stream: &Stream, axis: &BuiltAxis, material: &str) {
-        let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round() as usize;
+        let count = self.draw(ends, Some(0.0), (stream, 0), |d| &d.count).round_to::<usize>();
         let (low, high) = (self.blend(ends, |d| d.from.f32()), self.blend(ends, |d| d.to.f32()));
         let top = self.blend(ends, |d| d.top.f32());
         let Some(flower) = self.growth.desc.flowers.get(&ends.1.kind) else { return };
@@ -290,7 +290,7 @@ impl<'a> AxisBuilder<'a, '_> {
             if self.flowers >= MOST_FLOWERS {
                 return;
             }
-            let own = stream.child(Purpose::Plant, i as u64);
+            let own = stream.child(Purpose::Plant, i.to_u64());
             let mut stream = own.child(Purpose::Plant, 50);
             let share = spaced(i, count);
             let factor = self.growth.vigour * lerp(1.0, top, share);
@@ -304,7 +304,7 @@ impl<'a> AxisBuilder<'a, '_> {
             let nod = self.draw(ends, None, (&own, 4), |d| &d.nod_deg).to_radians();
             let (point, along, radius) = axis.at(lerp(low, high, share));
             self.pen.stand(axis.on(lerp(low, high, share)));
-            let out = seat::across(along, axis.spin + GOLDEN * i as f32 + 0.15 * stream.normal() as f32);
+            let out = seat::across(along, axis.spin + GOLDEN * i.to_f32() + 0.15 * stream.normal().to_f32());
             let way = (along * angle.cos() + out * angle.sin()).normalize_or(along);
             let mut base = point + out * (0.5 * radius * angle.sin());
             let thick = (0.045 * size).min(0.8 * radius).max(1.2e-4);
@@ -332,7 +332,7 @@ impl<'a> AxisBuilder<'a, '_> {
 /// Returns the relative position of the i-th of `count` leaves or flowers between the first and the last; a single one
 /// is at the end.
 fn spaced(i: usize, count: usize) -> f32 {
-    if count > 1 { i as f32 / (count - 1) as f32 } else { 1.0 }
+    if count > 1 { i.to_f32() / (count - 1).to_f32() } else { 1.0 }
 }
 
 /// Rotates `way` towards the ground by `nod` radians, in the vertical plane through it, or through `out` if it is
@@ -353,20 +353,20 @@ fn curve(
     radius: f32,
     stream: &mut Stream,
 ) -> (Vec<Vec3>, Vec<Vec3>) {
-    let pieces = (length / 0.012).round().clamp(4.0, 9.0) as usize;
-    let step = length / pieces as f32;
+    let pieces = (length / 0.012).round().clamp(4.0, 9.0).trunc_to::<usize>();
+    let step = length / pieces.to_f32();
     let heading = along.x.atan2(along.y);
     let (mut zenith, mut turn) = (along.z.clamp(-1.0, 1.0).acos(), heading);
     let (mut points, mut ways) = (vec![base], Vec::new());
     for i in 0..pieces {
-        let up = bend / pieces as f32;
+        let up = bend / pieces.to_f32();
         let before = zenith;
         zenith -= up;
         if up > 0.0 {
             zenith = zenith.max(before.min(0.04));
         }
-        zenith += 0.02 * stream.normal() as f32;
-        turn += 0.05 * stream.normal() as f32;
+        zenith += 0.02 * stream.normal().to_f32();
+        turn += 0.05 * stream.normal().to_f32();
         let mut way = furrow_base::math::direction(zenith, turn);
         let floor = radius + 1e-3;
         if points[i].z + way.z * step < floor && i > 0 {

@@ -2,7 +2,7 @@
 
 use crate::plant::growth::Growth;
 use crate::plant::organ::{Organ, OrganKind, StemPosition};
-use furrow_base::math::{Vec3, direction};
+use furrow_base::math::{ToFloat, Vec3, direction};
 use furrow_base::sampling::Purpose;
 use std::f32::consts::{FRAC_PI_2, TAU};
 
@@ -34,7 +34,7 @@ fn end_of(stem: &Organ) -> Option<AxisSite> {
     let middle_of = |v: f32| {
         // The last vertex of a ring coincides with its first.
         let ring = || mesh.positions.iter().zip(&mesh.uvs).filter(|(_, uv)| uv.y == v && uv.x < 1.0).map(|(p, _)| *p);
-        ring().sum::<Vec3>() / ring().count().max(1) as f32
+        ring().sum::<Vec3>() / ring().count().max(1).to_f32()
     };
     let last = mesh.uvs.last()?.y;
     let before = mesh.uvs.iter().rev().find(|uv| uv.y != last)?.y;
@@ -70,7 +70,7 @@ fn culms(organs: &[Organ], growth: &Growth<'_>) -> Vec<AxisSite> {
     let culm = |(k, shoot): (usize, &Shoot)| {
         // The two oldest sheaths are on opposite sides.
         let two = &shoot.feet[..shoot.feet.len().min(2)];
-        let foot = two.iter().sum::<Vec3>() / two.len() as f32;
+        let foot = two.iter().sum::<Vec3>() / two.len().to_f32();
         let (point, along) = if k == 0 { (Vec3::ZERO, upright) } else { (foot, shoot.along) };
         AxisSite { point, along, out: None, on: None }
     };

@@ -3,6 +3,7 @@
 use super::*;
 use crate::plant::{Plant, PlantDesc, Stage, grow as grow_plant, most_triangles};
 use furrow_base::geometry::Mesh;
+use furrow_base::math::ToFloat;
 use furrow_field::species_text::SpeciesFile;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -67,7 +68,7 @@ fn flowers_lie_within_the_table() {
             let (largest, count) = measured(&plant, material);
             let at = format!("{eppo} {bbch} {material} seed {seed}: {largest} mm, {count}");
             assert!((range[0]..=range[1]).contains(&largest), "{at}");
-            assert!((range[2]..=range[3]).contains(&(count as f32)), "{at}");
+            assert!((range[2]..=range[3]).contains(&count.to_f32()), "{at}");
         }
     }
 }
@@ -80,10 +81,10 @@ fn the_estimate_of_triangles_holds() {
         let most = most_triangles(&page.plant);
         let (first, last) = page.plant.days();
         for seed in 0..10 {
-            let age = first + (last - first) * (0.5 + 0.05 * (seed + 1) as f32);
+            let age = first + (last - first) * (0.5 + 0.05 * (seed + 1).to_f32());
             let plant = grow_plant(&page.plant, Stage::Age(age), &stream(seed));
             let count: usize = plant.organs.iter().map(|o| o.mesh.triangles.len()).sum();
-            assert!(count as f64 <= most, "{} on day {age}: {count} of {most}", page.eppo);
+            assert!(count.to_f64() <= most, "{} on day {age}: {count} of {most}", page.eppo);
         }
     }
 }

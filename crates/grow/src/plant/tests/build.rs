@@ -1,7 +1,7 @@
 //! Structure of plants: sheaths, mats, joints, spines.
 
 use super::*;
-use furrow_base::math::vec2;
+use furrow_base::math::{ToFloat, vec2};
 
 /// Rationale: sheaths that leave the ground side by side look like straws; grasses have one stem of nested sheaths.
 /// Expected: the extent of a shoot's sheaths near the soil, below the lowest collar, is at most the stem's width plus a
@@ -48,7 +48,7 @@ fn plants_are_as_high_as_they_are_wide_or_lie() {
                 let (low, high) = along.fold((f32::MAX, f32::MIN), |(l, h), x| (l.min(x), h.max(x)));
                 high - low
             };
-            let widths: Vec<f32> = (0..12).map(|k| width(PI * k as f32 / 12.0)).collect();
+            let widths: Vec<f32> = (0..12).map(|k| width(PI * k.to_f32() / 12.0)).collect();
             let (low, high) = widths.iter().fold((f32::MAX, 0.0_f32), |(l, h), w| (l.min(*w), h.max(*w)));
             [low, high, plant.height]
         };
@@ -128,7 +128,7 @@ fn divided_blades_bend_branch_by_branch() {
         let rise = |least: f32, most: f32| {
             let of = flat.iter().zip(&bent).filter(|(p, _)| (least..most).contains(&(across(**p) / widest)));
             let all: Vec<f32> = of.map(|(p, q)| (q.z - p.z) / across(*p).max(1e-5)).collect();
-            all.iter().sum::<f32>() / all.len() as f32
+            all.iter().sum::<f32>() / all.len().to_f32()
         };
         assert!(
             flat.iter().zip(&bent).filter(|(p, _)| across(**p) < 1e-5).all(|(p, q)| p.distance(*q) < 1e-5),
@@ -177,7 +177,7 @@ fn a_potato_has_several_stems_that_stay_what_they_are() {
         let stream = stream(seed);
         let (mut counts, mut feet) = (Vec::new(), BTreeMap::<u16, Vec3>::new());
         for day in 5..36 {
-            let [plant, first] = [&desc, &single].map(|desc| grow(desc, Stage::Age(day as f32), &stream));
+            let [plant, first] = [&desc, &single].map(|desc| grow(desc, Stage::Age(day.to_f32()), &stream));
             assert_eq!(plant.organs[..first.organs.len()], first.organs, "seed {seed}, day {day}");
             let hypocotyls = || plant.organs.iter().filter(|o| o.kind == OrganKind::Hypocotyl);
             counts.push(hypocotyls().count());
@@ -196,7 +196,7 @@ fn a_potato_has_several_stems_that_stay_what_they_are() {
         assert!((2..=6).contains(&counts[0]) && counts.iter().all(|n| *n == counts[0]), "seed {seed}: {counts:?}");
         all.push(counts[0]);
     }
-    let mean = all.iter().sum::<usize>() as f32 / all.len() as f32;
+    let mean = all.iter().sum::<usize>().to_f32() / all.len().to_f32();
     assert!((3.0..4.6).contains(&mean), "{mean}");
 }
 
@@ -266,7 +266,7 @@ fn plants_lean_one_way_whatever_their_stages_say() {
 fn seedlings_straighten_after_emergence() {
     for eppo in ["BEAVX", "CHEAL"] {
         let desc = page(eppo);
-        let most = desc.lean_deg.usual().1 as f32;
+        let most = desc.lean_deg.usual().1.to_f32();
         for seed in 0..10 {
             let stream = stream(seed);
             let leans = [1.0, 2.0, 3.0, 4.0].map(|days| {

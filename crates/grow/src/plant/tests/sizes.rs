@@ -1,6 +1,7 @@
 //! Numbers of leaves, sizes and proportions, compared with tables from the literature.
 
 use super::*;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 
 /// Returns the number of unfolded true leaves at a stage, and the number of all. A leaf has unfolded once it is 0.35
 /// times as long as the longest leaf, and so have all older leaves, withered or not. In whorled plants whorls are
@@ -12,7 +13,7 @@ fn unfolded(plant: &PlantDesc, stage: &StageDesc) -> (usize, usize) {
         .layers
         .iter()
         .filter(|l| plant.kinds[&l.kind].organ == OrganKind::Blade)
-        .map(|l| (l.blade_mm.draw(&mut stream.clone()), if whorls { 1 } else { l.leaves.get() as usize }))
+        .map(|l| (l.blade_mm.draw(&mut stream.clone()), if whorls { 1 } else { l.leaves.get().trunc_to::<usize>() }))
         .collect();
     let peak = lengths.iter().fold(0.0, |m: f64, l| m.max(l.0));
     let (mut longest, mut unfolded, mut all) = (0.0_f64, 0, 0);
@@ -37,7 +38,7 @@ fn leaves_are_as_many_as_the_stage_says() {
         let stream = stream(0);
         let grown = growth::growth(&page.plant, Stage::Bbch(stage.bbch), &stream, 1.0).unwrap();
         let (unfolded, all) = unfolded(&page.plant, stage);
-        let expected = stage.bbch.saturating_sub(10) as usize;
+        let expected = stage.bbch.saturating_sub(10).to_usize();
         let fits = if expected == 9 { unfolded >= 9 } else { unfolded == expected };
         assert!(fits, "{} BBCH {}: {unfolded} unfolded of {all}", page.eppo, stage.bbch);
         assert!(grown.leaves.windows(2).all(|w| w[0].number < w[1].number));
@@ -69,7 +70,7 @@ fn sizes_lie_within_the_tables() {
             let most = number(&row, &format!("{what}_most")).is_none_or(|m| value <= m * (1.0 + slack));
             assert!(least && most, "{at}: {what} {value}");
         };
-        within("leaves", unfolded(plant, stage).0 as f32, 0.0);
+        within("leaves", unfolded(plant, stage).0.to_f32(), 0.0);
         for seed in 0..20 {
             let stream = stream(seed);
             let grown = growth::growth(plant, Stage::Bbch(bbch), &stream, 1.0).unwrap();
@@ -96,7 +97,7 @@ fn blades_fill_as_much_of_their_length_and_width_as_the_table_says() {
         let Some(area) = number(row, "area") else { continue };
         let kinds = || page.plant.kinds.iter().filter(|(_, k)| k.organ == OrganKind::Blade);
         let ratio = |outline: outline::Outline| {
-            (0..2000).map(|i| 2.0 * outline.half_width((i as f32 + 0.5) / 2000.0)).sum::<f32>() / 2000.0
+            (0..2000).map(|i| 2.0 * outline.half_width((i.to_f32() + 0.5) / 2000.0)).sum::<f32>() / 2000.0
         };
         let fits = kinds().any(|(_, k)| match k.shape {
             Shape::Sheet { outline } | Shape::Leaflets { outline, .. } => (ratio(outline) / area - 1.0).abs() < 0.07,
@@ -160,20 +161,20 @@ fn compound_blades_have_as_many_leaflets_as_their_species() {
                 }
                 let organ = plant.organs.iter().find(|o| o.leaf == leaf.number && o.axis.is_some()).unwrap();
                 // Vertices that share a triangle belong to one sheet.
-                let mut sheet: Vec<u32> = (0..organ.mesh.positions.len() as u32).collect();
+                let mut sheet: Vec<u32> = (0..organ.mesh.positions.len().to_u32()).collect();
                 let mut joined = true;
                 while joined {
                     joined = false;
                     for triangle in &organ.mesh.triangles {
-                        let least = triangle.iter().map(|i| sheet[*i as usize]).min().unwrap();
+                        let least = triangle.iter().map(|i| sheet[i.to_usize()]).min().unwrap();
                         for i in triangle {
-                            joined |= sheet[*i as usize] != least;
-                            sheet[*i as usize] = least;
+                            joined |= sheet[i.to_usize()] != least;
+                            sheet[i.to_usize()] = least;
                         }
                     }
                 }
                 let held: std::collections::BTreeSet<u32> =
-                    organ.mesh.triangles.iter().map(|t| sheet[t[0] as usize]).collect();
+                    organ.mesh.triangles.iter().map(|t| sheet[t[0].to_usize()]).collect();
                 assert_eq!(held.len(), leaflets, "{eppo} leaf {}", leaf.number);
                 let axis = organ.axis.as_ref().unwrap();
                 let share = axis.base.distance(axis.tip) / leaf.blade;
@@ -193,7 +194,7 @@ fn beets_are_as_high_and_wide_as_their_stage() {
         let stage = beet.stages.iter().find(|s| s.bbch == bbch).unwrap();
         // Selects the stage of the file by its days, because its code may be one of ground cover.
         let plants: Vec<Plant> = (0..10).map(|seed| grow(&beet, Stage::Age(stage.days.f32()), &stream(seed))).collect();
-        let mean = |pick: fn(&Plant) -> f32| plants.iter().map(pick).sum::<f32>() / plants.len() as f32 * 1e3;
+        let mean = |pick: fn(&Plant) -> f32| plants.iter().map(pick).sum::<f32>() / plants.len().to_f32() * 1e3;
         let span = |plant: &Plant| {
             let corners = || plant.organs.iter().filter_map(|o| o.mesh.bounds());
             let low = corners().fold(Vec3::MAX, |low, b| low.min(b.0));

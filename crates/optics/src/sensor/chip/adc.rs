@@ -4,6 +4,7 @@
 //! The black level takes a fraction of the range. White, 90 % of the full well, is at 87 % of the range: the JAI AD-130
 //! puts them at 33 and 890 of 1023, or at 8 and 222 of 255 (manual of its sister model AD-131GE).
 
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::ron_file::{Bound, Num};
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +75,7 @@ impl AdcDesc {
     /// Creates the converter; `None` if it is off.
     pub fn build(&self) -> Option<Adc> {
         let Self::Bits { bits, black, kept } = *self else { return None };
-        let top = (1_u32 << bits.get() as u32) as f32 - 1.0;
+        let top = (1_u32 << bits.get().trunc_to::<u32>()).to_f32() - 1.0;
         Some(Adc { black: (black.f32() * top).round(), white: (WHITE * top).round(), top, kept })
     }
 }
@@ -106,7 +107,7 @@ mod tests {
             assert_eq!((adc.black, adc.white), (black, white), "{bits} bits");
             assert_eq!((adc.convert(0.0), adc.convert(1.0)), (0.0, 1.0));
             let levels: BTreeSet<u32> = (0..200_000)
-                .map(|i| (adc.convert(i as f32 / 100_000.0 - 0.5) * (white - black)).round().to_bits())
+                .map(|i| (adc.convert(i.to_f32() / 100_000.0 - 0.5) * (white - black)).round().to_bits())
                 .collect();
             assert_eq!(levels.len(), 1 << bits, "{bits} bits");
             assert!(adc.convert(-0.01) < 0.0 && adc.convert(-9.0) == -black / (white - black));

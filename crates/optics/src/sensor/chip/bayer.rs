@@ -5,6 +5,7 @@
 //! neighbours, as in any single-chip camera. Beyond the window's edge the mosaic is mirrored about the outermost
 //! pixels, which preserves its colours.
 
+use furrow_base::math::ToInt;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -105,7 +106,7 @@ impl Mosaic<'_> {
         let which = usize::from(method == Demosaic::MalvarHeCutler);
         let (row, cross, diagonal) = (&ROW[which], &CROSS[which], &DIAGONAL[which]);
         let column = transposed(row);
-        let (width, (left, top)) = (self.width as usize, self.corner);
+        let (width, (left, top)) = (self.width.to_usize(), self.corner);
         let height = self.values.len() / width.max(1);
         let around_columns: Vec<[usize; 5]> = (0..width).map(|x| around(x, width)).collect();
         let mut seen = vec![[0.0; 3]; width * height];
@@ -113,7 +114,7 @@ impl Mosaic<'_> {
             let rows = around(y, height).map(|y| &self.values[y * width..][..width]);
             for (x, (columns, seen)) in around_columns.iter().zip(row_of).enumerate() {
                 let (own, weigh) = (rows[2][x], |kernel| weigh(kernel, &rows, columns));
-                let at = (left + x as u32, top + y as u32);
+                let at = (left + x.to_u32(), top + y.to_u32());
                 *seen = match self.pattern.color(at.0, at.1) {
                     0 => [own, weigh(cross), weigh(diagonal)],
                     2 => [weigh(diagonal), weigh(cross), own],
@@ -156,10 +157,10 @@ fn weigh(kernel: &Kernel, rows: &[&[f32]; 5], columns: &[usize; 5]) -> f32 {
 /// Returns an index with the two on either side, mirrored about the first and the last of `count`; if `count` is 1, all
 /// are that one.
 fn around(i: usize, count: usize) -> [usize; 5] {
-    let last = count as i64 - 1;
+    let last = count.to_i64() - 1;
     [-2, -1, 0, 1, 2].map(|d| {
-        let i = (i as i64 + d).abs();
-        (if i > last { 2 * last - i } else { i }).clamp(0, last) as usize
+        let i = (i.to_i64() + d).abs();
+        (if i > last { 2 * last - i } else { i }).clamp(0, last).to_usize()
     })
 }
 
@@ -170,6 +171,7 @@ fn transposed(kernel: &Kernel) -> Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
     use furrow_base::sampling::{Purpose, Stream};
 
     const PATTERNS: [Pattern; 4] = [Pattern::Rggb, Pattern::Bggr, Pattern::Grbg, Pattern::Gbrg];
@@ -197,12 +199,12 @@ mod tests {
     fn a_linear_ramp_survives() {
         for (pattern, method) in PATTERNS.into_iter().flat_map(|p| METHODS.map(|m| (p, m))) {
             let ramp = |x: u32, y: u32| {
-                let (x, y) = (x as f32, y as f32);
+                let (x, y) = (x.to_f32(), y.to_f32());
                 [2.0 + 0.5 * x - 0.25 * y, 1.0 + 0.125 * x + 0.75 * y, 4.0 - 0.25 * x + 0.5 * y]
             };
             let seen = through(16, pattern, method, ramp);
             for (x, y) in (2..14).flat_map(|y| (2..14).map(move |x| (x, y))) {
-                assert_eq!(seen[(y * 16 + x) as usize], ramp(x, y), "{pattern:?} {method:?} at {x}, {y}");
+                assert_eq!(seen[(y * 16 + x).to_usize()], ramp(x, y), "{pattern:?} {method:?} at {x}, {y}");
             }
             let flat = through(7, pattern, method, |_, _| [0.25, 0.5, 0.75]);
             assert!(flat.iter().all(|c| *c == [0.25, 0.5, 0.75]), "{pattern:?} {method:?}");
@@ -216,11 +218,11 @@ mod tests {
     fn every_tap_is_the_mirrored_neighbour() {
         let mut stream = Stream::of(6, 0, Purpose::Test, 0);
         for (width, height) in [(1, 1), (1, 4), (2, 2), (3, 1), (2, 5), (4, 3), (9, 7)] {
-            let values: Vec<f32> = (0..width * height).map(|_| stream.normal() as f32).collect();
+            let values: Vec<f32> = (0..width * height).map(|_| stream.normal().to_f32()).collect();
             for (pattern, method) in PATTERNS.into_iter().flat_map(|p| METHODS.map(|m| (p, m))) {
-                let mosaic = Mosaic { values: &values, width: width as u32, corner: (3, 6), pattern };
+                let mosaic = Mosaic { values: &values, width: width.to_u32(), corner: (3, 6), pattern };
                 let seen = mosaic.interpolate(method);
-                let plain = |i: usize| plain(&mosaic, method, (i as i64 % width, i as i64 / width));
+                let plain = |i: usize| plain(&mosaic, method, (i.to_i64() % width, i.to_i64() / width));
                 let plain: Vec<[f32; 3]> = (0..values.len()).map(plain).collect();
                 assert_eq!(seen, plain, "{pattern:?} {method:?} {width} × {height}");
             }
@@ -230,18 +232,18 @@ mod tests {
     /// Returns the colours of one pixel, computed neighbour by neighbour.
     fn plain(mosaic: &Mosaic<'_>, method: Demosaic, (x, y): (i64, i64)) -> [f32; 3] {
         let (width, which) = (i64::from(mosaic.width), usize::from(method == Demosaic::MalvarHeCutler));
-        let height = mosaic.values.len() as i64 / width;
+        let height = mosaic.values.len().to_i64() / width;
         let mirrored = |i: i64, count: i64| {
             let i = i.abs();
             let i = if i >= count { 2 * (count - 1) - i } else { i };
             i.clamp(0, count - 1)
         };
-        let at = |x: i64, y: i64| mosaic.values[(mirrored(y, height) * width + mirrored(x, width)) as usize];
+        let at = |x: i64, y: i64| mosaic.values[(mirrored(y, height) * width + mirrored(x, width)).to_usize()];
         let sum = |kernel: &Kernel, turned: bool| {
             let mut sum = 0.0;
             for (dy, dx) in (0..3).flat_map(|dy| (0..3).map(move |dx| (dy, dx))) {
                 let weight = if turned { kernel[dx][dy] } else { kernel[dy][dx] };
-                let (dx, dy) = (dx as i64, dy as i64);
+                let (dx, dy) = (dx.to_i64(), dy.to_i64());
                 let mut all = at(x + dx, y + dy);
                 if dx > 0 {
                     all += at(x - dx, y + dy);
@@ -256,7 +258,7 @@ mod tests {
             }
             sum / 8.0
         };
-        let color = |dx: u32| mosaic.pattern.color(mosaic.corner.0 + x as u32 + dx, mosaic.corner.1 + y as u32);
+        let color = |dx: u32| mosaic.pattern.color(mosaic.corner.0 + x.to_u32() + dx, mosaic.corner.1 + y.to_u32());
         let (own, cross, diagonal) = (at(x, y), sum(&CROSS[which], false), sum(&DIAGONAL[which], false));
         let (beside, above) = (sum(&ROW[which], false), sum(&ROW[which], true));
         match (color(0), color(1)) {
@@ -271,12 +273,14 @@ mod tests {
     /// one. Around a single bright pixel among black ones, green equals the published kernel's weights.
     #[test]
     fn the_laplacian_of_one_colour_guides_the_others() {
-        let wave = |x: u32, y: u32| [0.5 + 0.25 * (1.1 * x as f32 + 0.4 * y as f32).sin(); 3];
+        let wave = |x: u32, y: u32| [0.5 + 0.25 * (1.1 * x.to_f32() + 0.4 * y.to_f32()).sin(); 3];
         let error = |method| -> f32 {
             let seen = through(32, Pattern::Rggb, method, wave);
             let places = (2..30).flat_map(|y| (2..30).map(move |x| (x, y)));
             places
-                .map(|(x, y)| (0..3).map(|c| (seen[y * 32 + x][c] - wave(x as u32, y as u32)[c]).powi(2)).sum::<f32>())
+                .map(|(x, y)| {
+                    (0..3).map(|c| (seen[y * 32 + x][c] - wave(x.to_u32(), y.to_u32())[c]).powi(2)).sum::<f32>()
+                })
                 .sum()
         };
         let [plain, guided] = METHODS.map(error);
@@ -300,8 +304,8 @@ mod tests {
     fn noise_becomes_that_of_neighbours() {
         const SIZE: usize = 400;
         let mut stream = Stream::of(5, 0, Purpose::Test, 0);
-        let values: Vec<f32> = (0..SIZE * SIZE).map(|_| stream.normal() as f32).collect();
-        let mosaic = Mosaic { values: &values, width: SIZE as u32, corner: (0, 0), pattern: Pattern::Grbg };
+        let values: Vec<f32> = (0..SIZE * SIZE).map(|_| stream.normal().to_f32()).collect();
+        let mosaic = Mosaic { values: &values, width: SIZE.to_u32(), corner: (0, 0), pattern: Pattern::Grbg };
         let seen = mosaic.interpolate(Demosaic::Bilinear);
         for (color, variance, correlation) in
             [(0, 9.0 / 16.0, 2.0 / 3.0), (1, 5.0 / 8.0, 0.4), (2, 9.0 / 16.0, 2.0 / 3.0)]

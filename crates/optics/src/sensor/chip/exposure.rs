@@ -1,5 +1,6 @@
 //! Exposure metering, from the image or from the incident light.
 
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::ron_file::{Bound, Positive, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -106,11 +107,11 @@ impl Exposure {
 /// Returns the mean with the brightest hundredth clipped, so that a glint or a bright stone does not darken the image.
 fn clipped_mean(signals: &mut [f32]) -> f32 {
     let ceiling = percentile(signals, 0.99);
-    (signals.iter().map(|&s| f64::from(s.min(ceiling))).sum::<f64>() / signals.len().max(1) as f64) as f32
+    (signals.iter().map(|&s| f64::from(s.min(ceiling))).sum::<f64>() / signals.len().max(1).to_f64()).to_f32()
 }
 
 fn percentile(signals: &mut [f32], fraction: f32) -> f32 {
     let Some(last) = signals.len().checked_sub(1) else { return 0.0 };
-    let index = ((f64::from(fraction) * last as f64).round() as usize).min(last);
+    let index = (f64::from(fraction) * last.to_f64()).round_to::<usize>().min(last);
     *signals.select_nth_unstable_by(index, f32::total_cmp).1
 }

@@ -7,7 +7,7 @@
 
 use super::level::CLIP;
 use crate::sensor::given::{Given, layered};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{RoundTo, Spectrum};
 use furrow_base::ron_file::{Count, Fraction, NonNegative, Num, Positive};
 use furrow_base::sampling::rng::{Purpose, Stream};
 use serde::Serialize;
@@ -63,7 +63,7 @@ impl NoiseDesc {
             dark_current: self.dark_current.f32(),
             dsnu: self.dsnu.f32(),
             prnu: self.prnu.f32(),
-            body: self.body.get() as u64,
+            body: self.body.get().trunc_to::<u64>(),
         })
     }
 }

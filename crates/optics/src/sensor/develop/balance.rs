@@ -1,7 +1,7 @@
 //! White balance: gains that make white neutral.
 
 use crate::sensor::chip::RESPONSE;
-use furrow_base::math::Spectrum;
+use furrow_base::math::{Spectrum, ToFloat};
 use furrow_base::ron_file::{Fraction, Positive, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -81,7 +81,7 @@ impl WhiteBalance {
                         *sum += f64::from(band);
                     }
                 }
-                let grey = neutral(sums.map(|sum| sum as f32));
+                let grey = neutral(sums.map(ToFloat::to_f32));
                 let white = neutral_gains(illuminant);
                 [0, 1, 2].map(|i| white[i].powf(1.0 - strength) * grey[i].powf(strength))
             }

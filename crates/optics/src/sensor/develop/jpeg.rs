@@ -7,6 +7,7 @@
 //! This is implemented here because encoder libraries return a file and not the loss, and because their rounding may
 //! change between versions, which must not change pixels.
 
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::ron_file::{Bound, Vary};
 use furrow_base::sampling::rng::Stream;
 use rayon::prelude::*;
@@ -46,7 +47,7 @@ impl JpegDesc {
     /// Samples the compression; `None` if it is off.
     pub fn draw(&self, stream: &mut Stream) -> Option<Jpeg> {
         let Self::On { quality, full_color } = self else { return None };
-        Some(Jpeg { quality: quality.draw(stream) as u32, full_color: *full_color })
+        Some(Jpeg { quality: quality.draw(stream).trunc_to::<u32>(), full_color: *full_color })
     }
 }
 
@@ -80,7 +81,7 @@ const COLOR: [[u32; 4]; 4] = [[17, 18, 24, 47], [18, 21, 26, 66], [24, 26, 56, 9
 impl Jpeg {
     /// Compresses and decompresses 8-bit R, G, B values, row by row, in place.
     pub fn pass(&self, rgb: &mut [u8], width: u32) {
-        let width = width as usize;
+        let width = width.to_usize();
         let pixels = rgb.as_chunks_mut::<3>().0;
         let plane = |weights: [f32; 3], zero: f32| {
             let of = |p: &[u8; 3]| (0..3).map(|c| weights[c] * f32::from(p[c])).sum::<f32>() + zero;
@@ -101,14 +102,14 @@ impl Jpeg {
         pixels.par_iter_mut().enumerate().for_each(|(i, pixel)| {
             let (y, b, r) = (luminance.values[i], blue.values[i] - 128.0, red.values[i] - 128.0);
             let color = [y + 1.402 * r, y - 0.344_136 * b - 0.714_136 * r, y + 1.772 * b];
-            *pixel = color.map(|v| v.round().clamp(0.0, 255.0) as u8);
+            *pixel = color.map(|v| v.round().clamp(0.0, 255.0).trunc_to::<u8>());
         });
     }
 
     /// Returns a quantisation table at this quality.
     fn steps(self, base: impl Fn(usize, usize) -> u32) -> Block {
         let scale = if self.quality < 50 { 5000 / self.quality.max(1) } else { 200 - 2 * self.quality.min(100) };
-        let step = |u, v| ((base(u, v) * scale + 50) / 100).clamp(1, 255) as f32;
+        let step = |u, v| ((base(u, v) * scale + 50) / 100).clamp(1, 255).to_f32();
         std::array::from_fn(|v| std::array::from_fn(|u| step(u, v)))
     }
 }
@@ -182,7 +183,7 @@ impl Plane {
 fn cosines() -> Block {
     let cosine = |u: usize, x: usize| {
         let scale = if u == 0 { FRAC_1_SQRT_2 } else { 1.0 };
-        0.5 * scale * ((2 * x + 1) as f32 * u as f32 * PI / 16.0).cos()
+        0.5 * scale * ((2 * x + 1).to_f32() * u.to_f32() * PI / 16.0).cos()
     };
     std::array::from_fn(|u| std::array::from_fn(|x| cosine(u, x)))
 }
@@ -207,21 +208,21 @@ mod tests {
     fn picture() -> Vec<u8> {
         let mut noise = Stream::of(4, 0, Purpose::Test, 0);
         let of = |i: usize| {
-            let (x, y) = ((i % SIZE.0) as f32, (i / SIZE.0) as f32);
+            let (x, y) = ((i % SIZE.0).to_f32(), (i / SIZE.0).to_f32());
             [120.0 + 80.0 * (0.5 * x).sin(), 100.0 + 2.0 * y, if x > 18.0 { 40.0 } else { 140.0 }]
         };
-        (0..SIZE.0 * SIZE.1).flat_map(of).map(|v| (v + noise.range32(-9.0, 9.0)) as u8).collect()
+        (0..SIZE.0 * SIZE.1).flat_map(of).map(|v| (v + noise.range32(-9.0, 9.0)).trunc_to::<u8>()).collect()
     }
 
     fn pass(quality: u32, full_color: bool, rgb: &[u8]) -> Vec<u8> {
         let mut seen = rgb.to_vec();
-        Jpeg { quality, full_color }.pass(&mut seen, SIZE.0 as u32);
+        Jpeg { quality, full_color }.pass(&mut seen, SIZE.0.to_u32());
         seen
     }
 
     fn differ(a: &[u8], b: &[u8]) -> (f64, u8) {
         let all = || a.iter().zip(b).map(|(a, b)| a.abs_diff(*b));
-        (all().map(|d| f64::from(d).powi(2)).sum::<f64>().sqrt() / (a.len() as f64).sqrt(), all().max().unwrap())
+        (all().map(|d| f64::from(d).powi(2)).sum::<f64>().sqrt() / a.len().to_f64().sqrt(), all().max().unwrap())
     }
 
     /// Expected: the same image as an independent encoder and decoder produce, up to the rounding of their integer DCT.
@@ -230,7 +231,7 @@ mod tests {
         let picture = picture();
         for quality in [30, 75, 92] {
             let mut bytes = Vec::new();
-            let (w, h) = (SIZE.0 as u32, SIZE.1 as u32);
+            let (w, h) = (SIZE.0.to_u32(), SIZE.1.to_u32());
             JpegEncoder::new_with_quality(&mut bytes, quality).encode(&picture, w, h, Rgb8).unwrap();
             let theirs = image::load_from_memory(&bytes).unwrap().into_rgb8().into_raw();
             let ours = pass(u32::from(quality), true, &picture);

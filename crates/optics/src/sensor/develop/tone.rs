@@ -61,13 +61,14 @@ fn srgb(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::ToFloat;
 
     #[test]
     fn curves_rise_from_black_to_white() {
         for tone in [Tone::Film, Tone::Srgb, Tone::SCurve, Tone::Gamma(Num::new(2.2)), Tone::Linear] {
             let bytes = [-0.1, 0.0, CLIP, 9.0].map(|x| (tone.apply(x) * 255.0).round());
             assert_eq!(bytes, [0.0, 0.0, 255.0, 255.0], "{tone:?}");
-            let steps: Vec<f32> = (0..=2000).map(|i| tone.apply(i as f32 * CLIP / 2000.0)).collect();
+            let steps: Vec<f32> = (0..=2000).map(|i| tone.apply(i.to_f32() * CLIP / 2000.0)).collect();
             assert!(steps.is_sorted(), "{tone:?}");
         }
         let middle = Tone::Gamma(Num::new(2.0)).apply(0.25);

@@ -1,5 +1,6 @@
 //! Thin lens: its description and its sampled values.
 
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
@@ -26,7 +27,7 @@ impl ApertureDesc {
                  pixel_um: …)",
             ));
         };
-        let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))) as f32;
+        let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))).to_f32();
         Ok(Aperture { radius, focus: self.focus_m.draw32(stream) })
     }
 }

@@ -1,7 +1,7 @@
 //! Camera rays of pixels outside the image, and bounds of a projected triangle.
 
 use super::camera::Camera;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToInt, Vec3};
 
 /// Box in continuous pixel coordinates: its minimum and maximum corners.
 pub type PixelBox = [[f64; 2]; 2];
@@ -67,7 +67,7 @@ impl Camera {
     pub fn ray_beyond(&self, x: i32, y: i32) -> Option<(Vec3, Vec3)> {
         let px = [f64::from(x) + 0.5, f64::from(y) + 0.5];
         let at = self.unproject(px);
-        let inside = x >= 0 && y >= 0 && x < self.width as i32 && y < self.height as i32;
+        let inside = x >= 0 && y >= 0 && x < self.width.to_i32() && y < self.height.to_i32();
         if !inside && !self.distortion.is_none() {
             let back = self.project_still([at[0], at[1], 1.0])?;
             let same = (back[0] - px[0]).abs() < 1e-6 && (back[1] - px[1]).abs() < 1e-6;
@@ -183,7 +183,7 @@ fn distance_from_axis(corners: [[f64; 2]; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::sensor::{Distortion, Pose};
-    use furrow_base::math::vec3;
+    use furrow_base::math::{ToFloat, vec3};
     use furrow_base::sampling::{Purpose, Stream};
 
     const LENSES: [Distortion; 4] = [
@@ -272,7 +272,7 @@ mod tests {
             let camera = camera(lens);
             let at = |x: f64, y: f64| {
                 let [x, y] = camera.unproject([x, y]);
-                let centre = camera.pose.to_world(vec3(x as f32, y as f32, 1.0));
+                let centre = camera.pose.to_world(vec3(x.to_f32(), y.to_f32(), 1.0));
                 camera.position(0.0, 0.0) + centre * 0.8
             };
             let held = |corners: [Vec3; 3]| {
@@ -280,7 +280,7 @@ mod tests {
                 let [lo, hi] = outline.bounds.map(|corner| corner.map(|v| v.clamp(-1e3, 1e3)));
                 let part = |i: i32, axis: usize| lo[axis] + (f64::from(i) + 0.5) / 40.0 * (hi[axis] - lo[axis]);
                 let places = (0..1600).map(|k| [part(k % 40, 0), part(k / 40, 1)]);
-                places.filter(|px| outline.may_hold(*px)).count() as f64 / 1600.0
+                places.filter(|px| outline.may_hold(*px)).count().to_f64() / 1600.0
             };
             let half = held([at(60.0, 40.0), at(100.0, 40.0), at(60.0, 80.0)]);
             let most = if lens.is_none() { 0.53 } else { 0.7 };
@@ -302,14 +302,14 @@ mod tests {
                 for x in -160..320 {
                     let ray = camera.ray_beyond(x, y);
                     if (0..160).contains(&x) && (0..120).contains(&y) {
-                        assert_eq!(ray, Some(camera.centre_ray(x as u32, y as u32)));
+                        assert_eq!(ray, Some(camera.centre_ray(x.to_u32(), y.to_u32())));
                         continue;
                     }
                     let Some((origin, direction)) = ray else { continue };
                     known += 1;
                     let px = camera.project(origin + direction).expect("in front of the lens");
                     assert!(
-                        (px.x - x as f32 - 0.5).abs() < 1e-2 && (px.y - y as f32 - 0.5).abs() < 1e-2,
+                        (px.x - x.to_f32() - 0.5).abs() < 1e-2 && (px.y - y.to_f32() - 0.5).abs() < 1e-2,
                         "{x} {y} {px}"
                     );
                 }

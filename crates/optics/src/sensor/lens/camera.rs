@@ -4,7 +4,7 @@ use super::aperture::Aperture;
 use super::distortion::Distortion;
 use super::motion::Motion;
 use super::pose::Pose;
-use furrow_base::math::{Vec2, Vec3, vec2, vec3};
+use furrow_base::math::{ToFloat, Vec2, Vec3, vec2, vec3};
 use furrow_base::sampling::warp;
 use furrow_base::{Error, Result};
 
@@ -69,7 +69,7 @@ impl Camera {
             self.focal[axis] *= scale;
             self.centre[axis] *= scale;
         }
-        self.scale *= width as f32 / self.width as f32;
+        self.scale *= width.to_f32() / self.width.to_f32();
         self.width = width;
         self.height = height;
         self
@@ -124,7 +124,7 @@ impl Camera {
     pub fn ray_during(&self, px: Vec2, lens_u: [f32; 2], shutter_u: f32) -> (Vec3, Vec3) {
         let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
         let position = self.position(f64::from(px.y), (shutter_u - 0.5) * self.motion.exposure);
-        let through = vec3(x as f32, y as f32, 1.0);
+        let through = vec3(x.to_f32(), y.to_f32(), 1.0);
         let Some(Aperture { radius, focus }) = self.aperture else {
             return (position, self.pose.to_world(through).normalize());
         };
@@ -143,7 +143,7 @@ impl Camera {
     /// Returns the ray through the lens's centre and a point of the plane at unit distance, for row coordinate `row`.
     #[inline]
     pub(super) fn through(&self, [x, y]: [f64; 2], row: f64) -> (Vec3, Vec3) {
-        (self.position(row, 0.0), self.pose.to_world(vec3(x as f32, y as f32, 1.0)).normalize())
+        (self.position(row, 0.0), self.pose.to_world(vec3(x.to_f32(), y.to_f32(), 1.0)).normalize())
     }
 
     /// Returns the point at unit distance along the optical axis, in the camera frame (x/z, y/z), that a pixel sees.
@@ -180,7 +180,7 @@ impl Camera {
     /// with distortion, far outside the image.
     pub fn project(&self, p: Vec3) -> Option<Vec2> {
         let [x, y] = self.project_camera(self.pose.point_to_camera(p))?;
-        Some(vec2(x as f32, y as f32))
+        Some(vec2(x.to_f32(), y.to_f32()))
     }
 
     /// Returns the position of the lens's centre, in world space, while the row at coordinate `row` is exposed.
@@ -190,13 +190,13 @@ impl Camera {
 
     /// Returns `true` if pixel coordinates are inside the image.
     pub fn contains(&self, px: Vec2) -> bool {
-        px.x >= 0.0 && px.y >= 0.0 && px.x < self.width as f32 && px.y < self.height as f32
+        px.x >= 0.0 && px.y >= 0.0 && px.x < self.width.to_f32() && px.y < self.height.to_f32()
     }
 
     /// Returns the angle in radians that a pixel covers at the optical axis. Multiplied by the distance, it is the
     /// footprint of a pixel.
     pub fn pixel_angle(&self) -> f32 {
-        (1.0 / (self.focal[0] * self.focal[1]).sqrt()) as f32
+        (1.0 / (self.focal[0] * self.focal[1]).sqrt()).to_f32()
     }
 
     /// Returns the points of the plane z = `ground` (metres) seen along the image's border, clockwise from the top left
@@ -206,14 +206,14 @@ impl Camera {
         let corners = self.corners();
         let side = |k: usize| {
             let (from, to) = (corners[k], corners[(k + 1) % 4]);
-            (0..points).map(move |i| from + (to - from) * (i as f32 / points as f32))
+            (0..points).map(move |i| from + (to - from) * (i.to_f32() / points.to_f32()))
         };
         (0..4).flat_map(side).map(|px| self.on_ground(px, ground)).collect()
     }
 
     /// Returns the image's corners, clockwise from the top left.
     fn corners(&self) -> [Vec2; 4] {
-        let (w, h) = (self.width as f32, self.height as f32);
+        let (w, h) = (self.width.to_f32(), self.height.to_f32());
         [vec2(0.0, 0.0), vec2(w, 0.0), vec2(w, h), vec2(0.0, h)]
     }
 
@@ -221,7 +221,7 @@ impl Camera {
     /// hit it.
     fn on_ground(&self, px: Vec2, ground: f32) -> Option<Vec2> {
         let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
-        let dir = self.pose.to_world(vec3(x as f32, y as f32, 1.0));
+        let dir = self.pose.to_world(vec3(x.to_f32(), y.to_f32(), 1.0));
         let position = self.position(f64::from(px.y), 0.0);
         let t = (ground - position.z) / dir.z;
         (t.is_finite() && t > 0.0).then(|| (position + dir * t).truncate())
@@ -230,7 +230,7 @@ impl Camera {
     /// Returns the cosine of the angle between the optical axis and a pixel's ray.
     pub fn axis_cosine(&self, px: [f64; 2]) -> f32 {
         let [x, y] = self.unproject(px);
-        (1.0 / (1.0 + x * x + y * y).sqrt()) as f32
+        (1.0 / (1.0 + x * x + y * y).sqrt()).to_f32()
     }
 
     /// Checks that the lens mapping is one-to-one on the image's border and from the centre to it. Returns the r² up to

@@ -8,6 +8,7 @@ use super::intrinsics::{IntrinsicsDesc, middle};
 use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
 use furrow_base::Result;
+use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::ron_file::{Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -90,7 +91,7 @@ macro_rules! cameras {
                         }
                     )*
                     Self::Pinhole { size, intrinsics, pose, distortion, aperture, motion } => {
-                        let size = (size.0.get() as u32, size.1.get() as u32);
+                        let size = (size.0.get().trunc_to::<u32>(), size.1.get().trunc_to::<u32>());
                         let (focal, centre, focal_mm) = intrinsics.draw(size, stream)?;
                         let pose = pose.draw(stream)?;
                         let distortion = distortion.draw(stream);
@@ -246,7 +247,7 @@ impl Named<'_> {
         let distortion = self.distortion.draw(stream);
         let aperture = self
             .f_number
-            .map(|f| Aperture { radius: (focal * 1e-3 / (2.0 * f.draw(stream))) as f32, focus: pose.height() });
+            .map(|f| Aperture { radius: (focal * 1e-3 / (2.0 * f.draw(stream))).to_f32(), focus: pose.height() });
         let pixels = focal * 1e3 / pixel_um;
         let camera = Camera::new(size, [pixels; 2], middle(size), distortion, pose)?;
         Ok(camera.with_aperture(aperture).with_motion(self.motion.draw(readout_ms, stream)))

@@ -10,7 +10,7 @@
 use super::camera::Camera;
 use super::motion::Motion;
 use super::pose::Pose;
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, Vec3};
 
 /// Largest number of secant steps to find the row that sees a point.
 const STEPS: usize = 24;
@@ -79,7 +79,7 @@ impl Camera {
         if !self.motion.moves() {
             return self.pose.position;
         }
-        self.pose.position + self.motion.velocity * (self.time(y) as f32 + after)
+        self.pose.position + self.motion.velocity * (self.time(y).to_f32() + after)
     }
 
     /// Converts a point (x, y, z) of the camera's frame to its frame at another time.

@@ -1,6 +1,6 @@
 //! Motion and shutter of a camera: description and sampled values.
 
-use furrow_base::math::{Vec3, vec3};
+use furrow_base::math::{ToFloat, Vec3, vec3};
 use furrow_base::ron_file::{NonNegative, Signed, Vary};
 use furrow_base::sampling::rng::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ impl MotionDesc {
         let mut stream = stream.child(Purpose::Motion, 0);
         let (speed, heading) = (self.speed_m_s.draw32(&mut stream), self.heading_deg.draw32(&mut stream).to_radians());
         let mut seconds = |of: &Option<Vary<NonNegative<10_000>>>, own: f64| {
-            (of.as_ref().map_or(own, |ms| ms.draw(&mut stream)) * 1e-3) as f32
+            (of.as_ref().map_or(own, |ms| ms.draw(&mut stream)) * 1e-3).to_f32()
         };
         Motion {
             velocity: vec3(heading.sin(), heading.cos(), 0.0) * speed,
@@ -74,7 +74,7 @@ pub struct Motion {
 /// Camera at rest.
 impl Default for Motion {
     fn default() -> Self {
-        Self { velocity: Vec3::ZERO, exposure: EXPOSURE_MS as f32 * 1e-3, readout: 0.0 }
+        Self { velocity: Vec3::ZERO, exposure: EXPOSURE_MS.to_f32() * 1e-3, readout: 0.0 }
     }
 }
 

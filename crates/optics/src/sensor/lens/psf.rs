@@ -4,7 +4,7 @@
 //! their variances add up. Labels are not affected. Beyond the window's edge the outermost pixels are repeated.
 
 use crate::sensor::given::{Given, layered};
-use furrow_base::math::Spectrum;
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt};
 use furrow_base::ron_file::{NonNegative, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use rayon::prelude::*;
@@ -85,10 +85,10 @@ impl Psf {
 
     /// Returns the weights of the pixels at distance 0, 1, … in R, G, B, NIR; their sum along a line is 1.
     fn weights(&self) -> Vec<Spectrum> {
-        let reach = (REACH * self.color.max(self.nir)).ceil().max(1.0) as usize;
+        let reach = (REACH * self.color.max(self.nir)).ceil().max(1.0).trunc_to::<usize>();
         let of = |sigma: f32| -> Vec<f32> {
             let weight = |i: usize| {
-                if sigma > 0.0 { (-0.5 * (i as f32 / sigma).powi(2)).exp() } else { f32::from(u8::from(i == 0)) }
+                if sigma > 0.0 { (-0.5 * (i.to_f32() / sigma).powi(2)).exp() } else { f32::from(u8::from(i == 0)) }
             };
             let all: Vec<f32> = (0..=reach).map(weight).collect();
             let sum = all[0] + 2.0 * all[1..].iter().sum::<f32>();
@@ -100,15 +100,15 @@ impl Psf {
 
     /// Returns the window with red and blue magnified about the image's middle.
     fn shifted(&self, pixels: &[Spectrum], width: u32, corner: (u32, u32), size: (u32, u32)) -> Vec<Spectrum> {
-        let middle = [size.0 as f32 / 2.0, size.1 as f32 / 2.0];
+        let middle = [size.0.to_f32() / 2.0, size.1.to_f32() / 2.0];
         let radius = middle[0].hypot(middle[1]);
         let window = Window::of(pixels, width);
         let moved = |i: usize| {
-            let (x, y) = (i as u32 % width, i as u32 / width);
-            let off = [(corner.0 + x) as f32 + 0.5 - middle[0], (corner.1 + y) as f32 + 0.5 - middle[1]];
+            let (x, y) = (i.to_u32() % width, i.to_u32() / width);
+            let off = [(corner.0 + x).to_f32() + 0.5 - middle[0], (corner.1 + y).to_f32() + 0.5 - middle[1]];
             let seen = |shift: f32| {
                 let scale = shift / (radius + shift);
-                window.between(x as f32 - off[0] * scale, y as f32 - off[1] * scale).to_array()
+                window.between(x.to_f32() - off[0] * scale, y.to_f32() - off[1] * scale).to_array()
             };
             let [_, g, _, nir] = pixels[i].to_array();
             Spectrum::new(seen(self.shift[0])[0], g, seen(self.shift[1])[2], nir)
@@ -127,18 +127,18 @@ struct Window<'a> {
 impl<'a> Window<'a> {
     fn of(pixels: &'a [Spectrum], width: u32) -> Self {
         let width = i64::from(width);
-        Self { pixels, width, height: pixels.len() as i64 / width }
+        Self { pixels, width, height: pixels.len().to_i64() / width }
     }
 
     fn at(&self, x: i64, y: i64) -> Spectrum {
-        self.pixels[(y.clamp(0, self.height - 1) * self.width + x.clamp(0, self.width - 1)) as usize]
+        self.pixels[(y.clamp(0, self.height - 1) * self.width + x.clamp(0, self.width - 1)).to_usize()]
     }
 
     /// Returns the bilinear value at a position between pixels.
     fn between(&self, x: f32, y: f32) -> Spectrum {
         let (i, j) = (x.floor(), y.floor());
-        let row = |j: i64| self.at(i as i64, j).lerp(self.at(i as i64 + 1, j), x - i);
-        row(j as i64).lerp(row(j as i64 + 1), y - j)
+        let row = |j: i64| self.at(i.trunc_to::<i64>(), j).lerp(self.at(i.trunc_to::<i64>() + 1, j), x - i);
+        row(j.trunc_to::<i64>()).lerp(row(j.trunc_to::<i64>() + 1), y - j)
     }
 }
 
@@ -146,7 +146,7 @@ impl<'a> Window<'a> {
 fn along(pixels: &[Spectrum], width: u32, weights: &[Spectrum], dx: i64, dy: i64) -> Vec<Spectrum> {
     let window = Window::of(pixels, width);
     let summed = |i: usize| {
-        let (x, y) = (i as i64 % window.width, i as i64 / window.width);
+        let (x, y) = (i.to_i64() % window.width, i.to_i64() / window.width);
         let mut sum = pixels[i] * weights[0];
         for (k, weight) in (1..).zip(&weights[1..]) {
             sum += (window.at(x - k * dx, y - k * dy) + window.at(x + k * dx, y + k * dy)) * *weight;
@@ -177,7 +177,7 @@ mod tests {
         for (band, sigma) in [(0, 0.8), (2, 0.8), (3, 2.0)] {
             let (mut sum, mut square) = (0.0, 0.0);
             for (i, p) in point.iter().enumerate() {
-                let off = f64::from(i as u32 % SIZE) - 20.0;
+                let off = f64::from(i.to_u32() % SIZE) - 20.0;
                 sum += f64::from(p.to_array()[band]);
                 square += f64::from(p.to_array()[band]) * off * off;
             }
@@ -186,7 +186,7 @@ mod tests {
         }
         let flat = spread(psf, |_, _| Spectrum::splat(0.7));
         assert!(flat.iter().all(|p| (p.mean() - 0.7).abs() < 1e-6));
-        let ramp = |x: u32, _| Spectrum::splat(x as f32);
+        let ramp = |x: u32, _| Spectrum::splat(x.to_f32());
         assert_eq!(spread(Psf::default(), ramp)[7], ramp(7, 0), "no spread requested, no change");
     }
 
@@ -195,8 +195,8 @@ mod tests {
     #[test]
     fn colours_part_towards_the_corners() {
         let psf = Psf { shift: [0.3, -0.2], ..Psf::default() };
-        let seen = spread(psf, |x, _| Spectrum::splat(x as f32));
-        let [r, g, b, nir] = seen[(20 * SIZE + 39) as usize].to_array();
+        let seen = spread(psf, |x, _| Spectrum::splat(x.to_f32()));
+        let [r, g, b, nir] = seen[(20 * SIZE + 39).to_usize()].to_array();
         let share = 19.0 / (20.5 * std::f32::consts::SQRT_2);
         assert_eq!((g, nir), (39.0, 39.0));
         assert!((39.0 - r - 0.3 * share).abs() < 0.01 && (b - 39.0 - 0.2 * share).abs() < 0.01, "{r} {b}");

@@ -1,7 +1,7 @@
 //! Tests of the camera against OpenCV's conventions and for consistency.
 
 use super::*;
-use furrow_base::math::{Vec3, vec2, vec3};
+use furrow_base::math::{ToFloat, Vec3, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 fn build(page: &str) -> Result<Camera, String> {
@@ -31,7 +31,7 @@ fn cameras() -> Vec<Camera> {
 fn a_pixel_projected_back_is_itself() {
     for camera in cameras() {
         let mut s = Stream::of(2, 0, Purpose::Test, 0);
-        let depth_digits = 4.0 * camera.focal[0] as f32 * f32::EPSILON * (1.0 + camera.pose.position.length());
+        let depth_digits = 4.0 * camera.focal[0].to_f32() * f32::EPSILON * (1.0 + camera.pose.position.length());
         for i in 0..2000 {
             let (w, h) = (f64::from(camera.width), f64::from(camera.height));
             let px = match i {
@@ -44,11 +44,11 @@ fn a_pixel_projected_back_is_itself() {
             let back = camera.project_camera([x * z, y * z, z]).unwrap();
             assert!((back[0] - px[0]).abs() < 1e-4 && (back[1] - px[1]).abs() < 1e-4, "{px:?} {back:?}");
 
-            let px = vec2(px[0] as f32, px[1] as f32);
+            let px = vec2(px[0].to_f32(), px[1].to_f32());
             let (origin, dir) = camera.ray(px, [0.3, 0.7]);
             assert!((dir.length() - 1.0).abs() < 1e-6);
-            let back = camera.project(origin + dir * z as f32).unwrap();
-            assert!((back - px).length() < depth_digits / z.min(1.0) as f32 + 1e-4, "{px} {back}");
+            let back = camera.project(origin + dir * z.to_f32()).unwrap();
+            assert!((back - px).length() < depth_digits / z.min(1.0).to_f32() + 1e-4, "{px} {back}");
         }
     }
 }
@@ -111,8 +111,8 @@ fn the_outline_on_the_ground_is_the_images_border() {
         let px = camera.project(at.extend(0.0)).unwrap();
         let (x, y) = [(0, 0), (200, 0), (200, 150), (0, 150)][k / 8];
         let (to_x, to_y) = [(200, 0), (200, 150), (0, 150), (0, 0)][k / 8];
-        let part = (k % 8) as f32 / 8.0;
-        let border = vec2(x as f32 + part * (to_x - x) as f32, y as f32 + part * (to_y - y) as f32);
+        let part = (k % 8).to_f32() / 8.0;
+        let border = vec2(x.to_f32() + part * (to_x - x).to_f32(), y.to_f32() + part * (to_y - y).to_f32());
         assert!(px.distance(border) < 0.01, "{k}: {px} for {border}");
     }
 }
@@ -122,7 +122,8 @@ fn another_size_keeps_the_field_of_view() {
     for camera in cameras() {
         let small = camera.with_size(camera.width() / 4, camera.height() / 2);
         for share in [[0.0, 0.0], [0.3, 0.9], [1.0, 1.0]] {
-            let dir = |c: &Camera| c.ray(vec2(share[0] * c.width() as f32, share[1] * c.height() as f32), [0.5; 2]).1;
+            let dir =
+                |c: &Camera| c.ray(vec2(share[0] * c.width().to_f32(), share[1] * c.height().to_f32()), [0.5; 2]).1;
             assert!((dir(&camera) - dir(&small)).length() < 1e-6);
         }
     }

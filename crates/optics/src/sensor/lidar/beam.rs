@@ -6,7 +6,7 @@
 //! Gaussian beam, Siegman 1986, "Lasers", chapter 17.
 
 use super::{Lidar, Pulse};
-use furrow_base::math::Vec3;
+use furrow_base::math::{ToFloat, ToInt, Vec3};
 
 /// Number of rays on each ring.
 const RINGS: [u32; 3] = [1, 6, 12];
@@ -34,17 +34,17 @@ impl Lidar {
             return vec![axis];
         }
         let energy = |rho: f64| 1.0 - (-2.0 * rho * rho).exp();
-        let edge = |ring: usize| STEP * (ring as f64 + 0.5);
-        let mut rays = Vec::with_capacity(RINGS.iter().sum::<u32>() as usize);
+        let edge = |ring: usize| STEP * (ring.to_f64() + 0.5);
+        let mut rays = Vec::with_capacity(RINGS.iter().sum::<u32>().to_usize());
         for (ring, count) in RINGS.into_iter().enumerate() {
             let inner = if ring == 0 { 0.0 } else { energy(edge(ring - 1)) };
             let share = (energy(edge(ring)) - inner) / energy(1.0) / f64::from(count);
-            let rho = (STEP * ring as f64) as f32;
+            let rho = (STEP * ring.to_f64()).to_f32();
             for k in 0..count {
-                let angle = std::f32::consts::TAU * k as f32 / count as f32;
+                let angle = std::f32::consts::TAU * k.to_f32() / count.to_f32();
                 let off = pulse.across[0] * (rho * angle.cos()) + pulse.across[1] * (rho * angle.sin());
                 rays.push(BeamRay {
-                    share: share as f32,
+                    share: share.to_f32(),
                     origin: pulse.origin + off * (0.5 * self.exit),
                     direction: (pulse.direction + off * (0.5 * self.divergence)).normalize(),
                 });
@@ -56,7 +56,7 @@ impl Lidar {
     /// Returns the spacing of a pulse's rays at a distance, metres. It determines the geometric detail needed there and
     /// the texture footprint of a ray.
     pub fn spacing(&self, distance: f32) -> f32 {
-        (0.5 * STEP as f32 * (self.exit + self.divergence * distance)).max(FINEST)
+        (0.5 * STEP.to_f32() * (self.exit + self.divergence * distance)).max(FINEST)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{HALF_LIGHT_M_NS, Lidar, Returns};
 use crate::sensor::given::{Given, layered};
-use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::math::{Mat3, RoundTo, ToFloat, Vec3, vec3};
 use furrow_base::ron_file::{Elevation, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
 use furrow_base::{Error, Result};
@@ -126,7 +126,7 @@ impl BeamsDesc {
         match self {
             Self::Angles(all) => all.iter().map(|angle| angle.get()).collect(),
             Self::Fan { count, from_deg, to_deg } => {
-                let (last, from, to) = (count.get() as u32 - 1, from_deg.get(), to_deg.get());
+                let (last, from, to) = (count.get().trunc_to::<u32>() - 1, from_deg.get(), to_deg.get());
                 if last == 0 {
                     return vec![0.5 * (from + to)];
                 }
@@ -139,7 +139,7 @@ impl BeamsDesc {
     fn count(&self) -> usize {
         match self {
             Self::Angles(all) => all.len(),
-            Self::Fan { count, .. } => count.get() as usize,
+            Self::Fan { count, .. } => count.get().trunc_to::<usize>(),
         }
     }
 }
@@ -179,12 +179,12 @@ impl LidarDesc {
         let rotation_hz = self.rotation_hz.get();
         let step_deg = match self.pulses {
             PulsesDesc::StepDeg(step) => step.get(),
-            PulsesDesc::PerSecond(rate) => 360.0 * rotation_hz * elevations_deg.len() as f64 / rate.get(),
+            PulsesDesc::PerSecond(rate) => 360.0 * rotation_hz * elevations_deg.len().to_f64() / rate.get(),
         };
         // The end of a full turn is its start; rounding must not add a column.
         let columns = ((to - from) / step_deg - 1e-6).ceil().max(1.0);
-        if columns * elevations_deg.len() as f64 > MOST_PULSES {
-            let words = format!("{:.0} pulses in a turn are too many", columns * elevations_deg.len() as f64);
+        if columns * elevations_deg.len().to_f64() > MOST_PULSES {
+            let words = format!("{:.0} pulses in a turn are too many", columns * elevations_deg.len().to_f64());
             return Err(Error::input(words)
                 .help(format!("at most {MOST_PULSES:.0}: use fewer beams or a larger step in `pulses`")));
         }
@@ -200,14 +200,14 @@ impl LidarDesc {
             elevations_deg,
             first_deg: from,
             step_deg,
-            columns: columns as u32,
+            columns: columns.trunc_to::<u32>(),
             rotation_hz,
-            divergence: (1e-3 * self.divergence_mrad.get()) as f32,
-            exit: (1e-3 * self.exit_mm.get()) as f32,
+            divergence: (1e-3 * self.divergence_mrad.get()).to_f32(),
+            exit: (1e-3 * self.exit_mm.get()).to_f32(),
             noise: self.range_noise_m.get(),
-            range: [near as f32, far as f32],
+            range: [near.to_f32(), far.to_f32()],
             least: self.min_intensity.f32(),
-            separation: (HALF_LIGHT_M_NS * self.pulse_ns.get()) as f32,
+            separation: (HALF_LIGHT_M_NS * self.pulse_ns.get()).to_f32(),
             returns: self.returns,
         })
     }

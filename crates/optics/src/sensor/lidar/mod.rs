@@ -15,7 +15,7 @@ mod desc;
 mod preset;
 mod returns;
 
-use furrow_base::math::{Mat3, Vec3, vec3};
+use furrow_base::math::{Mat3, ToFloat, ToInt, Vec3, vec3};
 
 pub use beam::BeamRay;
 pub use desc::{BeamsDesc, LidarDesc, PulsesDesc};
@@ -82,20 +82,20 @@ impl Lidar {
 
     /// Returns the number of beams.
     pub fn beams(&self) -> u16 {
-        self.elevations_deg.len() as u16
+        self.elevations_deg.len().to_u16()
     }
 
     /// Returns the pulse of a beam in a column.
     pub fn pulse(&self, column: u32, beam: u16) -> Pulse {
         let turned = self.step_deg * f64::from(column);
         let azimuth_deg = self.first_deg + turned;
-        let time_s = (turned / (360.0 * self.rotation_hz)) as f32;
+        let time_s = (turned / (360.0 * self.rotation_hz)).to_f32();
         let (sa, ca) = azimuth_deg.to_radians().sin_cos();
         let (se, ce) = self.elevations_deg[usize::from(beam)].to_radians().sin_cos();
-        let world = |x: f64, y: f64, z: f64| self.axes * vec3(x as f32, y as f32, z as f32);
+        let world = |x: f64, y: f64, z: f64| self.axes * vec3(x.to_f32(), y.to_f32(), z.to_f32());
         Pulse {
             beam,
-            azimuth_deg: azimuth_deg as f32,
+            azimuth_deg: azimuth_deg.to_f32(),
             time_s,
             origin: self.position + self.velocity * time_s,
             direction: world(ce * sa, ce * ca, se).normalize(),

@@ -1,6 +1,6 @@
 //! Scalar images, strokes in them, and distance transforms.
 
-use furrow_base::math::Vec2;
+use furrow_base::math::{RoundTo, ToFloat, Vec2};
 
 /// One f32 per pixel, row by row, top first.
 #[derive(Clone, Debug)]
@@ -22,12 +22,12 @@ impl Canvas {
         const THINNEST: f32 = 0.45;
         let reach = 2.0 * ra.max(rb).max(THINNEST) + 1.0;
         let (lo, hi) = (a.min(b) - reach, a.max(b) + reach);
-        let clip = |v: f32, n: usize| (v.max(0.0) as usize).min(n);
+        let clip = |v: f32, n: usize| v.max(0.0).trunc_to::<usize>().min(n);
         let along = b - a;
         let length2 = along.length_squared().max(1e-12);
         for y in clip(lo.y, self.height)..clip(hi.y + 1.0, self.height) {
             for x in clip(lo.x, self.width)..clip(hi.x + 1.0, self.width) {
-                let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let p = Vec2::new(x.to_f32() + 0.5, y.to_f32() + 0.5);
                 let s = ((p - a).dot(along) / length2).clamp(0.0, 1.0);
                 let radius = ra + (rb - ra) * s;
                 let shown = radius.max(THINNEST);
@@ -76,11 +76,11 @@ fn lower_envelope(f: &[f32]) -> Vec<f32> {
     let mut k = 0;
     from[0] = f64::NEG_INFINITY;
     from[1] = f64::INFINITY;
-    let value = |q: usize| f64::from(f[q]) + (q * q) as f64;
+    let value = |q: usize| f64::from(f[q]) + (q * q).to_f64();
     for q in 1..n {
         loop {
             let p = parabola[k];
-            let s = (value(q) - value(p)) / (2.0 * (q as f64 - p as f64));
+            let s = (value(q) - value(p)) / (2.0 * (q.to_f64() - p.to_f64()));
             if s <= from[k] && k > 0 {
                 k -= 1;
                 continue;
@@ -95,11 +95,11 @@ fn lower_envelope(f: &[f32]) -> Vec<f32> {
     let mut k = 0;
     (0..n)
         .map(|q| {
-            while from[k + 1] < q as f64 {
+            while from[k + 1] < q.to_f64() {
                 k += 1;
             }
-            let d = q as f64 - parabola[k] as f64;
-            (d * d + f64::from(f[parabola[k]])) as f32
+            let d = q.to_f64() - parabola[k].to_f64();
+            (d * d + f64::from(f[parabola[k]])).to_f32()
         })
         .collect()
 }
@@ -120,7 +120,7 @@ mod tests {
             for x in 0..31 {
                 let truth = marks
                     .iter()
-                    .map(|(a, b)| (x as f32 - *a as f32).hypot(y as f32 - *b as f32))
+                    .map(|(a, b)| (x.to_f32() - a.to_f32()).hypot(y.to_f32() - b.to_f32()))
                     .fold(f32::MAX, f32::min);
                 assert!((d.values[y * 31 + x] - truth).abs() < 1e-3, "{x} {y}");
             }

@@ -1,7 +1,7 @@
 //! Periodic cellular noise for the areoles of a leaf and the plates of a crust. Source: Worley 1996; borders are exact,
 //! computed as those of the Voronoi cells of the jittered points.
 
-use furrow_base::math::{Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
 use furrow_base::sampling::rng::mix;
 
 /// Largest number of cells along one axis. More would exceed the precision of their coordinates, and no image could
@@ -30,17 +30,17 @@ pub(super) struct Cell {
 }
 
 pub(super) fn unit(hash: u64) -> f32 {
-    (hash >> 40) as f32 / (1u64 << 24) as f32
+    (hash >> 40).to_f32() / (1u64 << 24).to_f32()
 }
 
 impl Cells {
     pub(super) fn new(seed: u64, period: (u32, u32), jitter: f32) -> Self {
-        Self { seed: mix(seed), period: (period.0.max(1) as i32, period.1.max(1) as i32), jitter }
+        Self { seed: mix(seed), period: (period.0.max(1).to_i32(), period.1.max(1).to_i32()), jitter }
     }
 
     fn hash(&self, x: i32, y: i32) -> u64 {
         // A division is needed only for squares outside the period.
-        let wrap = |i: i32, n: i32| if (0..n).contains(&i) { i } else { i.rem_euclid(n) } as u64;
+        let wrap = |i: i32, n: i32| (if (0..n).contains(&i) { i } else { i.rem_euclid(n) }).to_u64();
         let (x, y) = (wrap(x, self.period.0), wrap(y, self.period.1));
         mix(self.seed ^ (x << 32 | y))
     }
@@ -48,12 +48,12 @@ impl Cells {
     fn point(&self, x: i32, y: i32) -> (Vec2, u64) {
         let h = self.hash(x, y);
         let away = vec2(unit(h), unit(h << 24)) - 0.5;
-        (vec2(x as f32 + 0.5, y as f32 + 0.5) + away * self.jitter, h)
+        (vec2(x.to_f32() + 0.5, y.to_f32() + 0.5) + away * self.jitter, h)
     }
 
     /// Evaluates the noise at `p`, in squares.
     pub(super) fn at(&self, p: Vec2) -> Cell {
-        let (cx, cy) = (p.x.floor() as i32, p.y.floor() as i32);
+        let (cx, cy) = (p.x.floor_to::<i32>(), p.y.floor_to::<i32>());
         let (mut best, mut centre, mut own, mut square) = (f32::MAX, Vec2::ZERO, 0, (cx, cy));
         for y in cy - 1..=cy + 1 {
             for x in cx - 1..=cx + 1 {

@@ -6,7 +6,7 @@
 use super::cells::Cells;
 use super::stamp::Stamp;
 use super::tile::Tile;
-use furrow_base::math::{Vec2, lerp, smoothstep, vec2, vec3};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, lerp, smoothstep, vec2, vec3};
 use furrow_base::sampling::rng::Purpose;
 
 /// Fragments: fraction of the ground that they would cover if they also lay on plates, and their smallest and largest
@@ -22,7 +22,7 @@ impl Tile {
         let size = (self.size, self.size);
         let wrap = crate::texture::Wrap::Repeat;
         let soften = |t: &Self, mm: f32| {
-            let radius = (mm * t.scale).round().max(1.0) as usize;
+            let radius = (mm * t.scale).round().max(1.0).trunc_to::<usize>();
             crate::texture::maps::blur(&crate::texture::maps::blur(&t.height, size, radius, wrap), size, radius, wrap)
         };
         let (soft, broad) = (soften(self, 1.0), soften(self, 9.0));
@@ -50,7 +50,12 @@ impl Tile {
         let layers =
             [(plate, 1.0, 0.0), (plate / 2.9, 0.3, 0.75), (plate / 6.0, 0.11, 0.8)].map(|(mm, width, missing)| {
                 let n = (self.period_mm / mm).round().max(1.0);
-                (Cells::new(seed + mm as u64, (n as u32, n as u32), 0.9), n, width, missing)
+                (
+                    Cells::new(seed + mm.trunc_to::<u64>(), (n.trunc_to::<u32>(), n.trunc_to::<u32>()), 0.9),
+                    n,
+                    width,
+                    missing,
+                )
             });
         let mut near = vec![0.0; self.height.len()];
         self.each(|t, x, y, i| {
@@ -108,11 +113,12 @@ impl Tile {
             let dome = 0.5 * l * s.range32(0.6, 1.0);
             let sunk = dome * s.range32(0.15, 0.5);
             let axes = (vec2(0.5, 0.5 * s.range32(0.5, 0.95)) * l * self.scale).max(Vec2::splat(0.7));
-            let bright = (1.3 * f64::from(self.spread) * s.normal()).exp() as f32;
-            let warm = s.normal() as f32;
+            let bright = (1.3 * f64::from(self.spread) * s.normal()).exp().to_f32();
+            let warm = s.normal().to_f32();
             let mut stamp = Stamp::new(centre, axes, 0.0, dome, s.range32(0.6, 1.0), &mut s);
             let patch = 0.35 * smoothstep(-0.1, 0.4, self.noise(centre.x, centre.y, 35.0, 3, 40));
-            let i = (centre.y as usize).min(self.size - 1) * self.size + (centre.x as usize).min(self.size - 1);
+            let i = centre.y.trunc_to::<usize>().min(self.size - 1) * self.size
+                + centre.x.trunc_to::<usize>().min(self.size - 1);
             if s.uniform32() > 0.02 + 0.6 * patch + 0.7 * near[i] {
                 continue;
             }

@@ -1,5 +1,7 @@
 //! Generated texture image.
 
+use furrow_base::math::RoundTo;
+
 /// Generated texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneratedTexture {
@@ -32,7 +34,7 @@ impl HeightImage {
     /// Quantises heights in mm, clamped to 0..=`range_mm`. Only twelve bits are kept, because finer steps are noise
     /// that does not compress.
     pub(super) fn from_mm(width: u32, height: u32, heights: &[f32], range_mm: f32) -> Self {
-        let code = |h: &f32| (((h / range_mm).clamp(0.0, 1.0) * 4095.0 + 0.5) as u16) * 16;
+        let code = |h: &f32| ((h / range_mm).clamp(0.0, 1.0) * 4095.0 + 0.5).trunc_to::<u16>() * 16;
         Self { width, height, values: heights.iter().map(code).collect(), range_mm: range_mm * 65535.0 / 65520.0 }
     }
 }

@@ -17,7 +17,7 @@ use crate::texture::noise::Tiling;
 use crate::texture::srgb::ColorSpace;
 use furrow_base::error::{Error, Result};
 use furrow_base::geometry::outline::{MARGIN, Outline};
-use furrow_base::math::{Vec2, Vec3, lerp, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, lerp, smoothstep, vec2};
 use furrow_base::ron_file::Num;
 use furrow_base::sampling::rng::{Purpose, Stream};
 
@@ -31,8 +31,8 @@ pub(super) fn draw(recipe: &LeafRecipe) -> Result<GeneratedTexture> {
     {
         return Err(Error::input(format!("outline Power(a: {a}, b: {b}): both must be above 0 and below 20")));
     }
-    let height = recipe.size.get() as usize;
-    let width = (height as f64 * recipe.aspect.get()).round().max(1.0) as usize;
+    let height = recipe.size.get().trunc_to::<usize>();
+    let width = (height.to_f64() * recipe.aspect.get()).round().max(1.0).trunc_to::<usize>();
     if height.max(width) > 4096 {
         return Err(Error::input(format!("a leaf of {width} × {height} pixels: at most 4096 are supported")));
     }
@@ -88,11 +88,11 @@ struct LeafPainter<'a> {
 
 impl<'a> LeafPainter<'a> {
     fn new(recipe: &'a LeafRecipe, width: usize, height: usize) -> Self {
-        let seed = recipe.seed.get() as u64;
+        let seed = recipe.seed.get().trunc_to::<u64>();
         let stream = Stream::of(seed, 0, Purpose::Texture, 0);
         let notch = recipe.notch.map_or(0.0, Num::f32);
         let shape = Shape::new(recipe.outline, recipe.aspect, recipe.margin, notch, seed).with_sinus(recipe.sinus);
-        let scale = height as f32 / (1.0 + 2.0 * MARGIN);
+        let scale = height.to_f32() / (1.0 + 2.0 * MARGIN);
 
         let segments = veins::grow(&recipe.veins, &shape, recipe.aspect.f32(), recipe.margin, &stream);
         let mut painter = Self {
@@ -109,7 +109,7 @@ impl<'a> LeafPainter<'a> {
         let mut outside = Canvas::new(width, height, 0.0);
         for y in 0..height {
             for x in 0..width {
-                let p = painter.place(x as f32 + 0.5, y as f32 + 0.5);
+                let p = painter.place(x.to_f32() + 0.5, y.to_f32() + 0.5);
                 outside.values[y * width + x] = f32::from(u8::from(painter.shape.inside(p) < 0.0));
             }
         }
@@ -121,12 +121,12 @@ impl<'a> LeafPainter<'a> {
 
     /// Converts an image position (pixels) to leaf coordinates (leaf lengths).
     fn place(&self, x: f32, y: f32) -> Vec2 {
-        vec2((x - 0.5 * self.width as f32) / self.scale, (self.height as f32 - y) / self.scale - MARGIN)
+        vec2((x - 0.5 * self.width.to_f32()) / self.scale, (self.height.to_f32() - y) / self.scale - MARGIN)
     }
 
     fn ink(&mut self, segments: &[Segment]) {
         let pixel = |p: Vec2| {
-            vec2(p.x * self.scale + 0.5 * self.width as f32, self.height as f32 - (p.y + MARGIN) * self.scale)
+            vec2(p.x * self.scale + 0.5 * self.width.to_f32(), self.height.to_f32() - (p.y + MARGIN) * self.scale)
         };
         for g in segments {
             let canvas = &mut self.veins[usize::from(g.order) - 1];
@@ -166,7 +166,7 @@ impl<'a> LeafPainter<'a> {
                 if alpha == 0 {
                     continue;
                 }
-                let p = self.place(x as f32 + 0.5, y as f32 + 0.5);
+                let p = self.place(x.to_f32() + 0.5, y.to_f32() + 0.5);
                 let veins = [self.veins[0].values[i], self.veins[1].values[i], self.veins[2].values[i]];
                 let tissue = look.at(p, veins, self.to_margin.values[i], &self.shape);
                 let green = optics.with_chlorophyll(base * tissue.chlorophyll).reflectance.0.truncate();
@@ -181,7 +181,7 @@ impl<'a> LeafPainter<'a> {
             }
         }
         let relief = r.relief.map(|relief| self.relief(&relief));
-        GeneratedTexture { width: width as u32, height: height as u32, rgba, opaque: false, relief }
+        GeneratedTexture { width: width.to_u32(), height: height.to_u32(), rgba, opaque: false, relief }
     }
 
     /// Returns the opacity of each pixel, 0..255: the fraction of sixteen sample points inside the leaf. For an entire
@@ -191,14 +191,14 @@ impl<'a> LeafPainter<'a> {
         let pixel = 1.0 / self.scale;
         let mut cover = Canvas::new(self.width, self.height, 0.0);
         for (i, v) in cover.values.iter_mut().enumerate() {
-            let (x, y) = ((i % self.width) as f32, (i / self.width) as f32);
+            let (x, y) = ((i % self.width).to_f32(), (i / self.width).to_f32());
             let centre = self.shape.inside(self.place(x + 0.5, y + 0.5));
             *v = if centre.abs() > 6.0 * pixel {
                 f32::from(u8::from(centre > 0.0))
             } else {
-                let at = |k: usize| (k as f32 + 0.5) / 4.0;
+                let at = |k: usize| (k.to_f32() + 0.5) / 4.0;
                 let inside = |k: usize| self.shape.inside(self.place(x + at(k % 4), y + at(k / 4))) > 0.0;
-                (0..16).filter(|k| inside(*k)).count() as f32 / 16.0
+                (0..16).filter(|k| inside(*k)).count().to_f32() / 16.0
             };
         }
         if matches!(self.recipe.margin, Margin::Entire) && self.recipe.notch.is_none() && self.recipe.sinus.is_none() {
@@ -207,7 +207,7 @@ impl<'a> LeafPainter<'a> {
                 *v = v.max((2.7 - d).clamp(0.0, 1.0));
             }
         }
-        cover.values.iter().map(|v| (v * 255.0 + 0.5) as u8).collect()
+        cover.values.iter().map(|v| (v * 255.0 + 0.5).trunc_to::<u8>()).collect()
     }
 
     /// Computes the heights at half the image's size, because relief is smoother than colour.
@@ -228,9 +228,9 @@ impl<'a> LeafPainter<'a> {
         };
         let unit = self.scale / 700.0;
         let furrows = [
-            widened(0, (4.0 * unit).round() as usize),
-            widened(1, (3.0 * unit).round() as usize),
-            widened(2, (2.0 * unit).round() as usize),
+            widened(0, (4.0 * unit).round_to::<usize>()),
+            widened(1, (3.0 * unit).round_to::<usize>()),
+            widened(2, (2.0 * unit).round_to::<usize>()),
         ];
         let noise = Tiling::new(self.stream.clone().seed32().into());
         let cells = Cells::new(u64::from(self.stream.clone().seed32()) + 5, (8192, 8192), 0.8);
@@ -239,7 +239,7 @@ impl<'a> LeafPainter<'a> {
         for y in 0..height {
             for x in 0..width {
                 let i = (y * 2).min(self.height - 1) * self.width + (x * 2).min(self.width - 1);
-                let p = self.place(x as f32 * 2.0 + 0.5, y as f32 * 2.0 + 0.5);
+                let p = self.place(x.to_f32() * 2.0 + 0.5, y.to_f32() * 2.0 + 0.5);
                 let away = to_vein.values[i].min(1e4) * mm / self.recipe.length_mm.f32();
                 // The blade rises from the veins and flattens within a thirtieth of a leaf length. It also has
                 // blisters, about a dozen along the leaf.
@@ -256,6 +256,6 @@ impl<'a> LeafPainter<'a> {
                 heights.push(h + furrow);
             }
         }
-        HeightImage::from_mm(width as u32, height as u32, &heights, relief.range_mm.f32())
+        HeightImage::from_mm(width.to_u32(), height.to_u32(), &heights, relief.range_mm.f32())
     }
 }

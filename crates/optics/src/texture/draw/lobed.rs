@@ -6,7 +6,7 @@
 use super::cells::{smooth_max, unit};
 use super::teeth::Teeth;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Vec2, lerp, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, lerp, vec2};
 use furrow_base::ron_file::{Bound, Count, Fraction, Num, PositiveCount};
 use furrow_base::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
@@ -81,19 +81,19 @@ impl Lobes {
     pub(super) fn new(plan: &Lobed, outline: Outline, aspect: f32, seed: u64) -> Self {
         let random = |i: u64, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i)) - 0.5;
         let (pairs, pointed) = (plan.pairs.f32(), plan.pointed.f32());
-        let teeth = (plan.teeth.0.get().min(MOST_TEETH) as usize, plan.teeth.1.f32());
+        let teeth = (plan.teeth.0.get().min(MOST_TEETH).trunc_to::<usize>(), plan.teeth.1.f32());
         let terminal = plan.terminal.f32();
         let top = 1.0 - terminal;
         let place = |u: f32| top * lerp(BARE, 1.0, 1.0 - (1.0 - u.clamp(0.0, 1.0)).powf(CROWDING));
         let mut lobes = Vec::new();
-        for i in 0..pairs as u64 {
+        for i in 0..pairs.trunc_to::<u64>() {
             for (side, k) in [(-1.0_f32, 0), (1.0, 10)] {
-                let even = i as f32 / pairs;
+                let even = i.to_f32() / pairs;
                 let share = even + (0.5 + 0.1 * side + 0.3 * random(i, k + 2)) / pairs;
                 let pitch = place(even + 1.0 / pairs) - place(even);
                 let y = place(share);
                 let lean = plan.lean_deg.f32() * (1.0 + 0.35 * random(i, k + 3)) * lerp(0.75, 1.3, share);
-                let axis = Vec2::from_angle(lean.min(Lean::MAX as f32).to_radians()) * vec2(side, 1.0);
+                let axis = Vec2::from_angle(lean.min(Lean::MAX.to_f32()).to_radians()) * vec2(side, 1.0);
                 let room = reach(vec2(0.0, y), axis, outline, aspect);
                 let length = (room * (1.0 - 0.3 * (random(i, k + 4) + 0.5))).max(1e-3);
                 let half_width = (0.5 * pitch * (1.0 + 0.35 * random(i, k + 5))).min(0.5 * length);
@@ -140,11 +140,11 @@ impl Lobes {
 fn reach(from: Vec2, axis: Vec2, outline: Outline, aspect: f32) -> f32 {
     let far = 0.9 * aspect.max(0.1) / axis.x.abs().max(0.1);
     let within = |step: &u32| {
-        let p = from + axis * (far * *step as f32 / STEPS as f32);
+        let p = from + axis * (far * step.to_f32() / STEPS.to_f32());
         p.x.abs() < 0.97 * aspect * outline.half_width(p.y.min(1.0))
     };
     let steps = (0..=STEPS).rev().find(within).unwrap_or(0);
-    far * steps as f32 / STEPS as f32
+    far * steps.to_f32() / STEPS.to_f32()
 }
 
 impl Lobe {
@@ -180,9 +180,9 @@ fn toothed((count, depth): (usize, f32), random: impl Fn(u64) -> f32) -> Teeth {
         return Teeth::default();
     }
     let sinus = |j: usize| {
-        let shift = if (1..count).contains(&j) { 0.5 * random(j as u64) } else { 0.0 };
-        let deep = depth * (0.55 + 0.9 * (random(50 + j as u64) + 0.5));
-        (lerp(0.22, 0.97, (j as f32 + shift) / count as f32), deep)
+        let shift = if (1..count).contains(&j) { 0.5 * random(j.to_u64()) } else { 0.0 };
+        let deep = depth * (0.55 + 0.9 * (random(50 + j.to_u64()) + 0.5));
+        (lerp(0.22, 0.97, (j.to_f32() + shift) / count.to_f32()), deep)
     };
     Teeth { sinuses: (0..=count).map(sinus).collect(), fades: [(0.12, 0.3), (0.8, 1.0)] }
 }

@@ -5,7 +5,7 @@
 
 use super::cells::{smooth_max, unit};
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Vec2, lerp, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, lerp, smoothstep, vec2};
 use furrow_base::ron_file::{Fraction, NonNegative, Num, Positive};
 use furrow_base::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
@@ -75,18 +75,18 @@ impl Silhouette {
         let half = 0.5 * aspect;
         let terminal = plan.terminal.f32().max(LEAST);
         let foot = 1.0 - terminal;
-        let pairs = plan.pairs.f32() as u64;
-        let pitch = 0.9 * foot / pairs.max(1) as f32;
+        let pairs = plan.pairs.f32().trunc_to::<u64>();
+        let pitch = 0.9 * foot / pairs.max(1).to_f32();
         let pointed = plan.pointed.map_or(0.0, Num::f32);
         let (mut lobes, mut lobe_teeth) = (Vec::new(), Vec::new());
         for i in 0..pairs {
             for (k, side) in [-1.0_f32, 1.0].into_iter().enumerate() {
-                let k = 10 * k as u64;
+                let k = 10 * k.to_u64();
                 if random(i, k + 1) < -0.35 {
                     continue;
                 }
-                let share = (i as f32 + 0.75) / pairs as f32;
-                let y = 0.1 * foot + pitch * (i as f32 + 0.6 + 0.5 * random(i, k + 2));
+                let share = (i.to_f32() + 0.75) / pairs.to_f32();
+                let y = 0.1 * foot + pitch * (i.to_f32() + 0.6 + 0.5 * random(i, k + 2));
                 let long = half * plan.lobe.f32() * lerp(0.35, 1.0, share) * (1.0 + 0.6 * random(i, k + 3));
                 let lean = 0.32 + 0.5 * random(i, k + 4) + TURN * pointed;
                 let thick = (0.46 * pitch * (1.0 + 0.4 * random(i, k + 5))).min(0.5 * long);
@@ -97,24 +97,24 @@ impl Silhouette {
                 let wide = lerp(1.1, 0.6, pointed) * thick;
                 let lobe = Lobe { foot, end, radius: (wide, blunt), full: 1.2 * pointed };
                 if let Some((count, length)) = plan.lobe_teeth {
-                    lobe.toothed(count.get().min(MOST_TEETH) as u64, length.f32(), &mut lobe_teeth, |j| {
+                    lobe.toothed(count.get().min(MOST_TEETH).trunc_to::<u64>(), length.f32(), &mut lobe_teeth, |j| {
                         random(20 * i + j, 60 + k)
                     });
                 }
                 lobes.push(lobe);
             }
         }
-        let count = plan.teeth.0.f32().min(200.0) as u64;
+        let count = plan.teeth.0.f32().min(200.0).trunc_to::<u64>();
         let sinuses = [0_u64, 1].map(|side| {
             (0..count)
                 .map(|i| {
-                    let place = lerp(0.08, 0.94, (i as f32 + 0.5 + 0.75 * random(i, 30 + side)) / count as f32);
+                    let place = lerp(0.08, 0.94, (i.to_f32() + 0.5 + 0.75 * random(i, 30 + side)) / count.to_f32());
                     let deep = (random(i, 32 + side) + 0.62).max(0.12) * plan.teeth.1.f32();
-                    (place, deep, 0.3 / count as f32 * (1.0 + 0.8 * random(i, 34 + side)))
+                    (place, deep, 0.3 / count.to_f32() * (1.0 + 0.8 * random(i, 34 + side)))
                 })
                 .collect()
         });
-        let waves = [40, 50].map(|k| std::array::from_fn(|i| random(i as u64, k)));
+        let waves = [40, 50].map(|k| std::array::from_fn(|i| random(i.to_u64(), k)));
         let (a, b) = (plan.outline.0.f32(), plan.outline.1.f32());
         Self {
             terminal,
@@ -222,7 +222,7 @@ impl Lobe {
         for j in 0..2 * count {
             let side = if j % 2 == 0 { -1.0 } else { 1.0 };
             // Between the end of the midrib's wing and the end of the lobe.
-            let s = lerp(0.35, 0.8, ((j / 2) as f32 + 0.5 + 0.5 * random(2 * j)) / count as f32);
+            let s = lerp(0.35, 0.8, ((j / 2).to_f32() + 0.5 + 0.5 * random(2 * j)) / count.to_f32());
             let long = length * axis.length() * (1.0 + 0.8 * random(2 * j + 1));
             let foot = self.foot + axis * s;
             let end = foot + (ahead * 0.7 + out * (side * 0.7)) * (self.half_width(s) + long);

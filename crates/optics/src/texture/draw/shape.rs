@@ -7,7 +7,7 @@ use super::lobed::{Lobed, Lobes};
 use super::lyrate::{Lyrate, Silhouette};
 use super::teeth::Teeth;
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Vec2, lerp, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, lerp, smoothstep, vec2};
 use furrow_base::ron_file::{Fraction, Num, Positive, PositiveCount};
 use furrow_base::sampling::rng::mix;
 use serde::{Deserialize, Serialize};
@@ -94,12 +94,12 @@ impl Shape {
             teeth: Default::default(),
             lyrate: None,
         };
-        let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i as u64)) - 0.5;
+        let random = |i: usize, k: u64| unit(mix(mix(seed ^ (k << 40)) ^ i.to_u64())) - 0.5;
         match margin {
             Margin::Entire => {}
             Margin::Lyrate(plan) => shape.lyrate = Some(Silhouette::new(&plan, aspect, seed)),
             Margin::Toothed { count, .. } => {
-                shape.teeth = [0, 1].map(|side| toothed(count.get() as usize, |i, k| random(i, k + side)));
+                shape.teeth = [0, 1].map(|side| toothed(count.get().trunc_to::<usize>(), |i, k| random(i, k + side)));
             }
             Margin::Spined { lobes, spine, .. } => shape.arm(lobes.f32(), spine.f32(), random),
             Margin::Lobed(plan) => shape.lobed = Some(Lobes::new(&plan, outline, aspect, seed)),
@@ -122,14 +122,14 @@ impl Shape {
     /// Adds spines at the tips and shoulders of `lobes` lobes per side, `spine` times the half-width long.
     fn arm(&mut self, lobes: f32, spine: f32, random: impl Fn(usize, u64) -> f32) {
         for (k, side) in [-1.0f32, 1.0].into_iter().enumerate() {
-            for i in 0..3 * lobes as usize {
-                let lobe = (i as f32 / 3.0).floor();
-                let place = lobe + [0.2, 0.5, 0.8][i % 3] + 0.1 * random(i, 20 + k as u64);
+            for i in 0..3 * lobes.trunc_to::<usize>() {
+                let lobe = (i.to_f32() / 3.0).floor();
+                let place = lobe + [0.2, 0.5, 0.8][i % 3] + 0.1 * random(i, 20 + k.to_u64());
                 let y = lerp(0.06, 0.96, place / lobes);
                 let half = self.half_width(y);
                 let main = i % 3 == 1;
                 let x = side * half * (1.0 - spine) * self.bay(place, spine, y);
-                let lean = 0.35 + 0.5 * random(i, 24 + k as u64) + if i % 3 == 2 { 0.45 } else { 0.0 };
+                let lean = 0.35 + 0.5 * random(i, 24 + k.to_u64()) + if i % 3 == 2 { 0.45 } else { 0.0 };
                 let long = spine * half.max(0.1 * self.aspect) * if main { 1.25 } else { 0.8 };
                 let axis = vec2(side * lean.cos(), lean.sin());
                 // The spine starts inside the tissue.
@@ -218,9 +218,9 @@ impl Shape {
 /// Creates the teeth of one side of a leaf with sinuses of relative depth about 1; the widest teeth are near the base.
 fn toothed(count: usize, random: impl Fn(usize, u64) -> f32) -> Teeth {
     let sinus = |i: usize| {
-        let even = i as f32 / count as f32;
+        let even = i.to_f32() / count.to_f32();
         let inner = i > 0 && i < count;
-        let shift = if inner { random(i, 0) * 0.55 / count as f32 } else { 0.0 };
+        let shift = if inner { random(i, 0) * 0.55 / count.to_f32() } else { 0.0 };
         (lerp(0.16, 0.93, even.powf(0.9)) + shift, 0.65 + 0.7 * (random(i, 7) + 0.5))
     };
     Teeth { sinuses: (0..=count).map(sinus).collect(), fades: [(0.10, 0.22), (0.72, 0.97)] }

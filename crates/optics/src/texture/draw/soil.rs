@@ -11,12 +11,12 @@ use super::generated::GeneratedTexture;
 use super::soil_recipe::{Ground, SoilRecipe};
 use super::tile::Tile;
 use furrow_base::error::{Error, Result};
-use furrow_base::math::Vec3;
+use furrow_base::math::{RoundTo, Vec3};
 use furrow_base::ron_file::{Num, Positive};
 
 /// Generates the ground texture.
 pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
-    let size = recipe.size.get() as usize;
+    let size = recipe.size.get().trunc_to::<usize>();
     if size > 4096 {
         return Err(Error::input(format!("ground of {size} × {size} pixels: at most 4096 are supported")));
     }

@@ -1,6 +1,6 @@
 //! Stamp of one aggregate, stone or particle: a dome cut by planes.
 
-use furrow_base::math::{Vec2, lerp, vec2};
+use furrow_base::math::{ToFloat, Vec2, lerp, vec2};
 use furrow_base::sampling::rng::Stream;
 
 /// Dome to be stamped on the ground.
@@ -24,7 +24,7 @@ impl Stamp {
         let angle = s.range32(0.0, std::f32::consts::TAU);
         let start = s.range32(0.0, 1.0);
         let facets = std::array::from_fn(|k| {
-            let a = (k as f32 + start + s.range32(-0.3, 0.3)) / 6.0 * std::f32::consts::TAU;
+            let a = (k.to_f32() + start + s.range32(-0.3, 0.3)) / 6.0 * std::f32::consts::TAU;
             (vec2(a.cos(), a.sin()), s.range32(1.0, 1.45), s.range32(0.9, 2.2))
         });
         Self { centre, axes, turn: vec2(angle.cos(), angle.sin()), bottom, dome, facets, sharp }

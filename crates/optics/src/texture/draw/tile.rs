@@ -5,7 +5,7 @@ use super::soil_recipe::{Litter, SoilRecipe};
 use super::stamp::Stamp;
 use crate::texture::noise::Tiling;
 use crate::texture::srgb::ColorSpace;
-use furrow_base::math::{Vec2, Vec3, lerp, smoothstep, vec2, vec3};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, lerp, smoothstep, vec2, vec3};
 use furrow_base::ron_file::Num;
 use furrow_base::sampling::rng::{Purpose, Stream};
 
@@ -26,12 +26,12 @@ pub(super) struct Tile {
 
 impl Tile {
     pub(super) fn new(recipe: &SoilRecipe, size: usize) -> Self {
-        let stream = Stream::of(recipe.seed.get() as u64, 0, Purpose::Texture, 1);
+        let stream = Stream::of(recipe.seed.get().trunc_to::<u64>(), 0, Purpose::Texture, 1);
         let period_mm = recipe.period_mm.f32();
         let albedo = Vec3::from(recipe.albedo.map(Num::f32));
         Self {
             size,
-            scale: size as f32 / period_mm,
+            scale: size.to_f32() / period_mm,
             period_mm,
             noise: Tiling::new(stream.child(Purpose::Texture, 1).seed32().into()),
             stream,
@@ -45,9 +45,9 @@ impl Tile {
     /// Returns periodic noise over the tile whose first octave has features of size `mm`.
     pub(super) fn noise(&self, x: f32, y: f32, mm: f32, octaves: u32, layer: u64) -> f32 {
         let period = (self.period_mm / mm).round().max(1.0);
-        let k = period / self.size as f32;
+        let k = period / self.size.to_f32();
         let noise = Tiling::new(layer * 7919 + u64::from(self.noise.at(0.5, 0.5, 4).to_bits()));
-        noise.fbm(x * k, y * k, period as u32, octaves, 0.55)
+        noise.fbm(x * k, y * k, period.trunc_to::<u32>(), octaves, 0.55)
     }
 
     /// Recomputes every pixel: `f` returns height and colour from the position and the pixel index.
@@ -56,7 +56,7 @@ impl Tile {
         for y in 0..self.size {
             for x in 0..self.size {
                 let i = y * self.size + x;
-                (height[i], colour[i]) = f(self, x as f32, y as f32, i);
+                (height[i], colour[i]) = f(self, x.to_f32(), y.to_f32(), i);
             }
         }
         (self.height, self.colour) = (height, colour);
@@ -77,16 +77,16 @@ impl Tile {
 
     /// Applies a stamp; ground that is higher stays.
     pub(super) fn stamp(&mut self, stamp: &Stamp, paint: impl Fn(Vec2, f32, Vec3) -> Vec3, rough: f32) {
-        let reach = stamp.axes.max_element().ceil() as i32 + 1;
-        let (cx, cy) = (stamp.centre.x.floor() as i32, stamp.centre.y.floor() as i32);
-        let n = self.size as i32;
+        let reach = stamp.axes.max_element().ceil_to::<i32>() + 1;
+        let (cx, cy) = (stamp.centre.x.floor_to::<i32>(), stamp.centre.y.floor_to::<i32>());
+        let n = self.size.to_i32();
         for y in cy - reach..=cy + reach {
             for x in cx - reach..=cx + reach {
-                let offset = vec2(x as f32 + 0.5, y as f32 + 0.5) - stamp.centre;
+                let offset = vec2(x.to_f32() + 0.5, y.to_f32() + 0.5) - stamp.centre;
                 let Some(h) = stamp.at(offset) else { continue };
-                let i = y.rem_euclid(n) as usize * self.size + x.rem_euclid(n) as usize;
+                let i = y.rem_euclid(n).to_usize() * self.size + x.rem_euclid(n).to_usize();
                 let bump = if rough > 0.0 {
-                    1.0 + rough * self.noise.at(x as f32 * 0.37 + 7.0, y as f32 * 0.37, 65536)
+                    1.0 + rough * self.noise.at(x.to_f32() * 0.37 + 7.0, y.to_f32() * 0.37, 65536)
                 } else {
                     1.0
                 };
@@ -101,11 +101,11 @@ impl Tile {
 
     pub(super) fn surface(&self, p: Vec2) -> f32 {
         let n = self.size;
-        self.height[(p.y as usize).min(n - 1) * n + (p.x as usize).min(n - 1)]
+        self.height[p.y.trunc_to::<usize>().min(n - 1) * n + p.x.trunc_to::<usize>().min(n - 1)]
     }
 
     pub(super) fn somewhere(&self, s: &mut Stream) -> Vec2 {
-        vec2(s.range32(0.0, self.size as f32), s.range32(0.0, self.size as f32))
+        vec2(s.range32(0.0, self.size.to_f32()), s.range32(0.0, self.size.to_f32()))
     }
 
     /// Samples sizes from the power law until their areas cover the fraction `cover` of the ground; returned from large
@@ -132,15 +132,15 @@ impl Tile {
             let centre = self.somewhere(&mut s);
             let dome = 0.55 * l * s.range32(0.75, 1.05);
             let sunk = dome * s.range32(0.25, 0.5);
-            let earth = ground[(centre.y as usize).min(n - 1) * n + (centre.x as usize).min(n - 1)];
+            let earth = ground[centre.y.trunc_to::<usize>().min(n - 1) * n + centre.x.trunc_to::<usize>().min(n - 1)];
             // Small crumbs settle in gaps more often than on top of large ones.
             let bottom = lerp(earth, self.surface(centre), s.range32(0.1, 0.45)) - sunk;
             let axes = vec2(0.5, 0.5 * s.range32(0.66, 0.9)) * l * self.scale;
             let axes = axes.max(Vec2::splat(0.6));
             let stamp = Stamp::new(centre, axes, bottom, dome, s.range32(0.2, 0.9), &mut s);
             // Crumbs vary in brightness: some broke from deeper, moister soil.
-            let bright = (f64::from(self.spread) * s.normal()).exp() as f32 * 1.03;
-            let warm = s.normal() as f32;
+            let bright = (f64::from(self.spread) * s.normal()).exp().to_f32() * 1.03;
+            let warm = s.normal().to_f32();
             let own = self.albedo * bright * vec3(1.0 + 0.022 * warm, 1.0, 1.0 - 0.04 * warm);
             self.stamp(&stamp, |_, h, _| own * (0.97 + 0.06 * h), (0.05 * l).clamp(0.10, 0.18));
         }
@@ -148,11 +148,11 @@ impl Tile {
 
     /// Brightens raised parts, as dry dust does, and darkens gaps, as moisture does.
     pub(super) fn dust(&mut self) {
-        let mean = self.height.iter().sum::<f32>() / self.height.len() as f32;
+        let mean = self.height.iter().sum::<f32>() / self.height.len().to_f32();
         let soft = crate::texture::maps::blur(
             &self.height,
             (self.size, self.size),
-            (4.0 * self.scale) as usize,
+            (4.0 * self.scale).trunc_to::<usize>(),
             crate::texture::Wrap::Repeat,
         );
         self.each(|t, x, y, i| {
@@ -193,11 +193,11 @@ impl Tile {
     fn fibre(&mut self, length: f32, width: f32, colour: Vec3, s: &mut Stream) {
         let mut p = self.somewhere(s);
         let (mut heading, bend) = (s.range32(0.0, std::f32::consts::TAU), s.range32(-0.06, 0.06));
-        let steps = (length * self.scale / 0.5) as usize;
-        let n = self.size as f32;
+        let steps = (length * self.scale / 0.5).trunc_to::<usize>();
+        let n = self.size.to_f32();
         for k in 0..steps {
-            let ends =
-                smoothstep(0.0, 0.15, k as f32 / steps as f32) * (1.0 - smoothstep(0.85, 1.0, k as f32 / steps as f32));
+            let ends = smoothstep(0.0, 0.15, k.to_f32() / steps.to_f32())
+                * (1.0 - smoothstep(0.85, 1.0, k.to_f32() / steps.to_f32()));
             let radius = (0.5 * width * self.scale * lerp(0.5, 1.0, ends)).max(0.62);
             let q = vec2(p.x.rem_euclid(n), p.y.rem_euclid(n));
             let stamp = Stamp {
@@ -236,7 +236,7 @@ impl Tile {
                 }
                 pick -= share;
             }
-            let rock = rock * (0.16 * s.normal()).exp() as f32;
+            let rock = rock * (0.16 * s.normal()).exp().to_f32();
             let axes = (vec2(0.5, 0.5 * s.range32(0.6, 0.92)) * l * self.scale).max(Vec2::splat(0.8));
             let dome = 0.5 * l * s.range32(0.6, 0.9);
             let bottom = self.surface(centre).min(4.5) - dome * s.range32(0.2, 0.5);
@@ -271,14 +271,14 @@ impl Tile {
             .colour
             .iter()
             .fold([0.0f64; 3], |s, c| [s[0] + f64::from(c.x), s[1] + f64::from(c.y), s[2] + f64::from(c.z)]);
-        let n = self.colour.len() as f64;
-        let mean = Vec3::from(sum.map(|s| (s / n) as f32));
+        let n = self.colour.len().to_f64();
+        let mean = Vec3::from(sum.map(|s| (s / n).to_f32()));
         let factor = albedo / mean.max(Vec3::splat(1e-4));
         self.colour.iter_mut().for_each(|c| *c *= factor);
     }
 
     pub(super) fn finish(self, range_mm: f32) -> GeneratedTexture {
-        let n = self.size as u32;
+        let n = self.size.to_u32();
         let rgba = self
             .colour
             .iter()

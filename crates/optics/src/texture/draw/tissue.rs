@@ -4,7 +4,7 @@ use super::cells::{Cells, unit};
 use super::leaf_recipe::{LeafRecipe, TissueVariation};
 use super::shape::Shape;
 use crate::texture::noise::Tiling;
-use furrow_base::math::{Vec2, lerp, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, lerp, smoothstep, vec2};
 use furrow_base::sampling::rng::{Purpose, Stream, mix};
 
 /// Tissue composition at one point of the blade.
@@ -74,7 +74,7 @@ impl<'a> Surface<'a> {
         let bend = vec2(noise(p * 40.0 + far * 3.0, 2), noise(p * 40.0 + far * 5.0, 2));
         let mut net = 0.0f32;
         for (k, (size, weight)) in [(4.2, 1.35), (1.8, 1.0), (0.75, 0.55)].into_iter().enumerate() {
-            let cell = self.areoles.at(p / (self.areole * size) + bend * 0.35 + far * (k + 7) as f32);
+            let cell = self.areoles.at(p / (self.areole * size) + bend * 0.35 + far * (k + 7).to_f32());
             let line = 1.0 - smoothstep(0.02, 0.02 + 0.15 / (size * 0.55_f32).max(1.0), cell.border);
             net = net.max(line * weight);
             c *= 1.0 + mottle * 0.8 * (cell.own - 0.5);
@@ -115,9 +115,9 @@ impl<'a> Surface<'a> {
             c *= 0.12;
         }
         let meal = self.meal(p);
-        let hash = unit(mix(
-            self.seed ^ (u64::from((p.x * 6000.0 + 9e5) as u32) << 32 | u64::from((p.y * 6000.0 + 9e5) as u32))
-        ));
+        let hash = unit(mix(self.seed
+            ^ (u64::from((p.x * 6000.0 + 9e5).trunc_to::<u32>()) << 32
+                | u64::from((p.y * 6000.0 + 9e5).trunc_to::<u32>()))));
         let shade = 1.0 + look.speckle.f32() * (noise(p * 230.0 + far * 17.0, 2) + 0.8 * (hash - 0.5));
         Tissue { chlorophyll: c.max(0.02), red, brown, meal, shade }
     }

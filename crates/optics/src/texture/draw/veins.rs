@@ -5,7 +5,7 @@
 //! Coordinates as in [`super::shape`].
 
 use super::shape::{Margin, Shape};
-use furrow_base::math::{Vec2, lerp, smoothstep, vec2};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, lerp, smoothstep, vec2};
 use furrow_base::ron_file::{Count, Fraction, NonNegative, Num, PositiveCount};
 use furrow_base::sampling::rng::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -64,23 +64,23 @@ pub(super) fn grow(veins: &Veins, shape: &Shape, aspect: f32, margin: Margin, st
                 _ => Some(shape.sinus_depth()),
             };
             if let Some(foot) = foot {
-                let pairs = pairs.get() as usize;
+                let pairs = pairs.get().trunc_to::<usize>();
                 secondaries(&mut segments, shape, (pairs, foot), angle_deg.f32(), midrib.f32() * aspect, stream);
             }
-            let tree = branch(&segments, shape, fine.get() as usize, stream);
+            let tree = branch(&segments, shape, fine.get().trunc_to::<usize>(), stream);
             segments.extend(tree);
             segments
         }
         Veins::Parallel { count, midrib } => {
             let mut segments = midvein(midrib.f32() * aspect, stream);
-            let n = count.get() as usize;
+            let n = count.get().trunc_to::<usize>();
             for side in [-1.0, 1.0] {
                 for i in 1..=n {
-                    let share = side * i as f32 / (n as f32 + 0.6);
+                    let share = side * i.to_f32() / (n.to_f32() + 0.6);
                     // Every fourth vein is stronger.
                     let radius = aspect * if i % 4 == 0 { 0.012 } else { 0.006 };
                     let at = |k: usize| {
-                        let y = k as f32 / 200.0;
+                        let y = k.to_f32() / 200.0;
                         vec2(share * shape.half_width(y), y)
                     };
                     segments.extend((0..200).map(|k| Segment {
@@ -103,7 +103,7 @@ fn midvein(radius: f32, stream: &Stream) -> Vec<Segment> {
     let width = |y: f32| radius * ((1.0 - y).max(0.0).powf(1.25) + 0.07);
     (0..60)
         .map(|i| {
-            let (a, b) = (i as f32 / 60.0 * 1.02 - 0.04, (i + 1) as f32 / 60.0 * 1.02 - 0.04);
+            let (a, b) = (i.to_f32() / 60.0 * 1.02 - 0.04, (i + 1).to_f32() / 60.0 * 1.02 - 0.04);
             Segment { from: at(a), to: at(b), radius: (width(a), width(b)), order: 1 }
         })
         .collect()
@@ -118,7 +118,7 @@ fn along_lobes(segments: &mut Vec<Segment>, shape: &Shape, midrib: f32) {
         let start = vec2(0.0, foot.y - 0.012);
         let at = |t: f32| start.lerp(tip, t) + vec2(0.0, -0.012 * (std::f32::consts::PI * t).sin());
         for i in 0..10 {
-            let (a, b) = (i as f32 / 10.0, (i + 1) as f32 / 10.0);
+            let (a, b) = (i.to_f32() / 10.0, (i + 1).to_f32() / 10.0);
             let width = |t: f32| midrib * lerp(0.34, 0.06, t);
             segments.push(Segment { from: at(a), to: at(b), radius: (width(a), width(b)), order: 2 });
         }
@@ -135,10 +135,10 @@ fn secondaries(
 ) {
     for pair in 0..pairs {
         for side in 0..2 {
-            let mut s = stream.child(Purpose::Texture, 100 + pair as u64 * 2 + side);
+            let mut s = stream.child(Purpose::Texture, 100 + pair.to_u64() * 2 + side);
             let sign = if side == 0 { -1.0 } else { 1.0 };
             // Veins become denser towards the tip; left and right alternate by up to half the spacing.
-            let even = (pair as f32 + 0.35 + 0.22 * sign + s.range32(-0.16, 0.16)) / pairs as f32;
+            let even = (pair.to_f32() + 0.35 + 0.22 * sign + s.range32(-0.16, 0.16)) / pairs.to_f32();
             let base = shape.sinus_depth();
             let y = lerp(0.015_f32.max(foot), 0.9, even.clamp(0.0, 1.0).powf(1.12));
             // The lowest pair runs back into the lobes of a heart-shaped base.
@@ -201,18 +201,18 @@ fn run(out: &mut Vec<Segment>, shape: &Shape, path: &Path, foot: Vec2, radius: f
 /// density. The first veins are therefore long and later ones branch off them, as in a growing leaf.
 fn branch(segments: &[Segment], shape: &Shape, count: usize, stream: &Stream) -> Vec<Segment> {
     let mut s = stream.child(Purpose::Texture, 2);
-    let finest = (1.0 / count.max(1) as f32).sqrt() * 0.5;
+    let finest = (1.0 / count.max(1).to_f32()).sqrt() * 0.5;
     let step = finest * 0.16;
     let mut nodes: Vec<Vec2> = Vec::new();
     for g in segments {
-        let pieces = (g.from.distance(g.to) / step).ceil().max(1.0) as usize;
-        nodes.extend((0..pieces).map(|k| g.from.lerp(g.to, k as f32 / pieces as f32)));
+        let pieces = (g.from.distance(g.to) / step).ceil().max(1.0).trunc_to::<usize>();
+        nodes.extend((0..pieces).map(|k| g.from.lerp(g.to, k.to_f32() / pieces.to_f32())));
     }
     let first = nodes.len();
     let mut parent = vec![usize::MAX; first];
     for share in [14, 4, 1] {
         let points = scatter(shape, count / share, &mut s);
-        extend(&mut nodes, &mut parent, points, finest * (share as f32).sqrt(), step, &mut s);
+        extend(&mut nodes, &mut parent, points, finest * share.to_f32().sqrt(), step, &mut s);
     }
     // Applies Murray's law from the tips backwards. The first nodes belong to veins with a known width.
     let mut cubes = vec![0.0f32; nodes.len()];
@@ -271,9 +271,9 @@ fn extend(
 /// Samples up to `count` points in the blade with a minimum distance between them.
 fn scatter(shape: &Shape, count: usize, s: &mut Stream) -> Vec<Vec2> {
     let mut points: Vec<Vec2> = Vec::with_capacity(count);
-    let mut apart = (1.0 / count.max(1) as f32).sqrt() * 0.75;
+    let mut apart = (1.0 / count.max(1).to_f32()).sqrt() * 0.75;
     let mut misses = 0;
-    let half = (0..50).map(|i| shape.half_width(i as f32 / 49.0)).fold(0.0, f32::max);
+    let half = (0..50).map(|i| shape.half_width(i.to_f32() / 49.0)).fold(0.0, f32::max);
     // A blade that is too narrow for all points gets fewer.
     for _ in 0..count * 2000 {
         if points.len() == count {
@@ -306,7 +306,7 @@ impl Grid {
     }
 
     fn square(&self, p: Vec2) -> (i32, i32) {
-        ((p.x / self.size).floor() as i32, (p.y / self.size).floor() as i32)
+        ((p.x / self.size).floor_to::<i32>(), (p.y / self.size).floor_to::<i32>())
     }
 
     fn add(&mut self, i: usize, p: Vec2) {

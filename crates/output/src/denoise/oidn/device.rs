@@ -2,6 +2,7 @@
 
 use super::super::noisy_image::{Kind, NoisyImage, Rgb};
 use super::sys::{self, Functions};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use std::ffi::{CStr, c_char, c_int};
 use std::path::Path;
@@ -127,7 +128,7 @@ impl<'a> Filter<'a> {
     /// # Safety
     /// The pointer must be valid for that many pixels, for writing if it is the output, until the filter has run.
     unsafe fn image(&self, name: &CStr, pixels: *mut Rgb, [width, height]: [u32; 2]) {
-        let (width, height) = (width as usize, height as usize);
+        let (width, height) = (width.to_usize(), height.to_usize());
         // SAFETY: the filter is alive, the text is null-terminated, and the caller guarantees the pointer. Strides of 0
         // mean no gaps.
         unsafe {

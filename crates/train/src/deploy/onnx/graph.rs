@@ -5,6 +5,7 @@ use crate::data::Normalization;
 use crate::data::normalise::LEAST;
 use crate::net::{Conv, Norm, Operations};
 use crate::weights::Array;
+use furrow_base::math::{ToFloat, ToInt};
 
 /// Implementation of [`Operations`] that appends a node per operation. A value is its name in the graph; the first output of an operation
 /// has the operation's name.
@@ -38,7 +39,7 @@ impl Recorder {
     /// Adds a single-precision constant and returns its name.
     fn constant(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
         self.graph.initializer.push(Tensor {
-            dims: shape.iter().map(|n| *n as i64).collect(),
+            dims: shape.iter().map(|n| n.to_i64()).collect(),
             data_type: DataType::Float.into(),
             name: name.into(),
             raw_data: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -52,7 +53,7 @@ impl Recorder {
         let name = format!("whole_{}", words.join("_"));
         if self.graph.initializer.iter().all(|tensor| tensor.name != name) {
             self.graph.initializer.push(Tensor {
-                dims: vec![values.len() as i64],
+                dims: vec![values.len().to_i64()],
                 data_type: DataType::Int64.into(),
                 name: name.clone(),
                 raw_data: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -137,13 +138,13 @@ impl Operations for Recorder {
         if conv.bias {
             inputs.push(&bias);
         }
-        let (kernel, stride) = (conv.kernel as i64, conv.stride as i64);
-        let (before, after) = (conv.padding().0 as i64, conv.padding().1 as i64);
+        let (kernel, stride) = (conv.kernel.to_i64(), conv.stride.to_i64());
+        let (before, after) = (conv.padding().0.to_i64(), conv.padding().1.to_i64());
         let attributes = vec![
             several("kernel_shape", &[kernel; 2]),
             several("strides", &[stride; 2]),
             several("pads", &[before, before, after, after]),
-            whole("group", conv.groups as i64),
+            whole("group", conv.groups.to_i64()),
         ];
         self.named(name, "Conv", &inputs, attributes)
     }
@@ -151,7 +152,7 @@ impl Operations for Recorder {
     fn norm(&mut self, x: &String, name: &str, norm: Norm) -> String {
         let [gain, shift, mean, variance] =
             ["weight", "bias", "running_mean", "running_var"].map(|what| format!("{name}.{what}"));
-        let epsilon = number("epsilon", norm.epsilon as f32);
+        let epsilon = number("epsilon", norm.epsilon.to_f32());
         self.named(name, "BatchNormalization", &[x, &gain, &shift, &mean, &variance], vec![epsilon])
     }
 
@@ -212,7 +213,7 @@ impl Operations for Recorder {
     }
 
     fn to_multiple(&mut self, x: &String, pixels: usize) -> String {
-        let (less, pixels) = (self.wholes(&[pixels as i64 - 1]), self.wholes(&[pixels as i64]));
+        let (less, pixels) = (self.wholes(&[pixels.to_i64() - 1]), self.wholes(&[pixels.to_i64()]));
         let size = self.op("Shape", &[x], vec![whole("start", 2)]);
         let more = self.op("Add", &[&size, &less], vec![]);
         let times = self.op("Div", &[&more, &pixels], vec![]);
@@ -224,10 +225,10 @@ impl Operations for Recorder {
         let size = self.op("Shape", &[x], vec![whole("start", 2)]);
         let position = self.resize(&format!("{name}.position"), &size, "cubic");
         let placed = self.op("Add", &[x, &position], vec![]);
-        let row = self.wholes(&[0, channels as i64, 1, -1]);
+        let row = self.wholes(&[0, channels.to_i64(), 1, -1]);
         let patches = self.op("Reshape", &[&placed, &row], vec![]);
         let images = self.op("Shape", &[x], vec![whole("end", 1)]);
-        let one = self.wholes(&[channels as i64, 1, 1]);
+        let one = self.wholes(&[channels.to_i64(), 1, 1]);
         let shape = self.op("Concat", &[&images, &one], vec![whole("axis", 0)]);
         let class = self.op("Expand", &[&format!("{name}.class"), &shape], vec![]);
         self.op("Concat", &[&class, &patches], vec![whole("axis", 3)])
@@ -244,7 +245,7 @@ impl Operations for Recorder {
         let lying = self.op("Transpose", &[x], vec![several("perm", &[0, 2, 3, 1])]);
         let inputs = [&lying, &format!("{name}.weight"), &format!("{name}.bias")];
         let y =
-            self.op("LayerNormalization", &inputs.map(String::as_str), vec![number("epsilon", norm.epsilon as f32)]);
+            self.op("LayerNormalization", &inputs.map(String::as_str), vec![number("epsilon", norm.epsilon.to_f32())]);
         self.op("Transpose", &[&y], vec![several("perm", &[0, 3, 1, 2])])
     }
 
@@ -260,7 +261,7 @@ impl Operations for Recorder {
 
     /// Each head sums its values with the weights softmax(qᵀ · k / √d), where d = channels / heads.
     fn attention(&mut self, x: &String, channels: usize, heads: usize) -> String {
-        let (wide, heads) = ((channels / heads) as f32, heads as i64);
+        let (wide, heads) = ((channels / heads).to_f32(), heads.to_i64());
         let shape = self.wholes(&[0, 3 * heads, -1, 0]);
         let all = self.op("Reshape", &[x, &shape], vec![]);
         let [query, key, value] = [0, 1, 2].map(|part| {
@@ -275,12 +276,12 @@ impl Operations for Recorder {
         let shares = self.op("Softmax", &[&products], vec![whole("axis", 3)]);
         let shares = self.op("Transpose", &[&shares], turned());
         let sums = self.op("MatMul", &[&value, &shares], vec![]);
-        let shape = self.wholes(&[0, channels as i64, 1, -1]);
+        let shape = self.wholes(&[0, channels.to_i64(), 1, -1]);
         self.op("Reshape", &[&sums, &shape], vec![])
     }
 
     fn scale(&mut self, x: &String, name: &str, channels: usize) -> String {
-        let shape = self.wholes(&[channels as i64, 1, 1]);
+        let shape = self.wholes(&[channels.to_i64(), 1, 1]);
         let gamma = self.op("Reshape", &[&format!("{name}.gamma"), &shape], vec![]);
         self.op("Mul", &[x, &gamma], vec![])
     }

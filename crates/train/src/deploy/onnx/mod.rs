@@ -20,6 +20,7 @@ use crate::data::Band;
 use crate::deploy::ExportMetadata;
 use crate::net::fitting;
 use crate::run::TrainedModel;
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_output::write_atomically;
 use graph::Recorder;
@@ -45,7 +46,7 @@ pub fn model(trained: &TrainedModel) -> Result<Model> {
     recorder.end(&y);
     let mut graph = recorder.graph;
     let any = |name: &str| DimensionValue::Param(name.into());
-    let known = |n: usize| DimensionValue::Value(n as i64);
+    let known = |n: usize| DimensionValue::Value(n.to_i64());
     let names: Vec<&str> = card.input.bands.iter().map(Band::name).collect();
     graph.name = card.network.name().into();
     graph.input = vec![value(

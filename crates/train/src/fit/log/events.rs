@@ -3,6 +3,7 @@
 //! Source: `event.proto`, `summary.proto` and `lib/io/record_writer.h` of TensorFlow 2, with the same field numbers and types. A
 //! record consists of the message length, a masked CRC-32C of the length, the message, and a masked CRC-32C of the message.
 
+use furrow_base::math::ToInt;
 use prost::{Message, Oneof};
 
 /// Protobuf message `Event`.
@@ -81,7 +82,7 @@ pub(super) struct Image {
 /// Encodes an event as a record of the file.
 pub(super) fn record(event: &Event) -> Vec<u8> {
     let message = event.encode_to_vec();
-    let length = (message.len() as u64).to_le_bytes();
+    let length = message.len().to_u64().to_le_bytes();
     [&length[..], &masked(&length), &message, &masked(&message)].concat()
 }
 

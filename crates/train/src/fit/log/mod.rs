@@ -10,6 +10,7 @@ use super::checkpoint::{History, LossPoint, ValidationPass};
 use crate::figure::Figure;
 use events::{Event, EventContent, Image, STARTED, SessionLog, Summary, SummaryValue, Value};
 use furrow_base::input;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_output::write_atomically;
 use furrow_report::{Lines, csv};
@@ -72,7 +73,7 @@ impl TrainingLog {
         values.extend(ious.filter_map(|(name, iou)| Some(number(&format!("validation/IoU of {name}"), (*iou)?))));
         if let Some(sheet) = picture {
             let encoded = sheet.png()?;
-            let (height, width) = (sheet.height as i32, sheet.width as i32);
+            let (height, width) = (sheet.height.to_i32(), sheet.width.to_i32());
             let image = Image { height, width, colorspace: 3, encoded };
             values.push(Value { tag: "photograph, truth, prediction".into(), of: Some(SummaryValue::Image(image)) });
         }
@@ -86,7 +87,7 @@ impl TrainingLog {
 
     fn event(&mut self, step: u64, what: EventContent) -> Result<()> {
         let wall_time = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
-        let record = events::record(&Event { wall_time, step: step as i64, what: Some(what) });
+        let record = events::record(&Event { wall_time, step: step.to_i64(), what: Some(what) });
         self.events.write_all(&record).map_err(Error::io(&self.folder.join(EVENTS)))
     }
 }
@@ -104,13 +105,13 @@ fn go_on(path: &Path, known: u64) -> io::Result<Option<(File, u64)>> {
     if last < known {
         return Ok(None);
     }
-    file.set_len(length as u64)?;
+    file.set_len(length.to_u64())?;
     file.seek(SeekFrom::End(0))?;
     Ok(Some((file, last)))
 }
 
 fn number(tag: &str, value: f64) -> Value {
-    Value { tag: tag.into(), of: Some(SummaryValue::Number(value as f32)) }
+    Value { tag: tag.into(), of: Some(SummaryValue::Number(value.to_f32())) }
 }
 
 /// Reads the history of a running or complete training from `log.csv`, except accuracy and the IoU of single classes. Returns
@@ -129,7 +130,7 @@ pub fn read(folder: &Path) -> Result<Option<History>> {
             let error = Error::damaged("this is not a training log").in_file(path);
             return Err(error.help("a row starts with step, loss, rate, validation_mean_iou, validation_loss"));
         };
-        let step = step as u64;
+        let step = step.trunc_to::<u64>();
         if let (Some(loss), Some(rate)) = (loss, rate) {
             history.losses.push(LossPoint { step, loss, rate });
         }

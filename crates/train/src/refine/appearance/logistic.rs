@@ -3,6 +3,7 @@
 //! Labels are probabilities, because they are uncertain. Of the hundreds of features only the directions of largest variance are used, so
 //! that the classifier cannot overfit to errors in the labels.
 
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::rng::mix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -133,7 +134,7 @@ impl Examples {
             let row = standard(features, scales);
             covariance.syger(u / total, &row, &row, 1.0);
         }
-        let random = |i: usize| (mix(i as u64) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+        let random = |i: usize| (mix(i.to_u64()) >> 11).to_f64() / (1u64 << 53).to_f64() - 0.5;
         let mut axes = DMatrix::from_fn(channels, COMPONENTS.min(channels), |c, k| random(k * channels + c));
         let mut variances = Vec::new();
         for _ in 0..ROUNDS {
@@ -156,7 +157,7 @@ impl Examples {
     /// Fits bias and coefficients to the examples with the indices `some` by Newton's method. A column of `rows` holds 1 and the
     /// components of an example. Returns `None` if the Hessian is singular or the result is not finite.
     fn newton(&self, rows: &DMatrix<f64>, some: &[usize]) -> Option<DVector<f64>> {
-        let scale = some.len() as f64 / some.iter().map(|at| self.weights[*at]).sum::<f64>();
+        let scale = some.len().to_f64() / some.iter().map(|at| self.weights[*at]).sum::<f64>();
         let penalty = DMatrix::from_fn(rows.nrows(), rows.nrows(), |i, j| f64::from(u8::from(i == j && i > 0)));
         let mut beta = DVector::zeros(rows.nrows());
         for _ in 0..STEPS {
@@ -196,7 +197,7 @@ struct Scale {
 
 impl Scale {
     fn of(&self, feature: f32) -> f32 {
-        ((f64::from(feature) - self.mean) * self.factor) as f32
+        ((f64::from(feature) - self.mean) * self.factor).to_f32()
     }
 }
 
@@ -224,9 +225,9 @@ mod tests {
                 if c == 1 {
                     7.0
                 } else if c % 2 == 0 {
-                    (side + noise) as f32
+                    (side + noise).to_f32()
                 } else {
-                    noise as f32
+                    noise.to_f32()
                 }
             }));
             rows.labels.push(if first == (s.range(0.0, 1.0) >= wrong) { 0.9 } else { 0.1 });

@@ -16,6 +16,7 @@
 mod logistic;
 
 use crate::measure::components::Components;
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use logistic::Classifier;
 use std::collections::BTreeMap;
 
@@ -55,8 +56,9 @@ impl Features {
     /// Interpolates cell values bilinearly between cell centres at pixel `at` of an image of this size.
     fn between(&self, values: &[f64], at: usize, (width, height): (usize, usize)) -> f64 {
         let place = |pixel: usize, pixels: usize, cells: usize| {
-            let place = ((pixel as f64 + 0.5) * cells as f64 / pixels as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
-            (place as usize, (place as usize + 1).min(cells - 1), place.fract())
+            let place =
+                ((pixel.to_f64() + 0.5) * cells.to_f64() / pixels.to_f64() - 0.5).clamp(0.0, (cells - 1).to_f64());
+            (place.trunc_to::<usize>(), (place.trunc_to::<usize>() + 1).min(cells - 1), place.fract())
         };
         let (left, right, x) = place(at % width, width, self.size.0);
         let (above, below, y) = place(at / width, height, self.size.1);
@@ -69,7 +71,7 @@ impl Features {
     fn shared(&self, regions: &Components, size: (usize, usize)) -> BTreeMap<(usize, usize), f32> {
         let mut shared = BTreeMap::new();
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            *shared.entry((*region as usize - 1, self.cell(at, size))).or_insert(0.0) += 1.0;
+            *shared.entry((region.to_usize() - 1, self.cell(at, size))).or_insert(0.0) += 1.0;
         }
         shared
     }
@@ -88,7 +90,7 @@ impl Examples {
         let mut means = vec![0.0f32; largest.len() * channels];
         for ((region, cell), pixels) in features.shared(regions, size) {
             let Some(place) = places[region] else { continue };
-            let share = pixels / regions.areas[region] as f32;
+            let share = pixels / regions.areas[region].to_f32();
             let means = &mut means[place * channels..(place + 1) * channels];
             means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
         }
@@ -140,7 +142,7 @@ impl Appearance {
         }
         let near = blurred(&cells, &counts, features.size);
         let value = |(at, region): (usize, &u32)| {
-            let Some(region) = (*region as usize).checked_sub(1) else { return 0.0 };
+            let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
             let whole = sums[region] / f64::from(regions.areas[region]);
             WEIGHT * self.trust * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
         };
@@ -159,14 +161,14 @@ impl Appearance {
 
 /// Blurs cell values with a Gaussian, each cell weighted by its number of plant pixels. Cells without plants nearby keep their value.
 fn blurred(values: &[f64], counts: &[f64], (width, height): (usize, usize)) -> Vec<f64> {
-    let sd = BLUR * width.max(height) as f64;
-    let reach = (3.0 * sd).ceil() as isize;
-    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k as f64 / sd.max(1e-9)).powi(2)).exp()).collect();
+    let sd = BLUR * width.max(height).to_f64();
+    let reach = (3.0 * sd).ceil_to::<isize>();
+    let kernel: Vec<f64> = (-reach..=reach).map(|k| (-0.5 * (k.to_f64() / sd.max(1e-9)).powi(2)).exp()).collect();
     let along = |grid: &[f64], stride: usize, cells: usize| -> Vec<f64> {
         let value = |at: usize| {
-            let place = (at / stride % cells) as isize;
-            let near = (-reach..=reach).zip(&kernel).filter(|(k, _)| (0..cells as isize).contains(&(place + k)));
-            near.map(|(k, weight)| weight * grid[at.wrapping_add_signed(k * stride as isize)]).sum()
+            let place = (at / stride % cells).to_isize();
+            let near = (-reach..=reach).zip(&kernel).filter(|(k, _)| (0..cells.to_isize()).contains(&(place + k)));
+            near.map(|(k, weight)| weight * grid[at.wrapping_add_signed(k * stride.to_isize())]).sum()
         };
         (0..grid.len()).map(value).collect()
     };
@@ -193,7 +195,7 @@ mod tests {
         let cell =
             |c: usize| plants.iter().find(|(x, y, ..)| (*x, *y) == (c % 10, c / 10)).map_or(0.0, |plant| plant.2);
         let plane: Vec<f32> = (0..100).map(cell).collect();
-        let other = (0..100).map(|c| (c % 7) as f32).collect();
+        let other = (0..100).map(|c| (c % 7).to_f32()).collect();
         let mut order: Vec<_> = plants.to_vec();
         order.sort_by_key(|(x, y, ..)| (*y, *x));
         (regions, Features { size: (10, 10), planes: vec![plane, other] }, order.iter().map(|plant| plant.3).collect())
@@ -232,7 +234,7 @@ mod tests {
                     let follows = s.chance(share);
                     let says = if follows { crop } else { s.chance(0.5) };
                     let looks = if crop { 1.0 } else { -1.0 };
-                    examples.features.extend([looks + 0.2 * s.normal() as f32, s.normal() as f32]);
+                    examples.features.extend([looks + 0.2 * s.normal().to_f32(), s.normal().to_f32()]);
                     examples.labels.push(if says || !kinds { 0.95 } else { 0.05 });
                     examples.weights.push(s.range(0.5, 2.0));
                 }
@@ -266,10 +268,10 @@ mod tests {
     #[test]
     fn values_are_linear_between_cells() {
         let features = Features { size: (5, 4), planes: Vec::new() };
-        let centre = |c: usize| ((c % 5) as f64 + 0.5) * 8.0 + 10.0 * ((c / 5) as f64 + 0.5) * 8.0;
+        let centre = |c: usize| ((c % 5).to_f64() + 0.5) * 8.0 + 10.0 * ((c / 5).to_f64() + 0.5) * 8.0;
         let values: Vec<f64> = (0..20).map(centre).collect();
         for (x, y) in [(4, 4), (10, 4), (17, 21), (35, 27), (0, 0), (39, 31)] {
-            let (cx, cy) = ((x as f64 + 0.5).clamp(4.0, 36.0), (y as f64 + 0.5).clamp(4.0, 28.0));
+            let (cx, cy) = ((x.to_f64() + 0.5).clamp(4.0, 36.0), (y.to_f64() + 0.5).clamp(4.0, 28.0));
             let found = features.between(&values, y * 40 + x, (40, 32));
             assert!((found - cx - 10.0 * cy).abs() < 1e-9, "({x}, {y}): {found}");
         }

@@ -2,6 +2,7 @@
 
 mod page;
 
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -159,7 +160,7 @@ fn summary(status: &Status) -> String {
         parts.push(match (status.working, &status.shards[..]) {
             (0, [one]) => state(one),
             (0, _) => "no run is active".into(),
-            (n, _) => format!("{} active", count(n as u64, "run", "runs")),
+            (n, _) => format!("{} active", count(n.to_u64(), "run", "runs")),
         });
     }
     if status.core_s > 0.0 {
@@ -198,6 +199,6 @@ fn state(shard: &ShardStatus) -> String {
 
 /// Formats a duration with its two largest units.
 fn time(seconds: f64) -> String {
-    let words = format_duration(Duration::from_secs(seconds.clamp(0.0, 1e10) as u64)).to_string();
+    let words = format_duration(Duration::from_secs(seconds.clamp(0.0, 1e10).trunc_to::<u64>())).to_string();
     words.split(' ').take(2).collect::<Vec<_>>().join(" ")
 }

@@ -1,6 +1,7 @@
 //! Progress of a dataset as a self-contained HTML page: `trace dataset status --page`.
 
 use super::{failed, shards, slowest, summary};
+use furrow_base::math::ToInt;
 use furrow_dataset::Set;
 use furrow_dataset::make::status::Status;
 use furrow_report::{Cell, Number, Page, Table, numbers, section};
@@ -19,8 +20,8 @@ pub(super) fn html(set: &Set, status: &Status, every: Option<u64>) -> String {
         (numbers([
             Number::count("images", status.images, "images ordered"),
             Number::count("done", status.done, "done"),
-            Number::count("failed", status.failures.len() as u64, "failed"),
-            Number::count("working", status.working as u64, "active runs"),
+            Number::count("failed", status.failures.len().to_u64(), "failed"),
+            Number::count("working", status.working.to_u64(), "active runs"),
             hours,
         ]))
         progress max=(status.images) value=(status.done) style="width:100%" {}

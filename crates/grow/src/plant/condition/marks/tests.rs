@@ -1,12 +1,13 @@
 //! Areas and numbers of the parts that marks remove or colour.
 
 use super::*;
+use furrow_base::math::ToFloat;
 use furrow_optics::texture::noise::Perlin;
 
 const IMAGE: Vec2 = vec2(60.0, 100.0);
 
 fn oval() -> AlphaMask {
-    AlphaMask::new(300, 500, |x, y| ((x as f32 - 149.5) / 140.0).hypot((y as f32 - 249.5) / 235.0) < 1.0)
+    AlphaMask::new(300, 500, |x, y| ((x.to_f32() - 149.5) / 140.0).hypot((y.to_f32() - 249.5) / 235.0) < 1.0)
 }
 
 fn leaf(mask: &AlphaMask) -> Bearer<'_> {
@@ -44,12 +45,12 @@ fn holes_are_counted_as_a_poisson_counts() {
     let condition = Condition { holes: 3.0, ..Condition::default() };
     let of = |age: f32| -> Vec<f64> {
         let bearer = Bearer { age, ..leaf(&mask) };
-        (0..600).map(|k| marks(&condition, &bearer, k).holes() as f64).collect()
+        (0..600).map(|k| marks(&condition, &bearer, k).holes().to_f64()).collect()
     };
-    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().to_f64();
     let old = of(1.0);
     let m = mean(&old);
-    let variance = old.iter().map(|x| (x - m).powi(2)).sum::<f64>() / old.len() as f64;
+    let variance = old.iter().map(|x| (x - m).powi(2)).sum::<f64>() / old.len().to_f64();
     assert!((m - 3.0).abs() < 0.29 && (variance / 3.0 - 1.0).abs() < 0.25, "{m} {variance}");
     let young = mean(&of(0.0));
     assert!((young - 0.6).abs() < 0.13, "{young}");
@@ -67,11 +68,11 @@ fn holes_remove_the_area_of_their_radius() {
         let m = leaf(&mask).draw_marks(&desc, &condition, &stream(k));
         let centred = m.holes.iter().all(|h| (h.centre / vec2(28.0, 47.0) - vec2(0.0, 50.0 / 47.0)).length() < 0.8);
         if m.holes() == 1 && centred {
-            removed += (mask.count() - m.cut(Some(&mask)).count()) as f32 * 0.04;
+            removed += (mask.count() - m.cut(Some(&mask)).count()).to_f32() * 0.04;
             holes += 1;
         }
     }
-    let area = removed / holes as f32 / (std::f32::consts::PI * 9.0);
+    let area = removed / holes.to_f32() / (std::f32::consts::PI * 9.0);
     assert!(holes > 50 && (area - 1.0).abs() < 0.15, "{area} of {holes}");
 }
 
@@ -88,9 +89,9 @@ fn a_small_leaf_has_few_holes_and_is_never_lace() {
         for k in 0..200 {
             let m = marks(&condition, &bearer, k);
             holes += m.holes();
-            most = most.max(1.0 - m.cut(Some(&mask)).count() as f32 / mask.count() as f32);
+            most = most.max(1.0 - m.cut(Some(&mask)).count().to_f32() / mask.count().to_f32());
         }
-        (holes as f32 / 200.0, most)
+        (holes.to_f32() / 200.0, most)
     };
     for (length_mm, cotyledon) in [(5.0, true), (10.0, true), (10.0, false), (20.0, true), (40.0, false)] {
         let (mean, most) = of(length_mm, cotyledon);
@@ -109,7 +110,7 @@ fn bites_and_tears_cut_the_margin_and_not_more_than_a_third_of_the_leaf() {
     let condition = Condition { bites: 3.0, tears: 1.0, ..Condition::default() };
     for k in 0..40 {
         let m = marks(&condition, &leaf(&mask), k);
-        let left = m.cut(Some(&mask)).count() as f32 / mask.count() as f32;
+        let left = m.cut(Some(&mask)).count().to_f32() / mask.count().to_f32();
         assert!(m.cuts() == (left < 1.0) && left > 0.67, "{k}: {left}");
     }
 }
@@ -124,7 +125,7 @@ fn dust_covers_what_it_should() {
         for k in 0..60 {
             let m = marks(&condition, &Bearer { height, ..leaf(&mask) }, k);
             let noise = m.noise();
-            let at = |i: usize| m.tissue(vec2((i % 20) as f32 / 20.0, (i / 20) as f32 / 20.0), &noise).soil;
+            let at = |i: usize| m.tissue(vec2((i % 20).to_f32() / 20.0, (i / 20).to_f32() / 20.0), &noise).soil;
             sum += (0..400).map(at).sum::<f32>() / 400.0;
         }
         sum / 60.0
@@ -140,7 +141,7 @@ fn splash_covers_more_the_more_of_it_there_is() {
     let cover = |splash: f32| {
         let m = marks(&Condition { splash, ..Condition::default() }, &leaf(&mask), 3);
         let noise = m.noise();
-        let at = |i: usize| m.tissue(vec2((i % 100) as f32 / 100.0, (i / 100) as f32 / 100.0), &noise).soil;
+        let at = |i: usize| m.tissue(vec2((i % 100).to_f32() / 100.0, (i / 100).to_f32() / 100.0), &noise).soil;
         (0..10_000).map(at).sum::<f32>() / 10_000.0
     };
     let all = [0.5, 2.0, 8.0].map(cover);
@@ -164,7 +165,7 @@ fn scorched_rims_are_a_share_of_the_blade_and_rare() {
         for k in 0..200 {
             let marks = marks(&condition, &bearer, k);
             for i in 0..1600 {
-                let uv = vec2((i % 40) as f32 + 0.5, (i / 40) as f32 + 0.5) / 40.0;
+                let uv = vec2((i % 40).to_f32() + 0.5, (i / 40).to_f32() + 0.5) / 40.0;
                 if mask.opaque_at(uv) {
                     let t = marks.tissue(uv, &noise);
                     ill = (ill.0 + t.brown.max(t.yellow), ill.1 + 1.0);
