@@ -117,6 +117,26 @@ fn quiet_leaves_only_paths_on_stdout() {
     assert_eq!(there.len(), all.len(), "unexpected files were left behind: {there:?}");
 }
 
+/// Rationale: a script that passes `--quiet` must not miss that a plant differs from its file. Expected: the warning that
+/// the model's material is missing, by the renderer, the scan and the export.
+#[test]
+fn quiet_keeps_warnings() {
+    let folder = folder();
+    let model = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nusemtl bark\nf 1 2 3\n";
+    std::fs::write(folder.path().join("model.obj"), model).unwrap();
+    let camera =
+        "camera: Pinhole(size: (8, 6), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5))";
+    let lights = "lights: [Constant(radiance: (1, 1, 1, 1))]";
+    let scene = format!("Field({camera}, {lights}, models: [(file: \"model.obj\", class: Weed)])");
+    std::fs::write(folder.path().join("model.ron"), scene).unwrap();
+    for command in [&["--spp", "1"][..], &["scan", "--lidar", "Vlp16"], &["export", "--format", "gltf"]] {
+        let done = run(folder.path(), &[command, &["--scene", "model.ron", "--quiet"]].concat());
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        let warnings = text(&done.stderr);
+        assert!(warnings.starts_with("warning: model.obj: ") && warnings.contains("`bark`"), "{command:?}: {warnings}");
+    }
+}
+
 #[test]
 fn talk_goes_to_stderr() {
     let folder = folder();

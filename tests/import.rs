@@ -551,8 +551,8 @@ fn what_a_coco_file_lacks_is_counted() {
     for words in [
         "`http://host/a%20b/x.png` was found as `x.png`",
         "1 image: 1 annotations have the id of another annotation",
-        "1 image: 1 annotations cover no pixel",
-        "1 image: 1 masks reach more than a pixel beyond the image",
+        "1 image: 1 annotation covers no pixel",
+        "1 image: 1 mask reaches more than a pixel beyond the image",
         "1 image: 1 plants are covered by other masks",
         "1 image: 1 polygons with fewer than three points",
         "1 image: the source has no annotations of this image",

@@ -1,6 +1,6 @@
 //! `trace export`: exports one field as a scene of another program.
 
-use crate::field::FieldArgs;
+use crate::field::{FieldArgs, print_warning};
 use clap::ValueEnum;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
@@ -28,7 +28,7 @@ pub(crate) struct Args {
     /// Points per square metre of surface; with `--format ply`. Default: 100000.
     #[arg(long, value_name = "POINTS", value_parser = density)]
     density: Option<f64>,
-    /// Print nothing but errors and the paths of the files.
+    /// Print nothing but errors, warnings and the paths of the files.
     #[arg(long)]
     quiet: bool,
 }
@@ -87,10 +87,10 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     }
     let density = args.density.unwrap_or(DENSITY);
     let threads = Threads::all()?;
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), note)?;
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), print_warning)?;
     let export = field.threads().install(|| args.format.write(&out, field.grown(), density))?;
     for warning in &export.warnings {
-        note(&format!("warning: {warning}"));
+        print_warning(warning);
     }
     let amount = export.amount.unwrap_or_else(|| format!("{} files", export.paths.len()));
     note(&format!("{}: {amount} in {}", args.field.path().display(), out.display()));

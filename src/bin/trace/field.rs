@@ -83,6 +83,11 @@ pub(crate) struct FieldArgs {
     camera: String,
 }
 
+/// Prints a warning, also with `--quiet`.
+pub(crate) fn print_warning(words: &str) {
+    furrow_cli::message!("warning: {words}");
+}
+
 impl FieldArgs {
     /// The scene file.
     pub(crate) fn path(&self) -> &Path {
@@ -94,21 +99,21 @@ impl FieldArgs {
         self.scene.check()
     }
 
-    /// Builds the field with an edit and these scene options. Warnings are passed to `note` as soon as they are known.
+    /// Builds the field with an edit and these scene options. Warnings are passed to `warn` as soon as they are known.
     pub(crate) fn grow_as(
         &self,
         edit: &'static Edit,
         asked: impl FnOnce(SceneFile) -> SceneFile,
-        note: impl Fn(&str),
+        warn: impl Fn(&str),
     ) -> Result<Field> {
-        let note = |warning: &String| note(&format!("warning: {warning}"));
+        let warn = |warning: &String| warn(warning);
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
         let scene = asked(scene.day(self.day).memory(self.memory.bytes));
         let expected_warnings = scene.expected_warnings(self.index)?;
-        expected_warnings.iter().for_each(note);
+        expected_warnings.iter().for_each(warn);
         let mut field = scene.field(self.index)?;
-        field.grown().warnings.iter().filter(|warning| !expected_warnings.contains(warning)).for_each(note);
+        field.grown().warnings.iter().filter(|warning| !expected_warnings.contains(warning)).for_each(warn);
         let captures = &field.grown().captures;
         let place = captures.iter().position(|c| c.frame == self.frame && c.name == self.camera);
         let Some(place) = place else {

@@ -57,7 +57,7 @@ pub(crate) struct Args {
     /// Number of threads; 0 for one per core. The file does not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
-    /// Print nothing but errors and the path of the sheet.
+    /// Print nothing but errors, warnings and the path of the sheet.
     #[arg(long)]
     quiet: bool,
 }
@@ -99,7 +99,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let (mut thumbnails, mut seed, mut warned) = (Vec::new(), 0, BTreeSet::new());
     let mut warn = |words: &String| {
         // Most warnings are the same for all fields of a scene file.
-        if !args.quiet && warned.insert(words.clone()) {
+        if warned.insert(words.clone()) {
             furrow_cli::message!("warning: {words}");
         }
     };

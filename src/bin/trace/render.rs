@@ -5,7 +5,7 @@ use crate::growing::Line;
 use crate::quality::{QualityArgs, TechniqueArgs, threads};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use furrow_base::geometry::Window;
-use furrow_base::math::ToFloat;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
@@ -50,7 +50,7 @@ pub(crate) struct Args {
     /// Explain one pixel instead of rendering: its label, surface and radiance.
     #[arg(long, value_parser = cli::pixel, allow_hyphen_values = true, value_name = "X,Y", conflicts_with_all = ["crop", "out", "enough", "denoise"])]
     pixel: Option<(u32, u32)>,
-    /// Print nothing but errors and the paths of the files.
+    /// Print nothing but errors, warnings and the paths of the files.
     #[arg(long)]
     quiet: bool,
 }
@@ -80,9 +80,10 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let threads = Threads::new(args.threads)?;
     let growing = Line::begin(args.quiet);
     let note = |words: &str| growing.pause(|| args.say(words));
-    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), note)?;
+    let warn = |words: &str| growing.pause(|| furrow_cli::message!("warning: {words}"));
+    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), warn)?;
     if let Some(warning) = renderer.warning(&field) {
-        note(&format!("warning: {warning}"));
+        warn(warning);
     }
     let camera = &field.grown().scene.camera;
     let (width, height) = (camera.width(), camera.height());
@@ -117,7 +118,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
     args.say(&summary(&image, &options.quality, sampled.into_inner(), taken, &out));
     for warning in missed(&options.quality, &image.film, taken) {
-        args.say(&format!("warning: {warning}"));
+        furrow_cli::message!("warning: {warning}");
     }
     Ok(paths)
 }
@@ -140,10 +141,10 @@ fn grown(path: &Path, field: &Field) -> String {
     let (grow, build) = field.times();
     let scene = &field.grown().scene;
     format!(
-        "{}: {}, {} parts, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
+        "{}: {}, {}, {:.2} M triangles; grown in {:.2} s, built in {:.2} s",
         path.display(),
         plants(field.grown().plants.len()),
-        scene.parts.len(),
+        furrow_report::count(scene.parts.len().to_u64(), "part", "parts"),
         scene.triangles().to_f64() / 1e6,
         grow.as_secs_f64(),
         build.as_secs_f64()

@@ -1,6 +1,6 @@
 //! `trace scan`: simulates a LiDAR scan of one field.
 
-use crate::field::FieldArgs;
+use crate::field::{FieldArgs, print_warning};
 use clap::builder::PossibleValuesParser;
 use furrow_base::Result;
 use furrow_cli::cli;
@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// Folder for `scan.ply`. Default: `out/`, the scene file's name and `scan`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print nothing but errors and the path of the file.
+    /// Print nothing but errors, warnings and the path of the file.
     #[arg(long)]
     quiet: bool,
 }
@@ -39,10 +39,10 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let threads = Threads::all()?;
     let named = args.lidar.as_deref().and_then(LidarDesc::named);
     let scanner = named.map_or(Scanner::OfScene, |lidar| Scanner::AtCamera(Box::new(lidar)));
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), note)?;
+    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), print_warning)?;
     let (lidar, echoes) = field.scan()?;
     if echoes.is_empty() {
-        note("warning: there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
+        print_warning("there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }
     let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes)?;
     let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());

@@ -422,15 +422,26 @@ fn doubts(image: &Annotated, (w, h): (u32, u32), masks: &[(usize, Vec<u32>)], cr
     let is_crowd = |thing: &&Thing| thing.crowd && matches!(thing.meaning, Meaning::Class(Class::Crop | Class::Weed));
     let alone = if crowds == Crowds::Class { image.things.iter().filter(is_crowd).count() } else { 0 };
     let stated = [
-        (empty, "annotations cover no pixel and were left out"),
-        (beyond, "masks reach more than a pixel beyond the image and were cut at its border"),
+        (empty, ["annotation covers no pixel and was left out", "annotations cover no pixel and were left out"]),
+        (
+            beyond,
+            [
+                "mask reaches more than a pixel beyond the image and was cut at its border",
+                "masks reach more than a pixel beyond the image and were cut at its border",
+            ],
+        ),
         (
             alone,
-            "crowds (`iscrowd` 1) have a class and no plant number; if a tool marks painted plants so, give --crowds \
-             instances",
+            [
+                "crowd (`iscrowd` 1) has a class and no plant number; if a tool marks painted plants so, give --crowds \
+                 instances",
+                "crowds (`iscrowd` 1) have a class and no plant number; if a tool marks painted plants so, give \
+                 --crowds instances",
+            ],
         ),
     ];
-    stated.into_iter().filter(|(n, _)| *n > 0).map(|(n, words)| format!("{n} {words}")).collect()
+    let counted = |(n, [one, many]): (usize, [&str; 2])| format!("{n} {}", if n == 1 { one } else { many });
+    stated.into_iter().filter(|(n, _)| *n > 0).map(counted).collect()
 }
 
 impl Segmentation {

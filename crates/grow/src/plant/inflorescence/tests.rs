@@ -148,7 +148,7 @@ fn an_axis_is_as_long_as_written_and_bears_its_flower_at_its_end() {
     for (from, to, says) in [
         ("axis: \"scape\"", "axis: \"scale\"", "no flowering axis before this one is called \"scale\""),
         ("kind: \"ball\", size_mm: 6", "kind: \"bell\", size_mm: 6", "no flower is called \"bell\""),
-        ("at: Tip", "at: Axils(first: 0, last: 2)", "count from 1"),
+        ("at: Tip", "at: Axils(first: 0, last: 2)", "a whole number from 1"),
         ("at: Tip", "at: Tip, count: 401", "flowering axes"),
     ] {
         let page = text.replacen(from, to, 1);
