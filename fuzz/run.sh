@@ -1,7 +1,7 @@
 #!/bin/sh
-# Fuzzes targets one after the other, so many seconds each: sh fuzz/run.sh 180 scene png …; all of them without names.
-# What libFuzzer finds lies in fuzz/finds/TARGET-*; then the script ends with 1. What it has learnt lies in fuzz/learnt/TARGET, the fewest and
-# shortest files that reach as far: the next run begins with them. Git keeps neither; what was mended is copied to fuzz/corpus/TARGET by hand.
+# Fuzzes targets one after the other for SECONDS each: sh fuzz/run.sh 180 scene png …; all targets if none is named.
+# Finds are written to fuzz/finds/TARGET-* and make the exit code 1. Inputs that reach new code are minimised and kept in
+# fuzz/learnt/TARGET, where the next run starts. Git ignores both folders: copy a mended find to fuzz/corpus/TARGET.
 set -eu
 cd "$(dirname "$0")"
 known=$(sed -n 's/^    ("\([a-z]*\)", [a-z]*),$/\1/p' src/targets.rs)
@@ -17,18 +17,18 @@ for target; do
     echo "$known" | grep -qx -e "$target" || usage "no target: $target"
 done
 [ $# -gt 0 ] || set -- $known
-# Coverage on a stable compiler: the pass is LLVM's, and its flags are asked for by name.
+# Coverage on a stable compiler: RUSTC_BOOTSTRAP permits the flags of LLVM's pass.
 export RUSTC_BOOTSTRAP=1
 export RUSTFLAGS="-Ctarget-cpu=x86-64-v3 --cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares"
 cargo build --release --target x86_64-unknown-linux-gnu
 mkdir -p finds
-# A target's fuzzer, with the limits of all.
+# Runs the fuzzer of the target with the limits that all share.
 fuzz() {
     FUZZ=$target target/x86_64-unknown-linux-gnu/release/furrow-fuzz -timeout=20 -rss_limit_mb=4096 -max_len=65536 \
         -artifact_prefix="finds/$target-" "$@" 2>&1
 }
-# Replaces what was learnt by the part of it that is needed to reach as far as all of it and the corpus; as it was where that fails.
+# Reduces the kept inputs to those that add coverage to the corpus. Keeps all of them if that fails.
 minimise() {
     rm -rf "learnt/$target.least"
     mkdir "learnt/$target.least"
