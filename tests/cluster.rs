@@ -194,6 +194,11 @@ fn orders_that_make_no_sense_are_refused() {
             "--claim \"a\\nevil: b\" is not a volume claim name",
         ),
         (&["--scheduler", "kubernetes", "--shards", "2", "--image", "a b"], "not a container image name"),
+        (&["--scheduler", "slurm", "--shards", "2", "--mail", "a b"], "--mail \"a b\" is not an address"),
+        (&["--scheduler", "slurm", "--shards", "2", "--on-failure", " "], "--on-failure \" \" is not a command"),
+        (&["--scheduler", "parallel", "--shards", "2", "--mail", "a@b"], "--mail is for slurm"),
+        (&["--scheduler", "kubernetes", "--shards", "2", "--on-failure", "x"], "--on-failure is for slurm"),
+        (&["--scheduler", "parallel", "--shards", "2", "--max-running", "1"], "JOBS=N"),
     ] {
         let message = fail(verb("emit", &folder, more), 2);
         assert!(message.contains(words), "{more:?}: no `{words}` in\n{message}");
@@ -302,7 +307,15 @@ fn a_slurm_task_exits_as_its_scheduler_expects() {
 fn the_job_that_finishes_says_which_shards_lack_images() {
     let (_keep, folder) = scratch();
     plan(&folder, 6);
-    let jobs = emit(&folder, "slurm", 3, &["--rerender", "1"]);
+    let told = folder.with_file_name("told.txt");
+    let command = format!("echo \"it's $FURROW_DATASET: $FURROW_CODE\" >> {}", path(&told));
+    let alerts = ["--max-running", "2", "--mail", "night@example.org", "--on-failure", &command];
+    let jobs = emit(&folder, "slurm", 3, &[&["--rerender", "1"][..], &alerts].concat());
+    let [render, end] =
+        ["render.sbatch", "finish.sbatch"].map(|name| std::fs::read_to_string(jobs.join(name)).unwrap());
+    assert!(render.contains("\n#SBATCH --array=0-2%2\n"), "{render}");
+    assert!(render.contains("\n#SBATCH --mail-user=night@example.org\n#SBATCH --mail-type=FAIL\n"), "{render}");
+    assert!(end.contains("\n#SBATCH --mail-user=night@example.org\n#SBATCH --mail-type=END,FAIL\n"), "{end}");
     let finish = || {
         let mut command = Command::new("bash");
         command.arg(jobs.join("finish.sbatch")).env("SLURM_CPUS_PER_TASK", "1");
@@ -311,10 +324,13 @@ fn the_job_that_finishes_says_which_shards_lack_images() {
     assert_eq!(task(&jobs, 1).status().unwrap().code(), Some(0));
     let message = fail(finish(), 1);
     assert!(message.contains("4 of 6 images are missing: 0,2-3,5") && message.contains("--array=0,2"), "{message}");
+    let said = format!("it's {}: 1\n", path(&std::path::absolute(&folder).unwrap()));
+    assert_eq!(std::fs::read_to_string(&told).unwrap(), said);
     for number in [0, 2] {
         assert_eq!(task(&jobs, number).status().unwrap().code(), Some(0));
     }
     let done = succeed(finish());
+    assert_eq!(std::fs::read_to_string(&told).unwrap(), said, "the command ran although nothing failed");
     let message = String::from_utf8_lossy(&done.stderr);
     assert!(message.contains("6 of 6 images checked, 1 rendered again and the same; 0 faults"), "{message}");
     same(&files(&folder), &whole(6));

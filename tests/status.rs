@@ -41,6 +41,14 @@ fn a_dataset_that_is_done_says_so() {
     let found = status(&data, &[]);
     assert_eq!((number(&found, "images"), number(&found, "done"), number(&found, "left_s")), (4.0, 4.0, 0.0));
     assert_eq!((number(&found, "working"), found["failures"].as_array().unwrap().len()), (0.0, 0));
+    let metrics = keep.path().join("furrow.prom");
+    reported(&data, &["--prometheus", path(&metrics)]);
+    let text = std::fs::read_to_string(metrics).unwrap();
+    for (name, value) in [("images", 4.0), ("images_done", 4.0), ("images_failed", 0.0), ("runs_active", 0.0)] {
+        let line = format!("furrow_{name}{{dataset=\"{}\"}} {value}", data.canonicalize().unwrap().display());
+        assert!(text.lines().any(|found| found == line), "no {line} in\n{text}");
+        assert!(text.contains(&format!("# TYPE furrow_{name} gauge\n")), "{text}");
+    }
     let shard = &found["shards"].as_array().unwrap()[..];
     assert_eq!((shard.len(), &shard[0]["state"]), (1, &Value::from("done")));
     // The images in the log, divided by the time from its first row to its last image.
@@ -332,6 +340,9 @@ fn the_cost_estimate_matches_the_run() {
             let arguments =
                 [&["dataset", "plan"][..], order, &["--count", count, "--out", path(&data), "--estimate"]].concat();
             assert!(estimate_rows(&arguments).keys().eq(rows.keys()), "{order:?}");
+            let priced = estimate_rows(&[&arguments[..], &["--price-per-core-hour", "3600"]].concat());
+            let (_, core) = priced["core hours"].split_once('(').unwrap();
+            assert!((first_number(&priced["price"]) / first_number(core) - 1.0).abs() < 0.01, "{priced:?}");
             assert!(!data.exists(), "{order:?}");
         }
         succeed(trace(&[&all[..], &["--quiet"]].concat()));
@@ -343,7 +354,11 @@ fn the_cost_estimate_matches_the_run() {
         let (_, core) = rows["core hours"].split_once('(').unwrap();
         let memory = first_number(&rows["memory"]);
         assert!((0.05..3600.0).contains(&first_number(core)) && (0.01..16.0).contains(&memory), "{rows:?}");
-        assert!(rows["shards"].contains("--shards 1 "), "{rows:?}");
+        assert!(rows["shards"].starts_with("1 with 8 cores"), "{rows:?}");
+        // The printed command works as it is on the finished dataset.
+        let emit: Vec<&str> = rows["once planned"].split(' ').skip(1).collect();
+        assert!(emit.contains(&"--shards"), "{rows:?}");
+        succeed(trace(&emit));
     }
 }
 

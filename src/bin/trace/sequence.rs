@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.labels_only = args.look.labels_only;
     args.content.enter(&mut order)?;
     if args.dry.dry_run {
-        return cost_estimate::run(&args.out, order, args.work.threads, args.work.quiet, signals);
+        return cost_estimate::run(&args.out, order, args.work.threads, args.work.quiet, args.dry.price, signals);
     }
     let set = begin(&args.out, order, args.work.quiet, signals)?;
     generate(&set, &args.work, Shard::ALL, args.memory.bytes, signals)?;

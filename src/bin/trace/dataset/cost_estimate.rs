@@ -7,6 +7,7 @@ use furrow_base::math::{ToFloat, ToInt};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Order;
+use furrow_dataset::deliver::cluster::quoted;
 use furrow_dataset::make::cost_estimate::{self, CostEstimate, Step};
 use furrow_job::Threads;
 use furrow_report::{count, number};
@@ -26,6 +27,21 @@ pub(crate) struct DryRunArgs {
     /// memory and a number of shards.
     #[arg(long)]
     pub(crate) dry_run: bool,
+    #[command(flatten)]
+    pub(crate) price: PriceArgs,
+}
+
+/// Price of the computation.
+#[derive(Clone, Copy, clap::Args)]
+pub(crate) struct PriceArgs {
+    /// Price of one core for an hour, in any currency; adds the price of the dataset to an estimate.
+    #[arg(long, value_name = "PRICE", value_parser = price)]
+    pub(crate) price_per_core_hour: Option<f64>,
+}
+
+fn price(text: &str) -> std::result::Result<f64, String> {
+    let price = text.parse::<f64>().ok().filter(|price| (0.0..=1e6).contains(price));
+    price.ok_or_else(|| "a price is a number from 0 to 1000000, such as 0.04".into())
 }
 
 /// Prints the estimated cost of an order, or an error if its folder cannot be used. Writes nothing there. `quiet` hides
@@ -35,6 +51,7 @@ pub(crate) fn run(
     mut order: Order,
     threads: usize,
     quiet: bool,
+    price: PriceArgs,
     signals: &Signals,
 ) -> Result<Vec<PathBuf>> {
     cli::check_folder(folder)?;
@@ -48,7 +65,7 @@ pub(crate) fn run(
     for warning in warnings {
         furrow_cli::message!("warning: {warning}");
     }
-    cli::print_rows(&rows(folder, &cost, threads.count()))?;
+    cli::print_rows(&rows(folder, &cost, threads.count(), price))?;
     Ok(Vec::new())
 }
 
@@ -73,7 +90,7 @@ fn listed(names: &[String]) -> String {
 }
 
 /// Formats an estimate as rows of a table.
-fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> {
+fn rows(folder: &Path, cost: &CostEstimate, threads: usize, price: PriceArgs) -> Vec<[String; 2]> {
     let CostEstimate { images, fields, core_s, grow_s, sample_s, bytes, files, .. } = *cost;
     let row = |name: &str, words: String| [name.to_owned(), words];
     let part = |seconds: f64| format!("{:.0} %", 100.0 * seconds / core_s.max(1e-9));
@@ -84,7 +101,9 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> 
     let with = count(threads.to_u64(), "thread", "threads");
     let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
     let memory = (cost.memory(CORES.to_usize()).to_f64() * SPARE / GIB).ceil().max(1.0);
-    vec![
+    let price = price.price_per_core_hour.map(|price| row("price", number(price * core_s / 3600.0)));
+    let shards = cost.shards(CORES);
+    let mut rows = vec![
         row("from", format!("{} with {samples} samples per pixel", listed(&probes))),
         row(
             "core hours",
@@ -112,11 +131,18 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize) -> Vec<[String; 2]> 
         row(
             "shards",
             format!(
-                "trace dataset emit {} --scheduler slurm --shards {} --cpus {CORES} --memory {memory:.0}: about {} hours each",
-                folder.display(),
-                cost.shards(CORES),
-                number(core_s / 3600.0 / f64::from(CORES) / cost.shards(CORES).to_f64())
+                "{shards} with {CORES} cores, about {} hours each",
+                number(core_s / 3600.0 / f64::from(CORES) / shards.to_f64())
             ),
         ),
-    ]
+        row(
+            "once planned",
+            format!(
+                "trace dataset emit {} --scheduler slurm --shards {shards} --cpus {CORES} --memory {memory:.0}",
+                quoted(&folder.to_string_lossy())
+            ),
+        ),
+    ];
+    rows.splice(2..2, price);
+    rows
 }

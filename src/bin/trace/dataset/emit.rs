@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_dataset::Set;
-use furrow_dataset::deliver::cluster::{self, Job, Pod, Scheduler};
+use furrow_dataset::deliver::cluster::{self, Alerts, Job, Pod, Scheduler};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -20,6 +20,17 @@ pub(crate) struct Args {
     /// Number of shards; each should take minutes to hours.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: u64,
+    /// Largest number of shards that run at the same time, such as to leave a cluster to others; for slurm and
+    /// kubernetes.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    max_running: Option<u64>,
+    /// Address to which Slurm sends mail when a shard fails and when the last job ends; for slurm.
+    #[arg(long, value_name = "ADDRESS")]
+    mail: Option<String>,
+    /// Run this shell command if images are missing or faulty at the end, with the dataset's folder in FURROW_DATASET
+    /// and the exit code in FURROW_CODE; for slurm.
+    #[arg(long, value_name = "COMMAND")]
+    on_failure: Option<String>,
     /// Number of cores per shard.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024))]
     cpus: u32,
@@ -85,6 +96,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let job = Job {
         scheduler,
         shards: args.shards,
+        running: args.max_running,
+        alerts: Alerts { mail: args.mail.clone(), on_failure: args.on_failure.clone() },
         cpus: args.cpus,
         memory_gib: args.memory,
         time: args.time,

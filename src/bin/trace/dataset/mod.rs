@@ -69,6 +69,8 @@ struct PlanArgs {
     /// memory and a number of shards.
     #[arg(long, alias = "bill")]
     estimate: bool,
+    #[command(flatten)]
+    price: cost_estimate::PriceArgs,
 }
 
 #[derive(clap::Args)]
@@ -86,10 +88,10 @@ struct MakeArgs {
 /// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(PlanArgs { order, estimate: true })) => {
-            cost_estimate::run(order.images.folder(), order.order()?, 0, false, signals)
+        Some(Verb::Plan(PlanArgs { order, estimate: true, price })) => {
+            cost_estimate::run(order.images.folder(), order.order()?, 0, false, *price, signals)
         }
-        Some(Verb::Plan(PlanArgs { order, estimate: false })) => {
+        Some(Verb::Plan(PlanArgs { order, estimate: false, .. })) => {
             let set = order::run(order, false, signals)?;
             order::print_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
@@ -101,8 +103,8 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Verify(args)) => verify::run(args, signals),
         Some(Verb::Emit(args)) => emit::run(args),
         None if cli.make.dry.dry_run => {
-            let MakeArgs { order, work, .. } = &cli.make;
-            cost_estimate::run(order.images.folder(), order.order()?, work.threads, work.quiet, signals)
+            let MakeArgs { order, work, dry, .. } = &cli.make;
+            cost_estimate::run(order.images.folder(), order.order()?, work.threads, work.quiet, dry.price, signals)
         }
         None => {
             let push = cli.make.push.push()?;

@@ -28,7 +28,7 @@ pub(super) fn files(dir: &str, job: &Job, pod: &Pod) -> Result<Vec<File>> {
         ("CLAIM", pod.claim.clone()),
         ("TRACE_YAML", text(&program)?),
         ("SHARDS", job.shards.to_string()),
-        ("PARALLELISM", job.shards.min(PARALLELISM).to_string()),
+        ("PARALLELISM", job.shards.min(job.running.unwrap_or(PARALLELISM)).to_string()),
         ("CPUS", job.cpus.to_string()),
         ("MEMORY", job.memory_gib.to_string()),
         ("AGAIN", job.again.to_string()),

@@ -15,8 +15,8 @@ mod request;
 mod script;
 mod slurm;
 
-pub use request::{Job, Pod, Scheduler};
-pub(super) use script::quoted;
+pub use request::{Alerts, Job, Pod, Scheduler};
+pub use script::quoted;
 
 use crate::Set;
 use furrow_base::input::{refuse_links, tidy};
@@ -75,6 +75,27 @@ fn check(set: &Set, job: &Job) -> Result<()> {
     }
     if let Scheduler::Kubernetes(pod) = &job.scheduler {
         pod.check()?;
+    }
+    job.alerts.check()?;
+    if job.scheduler != Scheduler::Slurm {
+        let is_parallel = job.scheduler == Scheduler::Parallel;
+        for (given, words, help) in [
+            (job.alerts.mail.is_some(), "--mail is for slurm", "leave it out"),
+            (
+                job.alerts.on_failure.is_some(),
+                "--on-failure is for slurm",
+                "leave it out; the script's exit code says it",
+            ),
+            (
+                is_parallel && job.running.is_some(),
+                "--max-running is for slurm and kubernetes",
+                "run the script with JOBS=N",
+            ),
+        ] {
+            if given {
+                return fault(words.into(), help);
+            }
+        }
     }
     if let Some(push) = &job.push {
         push.check()?;

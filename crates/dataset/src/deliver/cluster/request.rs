@@ -49,6 +49,35 @@ impl Pod {
     }
 }
 
+/// Whom a job tells that it has failed or ended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Alerts {
+    /// Address to which Slurm sends mail when a shard fails and when the finishing job ends.
+    pub mail: Option<String>,
+    /// Shell command that the finishing job runs if images are missing or faulty, with the dataset's folder in
+    /// `FURROW_DATASET` and the exit code in `FURROW_CODE`.
+    pub on_failure: Option<String>,
+}
+
+impl Alerts {
+    /// Returns an error for text that would break a line of the job files.
+    pub(super) fn check(&self) -> Result<()> {
+        if let Some(mail) = &self.mail
+            && (mail.is_empty() || mail.contains(|c: char| c.is_whitespace() || c.is_control()))
+        {
+            let help = "for example: --mail night@example.org";
+            return Err(Error::misuse(format!("--mail {mail:?} is not an address")).help(help));
+        }
+        if let Some(command) = &self.on_failure
+            && (command.trim().is_empty() || command.contains(char::is_control))
+        {
+            let help = "give a command on one line, such as --on-failure 'notify \"$FURROW_DATASET\"'";
+            return Err(Error::misuse(format!("--on-failure {command:?} is not a command")).help(help));
+        }
+        Ok(())
+    }
+}
+
 /// Settings of the job files of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Job {
@@ -56,6 +85,10 @@ pub struct Job {
     pub scheduler: Scheduler,
     /// Number of shards.
     pub shards: u64,
+    /// Largest number of shards that run at the same time; `None` for no limit of ours.
+    pub running: Option<u64>,
+    /// Messages about failures and the end.
+    pub alerts: Alerts,
     /// Number of cores per shard.
     pub cpus: u32,
     /// Memory per shard, GiB.
@@ -80,6 +113,15 @@ impl Job {
     pub(super) fn rendering(&self) -> String {
         let scratch = self.scratch.as_ref().map(|scratch| format!(" --scratch {}", expanded(scratch)));
         scratch.unwrap_or_default() + &self.pushing()
+    }
+
+    /// Returns the lines that scripts append to their last command: the command for failures, or nothing.
+    pub(super) fn on_failure(&self) -> String {
+        let Some(command) = &self.alerts.on_failure else { return String::new() };
+        format!(
+            "\ncode=$?\n[ \"$code\" -eq 0 ] || FURROW_DATASET=$dir FURROW_CODE=$code sh -c {}\nexit \"$code\"",
+            quoted(command)
+        )
     }
 
     /// Returns the options that scripts append to `finish`: those for pushing, or none.

@@ -25,7 +25,7 @@ pub(super) fn name(dir: &str) -> String {
 }
 
 /// Quotes a string so that the shell reads it as one word.
-pub(crate) fn quoted(word: &str) -> String {
+pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();

@@ -9,6 +9,12 @@ use std::time::Duration;
 /// Returns the two jobs and the script that submits them.
 pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
     let array = if job.shards == 1 { "0".into() } else { format!("0-{}", job.shards - 1) };
+    let array = job.running.map_or(array.clone(), |running| format!("{array}%{running}"));
+    let mail = |events: &str| {
+        let lines =
+            job.alerts.mail.iter().map(|mail| format!("\n#SBATCH --mail-user={mail}\n#SBATCH --mail-type={events}"));
+        lines.collect::<String>()
+    };
     let names = [
         ("NAME", name(dir)),
         ("DIR", dir.to_owned()),
@@ -18,6 +24,9 @@ pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {
         ("RENDERING", job.rendering()),
         ("PUSH", job.pushing()),
         ("ARRAY", array),
+        ("MAIL_SHARD", mail("FAIL")),
+        ("MAIL_END", mail("END,FAIL")),
+        ("ON_FAILURE", job.on_failure()),
         ("CPUS", job.cpus.to_string()),
         ("MEMORY", job.memory_gib.to_string()),
         ("TIME", time(job.time)),

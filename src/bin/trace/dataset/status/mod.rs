@@ -1,6 +1,7 @@
 //! Progress of a dataset: `trace dataset status`.
 
 mod page;
+mod prometheus;
 
 use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
@@ -38,6 +39,10 @@ pub(crate) struct Args {
     /// reloads itself.
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Also write the numbers as a text file of Prometheus metrics, such as for the textfile collector of its node
+    /// exporter. With --watch it is rewritten at every update.
+    #[arg(long, value_name = "FILE")]
+    prometheus: Option<PathBuf>,
     /// Number of shards. Default: that of the last run.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     shards: Option<u64>,
@@ -45,7 +50,9 @@ pub(crate) struct Args {
 
 /// Prints the status once, or until all images are done.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    args.page.as_deref().map_or(Ok(()), |page| check_page(page, &args.dir))?;
+    for file in [&args.page, &args.prometheus].into_iter().flatten() {
+        check_outside(file, &args.dir)?;
+    }
     let stop = signals.catch();
     loop {
         // The dataset may have been extended meanwhile.
@@ -55,6 +62,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         if let Some(path) = &args.page {
             let again = (args.watch && !status.is_done()).then_some(EVERY.as_secs());
             write_atomically(path, page::html(&set, &status, again).as_bytes())?;
+        }
+        if let Some(path) = &args.prometheus {
+            write_atomically(path, prometheus::metrics(&set.folder, &status).as_bytes())?;
         }
         let is_read = print(&text, args.watch && !args.json)?;
         if status.is_done() || !args.watch || !is_read {
@@ -70,14 +80,14 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// Returns an error if the page is a folder, or inside the dataset's folder.
-fn check_page(page: &Path, dataset: &Path) -> Result<()> {
-    cli::check_file(page)?;
-    let folder = page.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+/// Returns an error if the file is a folder, or inside the dataset's folder.
+fn check_outside(file: &Path, dataset: &Path) -> Result<()> {
+    cli::check_file(file)?;
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match (folder.canonicalize(), dataset.canonicalize()) {
         (Ok(folder), Ok(dataset)) if folder.starts_with(&dataset) => {
-            let error = Error::misuse("this file is inside the dataset's folder").in_file(page);
-            Err(error.help("give --page a file elsewhere"))
+            let error = Error::misuse("this file is inside the dataset's folder").in_file(file);
+            Err(error.help("give a file elsewhere"))
         }
         _ => Ok(()),
     }
