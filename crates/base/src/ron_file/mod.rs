@@ -7,11 +7,14 @@
 //!
 //! [`Spliced`] is a text assembled from several files. Its errors are shown where the text was originally written.
 //!
+//! [`Assignment`] replaces or adds one value of a text by its path.
+//!
 //! `quantities` lists the numbers and distributions of a text with their positions, for programs that show or replace
 //! one of them.
 //!
 //! Types that deserialize themselves from raw text use [`from_raw`]; they report a [`Fault`], which keeps its position.
 
+mod assignment;
 mod bound;
 mod entries;
 mod fault;
@@ -24,6 +27,7 @@ mod spliced;
 mod suggest;
 mod vary;
 
+pub use assignment::Assignment;
 pub use bound::{Bound, Count, Elevation, Factor, Fraction, NonNegative, Positive, PositiveCount, Signed};
 pub use entries::entries;
 pub use fault::{Fault, from_raw, inside, parse_in, whole};

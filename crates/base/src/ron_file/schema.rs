@@ -50,19 +50,40 @@ pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> 
 /// at its end. Names inside a number are not checked.
 pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
     let root = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
-    let mut at = resolved(&root, &root);
+    match at_end(&root, path) {
+        Ok(at) if at.get(KIND).is_some() => (path.len(), Vec::new()),
+        Ok(at) => (path.len(), names(&root, at)),
+        Err(depth) => (depth, Vec::new()),
+    }
+}
+
+/// Returns the schema at the end of a path, or that of the number in which it ends; else the number of names on the path
+/// that exist.
+fn at_end<'a>(root: &'a Value, path: &[&str]) -> Result<&'a Value, usize> {
+    let mut at = resolved(root, root);
     for (k, step) in path.iter().enumerate() {
         if at.get(KIND).is_some() {
-            return (path.len(), Vec::new());
+            break;
         }
-        match within(&root, at, step) {
+        match within(root, at, step) {
             Some(inner) => at = inner,
             // The file's own name, or the name in front of a struct's fields.
             None if k == 0 || step.starts_with(char::is_uppercase) && at.get("properties").is_some() => {}
-            None => return (k, Vec::new()),
+            None => return Err(k),
         }
     }
-    (path.len(), names(&root, at))
+    Ok(at)
+}
+
+/// Returns `true` if `T`'s file has a string at the end of a path that exists.
+pub(super) fn is_text<T: JsonSchema>(path: &[&str]) -> bool {
+    at_end(&SchemaGenerator::default().into_root_schema_for::<T>().to_value(), path).is_ok_and(|at| {
+        match at.get("type") {
+            Some(Value::String(one)) => one == "string",
+            Some(Value::Array(several)) => several.iter().any(|one| one == "string"),
+            _ => false,
+        }
+    })
 }
 
 /// A name allowed at a place, and whether it takes a number in brackets.
