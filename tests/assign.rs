@@ -64,7 +64,11 @@ fn errors_point_into_the_argument() {
             "crops[0].species=maiz",
             "--set:1:18: no built-in species is called `maiz`",
         ),
-        (&["export", "--format", "gltf", "--scene"], "soil.clods.min_mm=60", "--set:1:"),
+        (
+            &["export", "--format", "gltf", "--scene"],
+            "lights[0].sun.elevation_deg=Normal(mean:-3,sd:1)",
+            "--set:1:41: ",
+        ),
         (&["dataset", "plan", "--count", "1", "--scene"], "weeds[3].spread=()", "--set:1:6: there is no item [3]"),
         (&["--scene"], "camera.pose.pitch_deg=1O", "--set:1:23: "),
     ] {

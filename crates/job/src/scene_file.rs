@@ -43,6 +43,12 @@ impl SceneFile {
         Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
     }
 
+    /// Returns the scene file of a text, with one edit. Its paths are relative to the folder of `path`, which need not exist.
+    pub fn of_text(path: impl AsRef<Path>, text: &str, edit: &'static Edit) -> Result<Self> {
+        let source = Arc::new(edit.of_text(path.as_ref(), text)?);
+        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
+    }
+
     /// Returns the scene file with these values instead of its own. Errors about a value are shown in the value.
     pub fn assign(self, values: &[Assignment]) -> Result<Self> {
         if values.is_empty() {

@@ -113,14 +113,19 @@ impl FieldArgs {
         asked: impl FnOnce(SceneFile) -> SceneFile,
         note: impl Fn(&str),
     ) -> Result<Field> {
-        let note = |warning: &String| note(&format!("warning: {warning}"));
+        self.grow(&asked(self.of(SceneFile::edited(self.path(), edit)?)?), note)
+    }
+
+    /// Returns a scene file with the values, seed, size, day and memory limit of these options.
+    pub(crate) fn of(&self, scene: SceneFile) -> Result<SceneFile> {
         let SceneArgs { seed, width, height, .. } = self.scene;
-        let scene = SceneFile::edited(self.path(), edit)?
-            .assign(&self.scene.set.values)?
-            .seed(seed)
-            .width(width)
-            .height(height);
-        let scene = asked(scene.day(self.day).memory(self.memory.bytes));
+        let scene = scene.assign(&self.scene.set.values)?.seed(seed).width(width).height(height);
+        Ok(scene.day(self.day).memory(self.memory.bytes))
+    }
+
+    /// Builds the field of a scene file. Warnings are passed to `note` as soon as they are known.
+    pub(crate) fn grow(&self, scene: &SceneFile, note: impl Fn(&str)) -> Result<Field> {
+        let note = |warning: &String| note(&format!("warning: {warning}"));
         let expected_warnings = scene.expected_warnings(self.index)?;
         expected_warnings.iter().for_each(note);
         let mut field = scene.field(self.index)?;

@@ -1,7 +1,7 @@
 //! Assignments: values that replace or add those of a RON text, given by their paths on the command line.
 
 use super::file::RonFile;
-use super::place::{Step, find, members, mismatch, path_at, place, value_end};
+use super::place::{Step, find, members, path_at, place};
 use super::schema;
 use super::spliced::Spliced;
 use crate::{Error, Result};
@@ -125,8 +125,7 @@ impl Assignment {
                 return Ok(with(ron::ser::to_string(value).unwrap_or_else(|_| format!("{value:?}"))));
             }
         }
-        let alone = value_end(value, 0) == value.len() && mismatch(value).is_none();
-        if !alone || RonFile::of(value).check_syntax().is_err() {
+        if !RonFile::of(value).is_value() {
             let help = "write it as in a scene file; shells need quotes around brackets: --set 'camera.size=(64, 48)'";
             return Err(self.page.about_bytes(self.value.clone(), "this is not one value", help));
         }

@@ -9,6 +9,8 @@
 //!
 //! [`Assignment`] replaces or adds one value of a text by its path.
 //!
+//! [`to_json`] and [`from_json`] convert texts for programs that edit them as nested tables.
+//!
 //! `quantities` lists the numbers and distributions of a text with their positions, for programs that show or replace
 //! one of them.
 //!
@@ -19,6 +21,7 @@ mod bound;
 mod entries;
 mod fault;
 mod file;
+mod json;
 mod num;
 mod place;
 mod quantities;
@@ -32,6 +35,7 @@ pub use bound::{Bound, Count, Elevation, Factor, Fraction, NonNegative, Positive
 pub use entries::entries;
 pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;
+pub use json::{from_json, to_json};
 pub use num::Num;
 pub use place::{Step, place};
 pub use quantities::{Quantity, Value, quantities};

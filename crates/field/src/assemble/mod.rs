@@ -96,6 +96,13 @@ impl Source {
         Self::of(Spliced::of(page), library)
     }
 
+    /// Takes `text` as the scene file at `path`, which need not exist and may name files anywhere.
+    pub fn of_text(path: &Path, text: &str) -> Result<Self> {
+        let mut library = Library::default();
+        let page = library.page_of(path, text);
+        Self::of(Spliced::of(page), library)
+    }
+
     /// Returns the scene file with these values instead of its own.
     pub fn assign(&self, values: &[Assignment]) -> Result<Self> {
         self.read(Some(&self.page().text), values)
