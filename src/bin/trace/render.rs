@@ -168,7 +168,9 @@ impl Args {
         let watch = RenderMonitor { done: &done, stop: &AtomicBool::new(false) };
         let request = Request { window: self.crop, view: self.integrator, begin: Some(begin), watch };
         let image = renderer.render(&field, &request)?;
-        missed(&options.quality, &image.film, begin.elapsed()).iter().for_each(|words| warn(words));
+        for words in missed(&options.quality, &image.film, begin.elapsed()) {
+            warn(&words);
+        }
         then(Made { scene: &scene, renderer: &renderer, image, whole: self.crop.is_none() })
     }
 }

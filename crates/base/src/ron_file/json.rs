@@ -106,7 +106,7 @@ impl Printer<'_> {
         match value {
             Value::Null => "None".to_owned(),
             Value::Bool(_) | Value::Number(_) => value.to_string(),
-            Value::String(word) if self.takes_names(schema) && is_ron(word) => word.clone(),
+            Value::String(word) if takes_names(schema) && is_ron(word) => word.clone(),
             Value::String(text) => string(text),
             Value::Array(items) => self.list(schema, items, depth),
             Value::Object(fields) => self.object(schema, fields, depth),
@@ -186,13 +186,13 @@ impl Printer<'_> {
     fn resolved<'v>(&'v self, schema: &'v Value) -> &'v Value {
         schema::referenced(self.root, schema).map_or(schema, |inner| self.resolved(inner))
     }
+}
 
-    /// Returns `true` if a string in this place is a name, a number or a distribution.
-    fn takes_names(&self, schema: &Value) -> bool {
-        let is_text = schema.get("type").is_some_and(|of| *of == "string" || of.get(0) == Some(&"string".into()));
-        let names = schema.get("oneOf").is_some() || schema.get("enum").is_some();
-        names || schema.get(KIND).is_some() && !is_text
-    }
+/// Returns `true` if a string in the place of this schema is a name, a number or a distribution.
+fn takes_names(schema: &Value) -> bool {
+    let is_text = schema.get("type").is_some_and(|of| *of == "string" || of.get(0) == Some(&"string".into()));
+    let names = schema.get("oneOf").is_some() || schema.get("enum").is_some();
+    names || schema.get(KIND).is_some() && !is_text
 }
 
 /// Returns `true` for the schema of a tuple or an array, which have a fixed number of items.
@@ -214,8 +214,8 @@ fn bracketed((open, close): (&str, &str), items: &[String], depth: usize) -> Str
         return format!("{open}{}{close}", items.join(", "));
     }
     let (outer, inner) = ("    ".repeat(depth), "    ".repeat(depth + 1));
-    let lines: String = items.iter().map(|item| format!("{inner}{item},\n")).collect();
-    format!("{open}\n{lines}{outer}{close}")
+    let separator = format!(",\n{inner}");
+    format!("{open}\n{inner}{},\n{outer}{close}", items.join(&separator))
 }
 
 #[cfg(test)]

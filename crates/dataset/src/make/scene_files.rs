@@ -41,9 +41,10 @@ pub(crate) fn collect_files(
     let mut gathered = Vec::new();
     for (from, to) in &places {
         let is_scene = *from == scene;
-        let mut bytes = match is_scene {
-            true => text.as_bytes().to_vec(),
-            false => furrow_base::input::contents(from).map_err(Error::reading(from))?,
+        let mut bytes = if is_scene {
+            text.as_bytes().to_vec()
+        } else {
+            furrow_base::input::contents(from).map_err(Error::reading(from))?
         };
         if from.extension().is_some_and(|e| e == "ron")
             && let Ok(text) = std::str::from_utf8(&bytes)

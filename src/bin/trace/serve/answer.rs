@@ -111,29 +111,30 @@ impl Answer {
     }
 }
 
-/// Receiver of answers: stdout.
-pub(super) struct Sink {
+/// Sends an answer. Returns `false` if the other program has closed the pipe.
+pub(super) fn send(answer: Result<Answer>) -> Result<bool> {
+    let Answer { values, maps } = answer.unwrap_or_else(|error| Answer::of("error", described(&error).to_string()));
+    let values: Vec<String> = values.iter().map(|(name, value)| format!("\"{name}\": {value}")).collect();
+    let mut bytes = format!("{{{}}}\n", values.join(", ")).into_bytes();
+    for map in &maps {
+        bytes.extend(&map.bytes);
+    }
+    written(&bytes)
+}
+
+/// Sends lines of progress, not more often than [`EVERY`].
+pub(super) struct Progress {
     last: Mutex<Instant>,
 }
 
-impl Default for Sink {
-    fn default() -> Self {
+impl Progress {
+    /// Begins to measure the interval.
+    pub(super) fn begin() -> Self {
         Self { last: Mutex::new(Instant::now()) }
     }
-}
 
-impl Sink {
-    /// Sends an answer. Returns `false` if the other program has closed the pipe.
-    pub(super) fn send(&self, answer: Result<Answer>) -> Result<bool> {
-        let Answer { values, maps } = answer.unwrap_or_else(|error| Answer::of("error", described(&error).to_string()));
-        let values: Vec<String> = values.iter().map(|(name, value)| format!("\"{name}\": {value}")).collect();
-        let mut bytes = format!("{{{}}}\n", values.join(", ")).into_bytes();
-        maps.iter().for_each(|map| bytes.extend(&map.bytes));
-        written(&bytes)
-    }
-
-    /// Sends a line of progress, a fraction from 0 to 1, unless the last one was sent just before.
-    pub(super) fn progress(&self, done: f64) {
+    /// Sends a fraction from 0 to 1, unless the last line was sent just before.
+    pub(super) fn send(&self, done: f64) {
         let Ok(mut last) = self.last.try_lock() else { return };
         if last.elapsed() >= EVERY {
             *last = Instant::now();

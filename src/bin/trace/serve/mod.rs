@@ -9,7 +9,7 @@ mod answer;
 mod scene;
 
 use crate::render;
-use answer::{Answer, Sink};
+use answer::{Answer, Progress};
 use clap::Parser;
 use furrow_base::ron_file::to_json;
 use furrow_base::supervise::supervised;
@@ -80,22 +80,21 @@ pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
             .help("use the Python module `furrow`, or see `trace serve --help`"));
     }
     let mut kept = Kept::default();
-    let sink = Sink::default();
     for line in io::stdin().lock().lines() {
         let line = line.map_err(|e| Error::failed(format!("cannot read stdin: {e}")))?;
-        let answer = supervised(|| answer(&line, &mut kept, &sink)).and_then(|answer| answer);
+        let answer = supervised(|| answer(&line, &mut kept)).and_then(|answer| answer);
         if answer.is_err() {
             // An error may have interrupted a change of what is kept.
             kept = Kept::default();
         }
-        if !sink.send(answer)? {
+        if !answer::send(answer)? {
             break;
         }
     }
     Ok(Vec::new())
 }
 
-fn answer(line: &str, kept: &mut Kept, sink: &Sink) -> Result<Answer> {
+fn answer(line: &str, kept: &mut Kept) -> Result<Answer> {
     let request = serde_json::from_str(line)
         .map_err(|e| Error::misuse(format!("this is not a request: {e}")).help("see `trace serve --help`"))?;
     match request {
@@ -105,23 +104,20 @@ fn answer(line: &str, kept: &mut Kept, sink: &Sink) -> Result<Answer> {
             Ok(Answer::of("scene", to_json(&text)).with("file", &file.to_string_lossy().into()))
         }
         Request::Write(source) => Ok(Answer::of("text", Value::from(source.absolute_text()?).to_string())),
-        Request::Render(request) => image(&request, kept, sink),
+        Request::Render(request) => image(&request, kept),
     }
 }
 
 /// Renders an image and describes it.
-fn image(request: &RenderRequest, kept: &mut Kept, sink: &Sink) -> Result<Answer> {
+fn image(request: &RenderRequest, kept: &mut Kept) -> Result<Answer> {
     let path = request.source.path().display().to_string();
     let words = ["--scene".to_owned(), path, "--quiet".to_owned()].into_iter().chain(request.arguments.iter().cloned());
     let options = Options::try_parse_from(words).map_err(|e| unparsed(&e))?.render;
     let scene = kept.scene(&request.source, options.edit()?)?;
     let warnings = RefCell::new(Vec::new());
     let warn = |words: &str| warnings.borrow_mut().push(words.to_owned());
-    let progress = |done: f64| {
-        if request.progress {
-            sink.progress(done);
-        }
-    };
+    let sent = request.progress.then(Progress::begin);
+    let progress = |done: f64| sent.iter().for_each(|progress| progress.send(done));
     let (answer, files) = options.image(scene, &progress, &warn, |made| {
         let files = made.image.field().grown().files.clone();
         let provenance = made.image.provenance.photograph_text(made.image.denoised.is_some());
