@@ -542,3 +542,27 @@ fn normals_are_smooth_and_face_the_camera_everywhere() {
     }
     assert!(compared * 1000 > parts.len() * 998, "only {compared} depths of {} agree", parts.len());
 }
+
+/// Rationale: volunteer potatoes are weeds, and a cover crop may be a weed elsewhere. Expected: the list in the scene file
+/// decides on the class, for plants, pixels and the species table, and a warning names the species. Source: the lists.
+#[test]
+fn the_list_of_a_species_decides_its_class() {
+    let (text, listed) = (program::small_text(), [("sugar_beet", "beet"), ("chenopodium", "fat hen")]);
+    let [crop, weed] = listed.map(|(file, _)| format!("species: \"scenes/species/{file}.ron\""));
+    let swapped = text.replacen(&crop, "species: \"?\"", 1).replace(&weed, &crop).replace("species: \"?\"", &weed);
+    for (text, fat_hen, warnings) in [(&text, Class::Weed, 0), (&swapped, Class::Crop, 2)] {
+        let field = program::field(text, &Options { width: Some(32), ..Options::default() });
+        let of: Vec<_> = field.plants.iter().filter(|plant| plant.species == "fat hen").collect();
+        assert!(!of.is_empty() && of.iter().all(|plant| plant.class == fat_hen), "{fat_hen:?}");
+        let kinds = of.iter().map(|plant| &field.species[usize::from(plant.kind) - 1]);
+        assert!(kinds.into_iter().all(|kind| (kind.name.as_str(), kind.class) == ("fat hen", fat_hen)));
+        let numbers: Vec<u32> = of.iter().map(|plant| plant.number).collect();
+        let tags = field.scene.tags();
+        assert!(tags.iter().filter(|tag| numbers.contains(&tag.plant)).all(|tag| tag.class == fat_hen));
+        let told: Vec<_> = field.warnings.iter().filter(|words| words.contains("` lists it")).collect();
+        assert_eq!(told.len(), warnings, "{told:?}");
+        // Single plants keep the role of their species file.
+        let single = field.plants.iter().find(|plant| plant.species == "sugar beet" && plant.age_days == 20.0);
+        assert_eq!(single.map(|plant| plant.class), Some(Class::Crop));
+    }
+}

@@ -17,6 +17,7 @@ mod accel;
 #[cfg(feature = "train")]
 mod adapt;
 mod analytic;
+mod assign;
 mod bsdf;
 mod camera;
 mod classes;

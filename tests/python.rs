@@ -110,6 +110,24 @@ fn pytorch_loads_batches_of_a_dataset() {
     done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
 }
 
+/// Expected: a misspelt keyword is an error of type checkers, and the right one is not.
+#[test]
+fn a_misspelt_keyword_is_an_error_of_types() {
+    let Some(python) = python("import mypy, numpy, PIL") else { return };
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let file = folder.join("misspelt.py");
+    for (keyword, code) in [("width", 0), ("wdith", 1)] {
+        std::fs::write(&file, format!("import furrow\nfurrow.load('field').render({keyword}=3)\n")).expect("a file");
+        let mut check = Command::new(&python);
+        check.args(["-m", "mypy", "--cache-dir", env!("CARGO_TARGET_TMPDIR")]).arg(&file).env("MYPYPATH", source());
+        let output = check.output().expect("mypy");
+        let words = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(code), "{words}");
+        assert_eq!(words.contains("did you mean \"width\"?"), code == 1, "{words}");
+    }
+}
+
 #[test]
 fn the_types_of_the_module_are_right() {
     let Some(python) = python("import mypy, numpy, PIL") else { return };

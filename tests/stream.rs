@@ -264,6 +264,16 @@ fn python_reads_twenty_images_and_stops() {
 }
 
 #[test]
+fn scenes_are_dicts_in_python() {
+    let Some(python) = python("import numpy, PIL") else { return };
+    let (_keep, data) = scratch();
+    let order = ["--count", "2", "--width", "48", "--spp", "1", "--quiet", "--out", path(&data)];
+    succeed(trace(&[&["dataset", "--scene", SMALL], &order[..]].concat()));
+    let folder = tempfile::tempdir().expect("a folder");
+    script(python, "check_scene.py", &[SMALL, path(&data), path(folder.path())]);
+}
+
+#[test]
 fn pytorch_trains_on_a_stream_as_the_guide_shows() {
     let Some(python) = torch_with("PIL") else { return };
     let page = crate::common::book::read("docs/guide/datasets.md");

@@ -1,5 +1,6 @@
 """Checks that the module `furrow` reads and renders the same as the program. Arguments: a dataset of two images, a folder."""
 
+import io
 import os
 import shutil
 import sys
@@ -32,7 +33,7 @@ splits = [len(furrow.Dataset(dataset, split=name)) for name in ("train", "val", 
 assert splits == [1, 1, 0], splits
 assert furrow.Dataset(dataset, split="val")[0]["record"]["split"] == "val"
 assert furrow.Dataset(dataset, transform=lambda s: s["image"].mean())[0] > 0
-for wrong, error in [(lambda: data[2], IndexError), (lambda: furrow.Dataset(folder), furrow.Error)]:
+for wrong, error in [(lambda: data[2], IndexError), (lambda: furrow.Dataset(folder), furrow.FurrowError)]:
     try:
         wrong()
     except error:
@@ -48,7 +49,7 @@ def told(path: str, content: bytes) -> str:
     (copy / path).write_bytes(content)
     try:
         furrow.Dataset(copy)[0]
-    except furrow.Error as error:
+    except furrow.FurrowError as error:
         return str(error)
     finally:
         shutil.rmtree(copy)
@@ -69,21 +70,24 @@ for path, content in [
 
 # Rendering leaves no files behind, and equals the program's output for the same field.
 rendered = furrow.render("field", index=1, spp=1, width=64)
-assert rendered["image"].shape[1] == 64 and rendered["record"]["index"] == "1", rendered["record"]
+assert rendered["image"].shape[1] == 64 and rendered.record["index"] == 1, rendered.record
 assert not list(folder.iterdir()) or "out" not in [p.name for p in folder.iterdir()]
-assert furrow.Image.open(__import__("io").BytesIO(rendered._repr_png_())).size[0] == 64
+assert rendered.provenance["spp"] == "1" and rendered.provenance["index"] == "1", rendered.provenance
+assert Image.open(io.BytesIO(rendered._repr_png_())).size[0] == 64
+assert rendered._repr_html_().count("data:image/png;base64,") == 2
+assert repr(rendered).startswith("furrow.Image(64 × 48, index 1, "), rendered
 part = furrow.render("field", spp=1, width=64, crop=(0, 0, 20, 10), without=["mis"])
 assert part["plants"].shape == (10, 20)
 try:
     furrow.render("fild")
-except furrow.Error as error:
+except furrow.FurrowError as error:
     assert "did you mean field" in str(error), error
 else:
     raise AssertionError("a missing scene file was accepted")
 os.environ["FURROW_TRACE"] = "/nowhere/trace"
 try:
     furrow.render("field")
-except furrow.Error as error:
+except furrow.FurrowError as error:
     assert "/nowhere/trace" in str(error), error
 else:
     raise AssertionError("a missing program was accepted")

@@ -21,7 +21,7 @@ def remembered(*arguments, **named):
     return started[-1]
 
 
-furrow.subprocess.Popen = remembered
+subprocess.Popen = remembered
 
 # Twenty samples of an endless stream; afterwards the program and its temporary files are gone.
 with tempfile.TemporaryDirectory() as folder:
@@ -60,7 +60,7 @@ assert "image" not in bare and bare["semantics"].ndim == 2 and bare["record"]["i
 for flags, words in [({"count": 0}, "0 is not in"), ({"shard": (3, 2)}, "k/N"), ({"without": ["none-such"]}, "none-such")]:
     try:
         next(furrow.stream(scene, **flags))
-    except furrow.Error as error:
+    except furrow.FurrowError as error:
         assert words in str(error), error
     else:
         raise AssertionError(flags)
@@ -71,14 +71,14 @@ started[-1].kill()
 try:
     for _ in samples:
         pass
-except furrow.Error as error:
+except furrow.FurrowError as error:
     assert "ended with -9" in str(error), error
 else:
     raise AssertionError("a truncated stream ended without an error")
 os.environ["FURROW_TRACE"] = "/nowhere/trace"
 try:
     next(furrow.stream(scene))
-except furrow.Error as error:
+except furrow.FurrowError as error:
     assert "/nowhere/trace" in str(error), error
 else:
     raise AssertionError("a missing program was accepted")

@@ -1,6 +1,7 @@
 //! Builds a crop field from a scene file: ground, plants, models, lights, cameras and LiDARs.
 
 pub mod ablation;
+mod aliases;
 pub mod assemble;
 pub mod days;
 pub mod desc;

@@ -1,5 +1,6 @@
 //! Species that ship with the program, and the names that a scene file can use for them.
 
+use super::aliases;
 use super::desc::SpeciesDesc;
 use furrow_base::input::shipped;
 use furrow_base::ron_file::nearest;
@@ -21,10 +22,12 @@ impl Shipped {
         self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Returns the names that identify the species: file name without `.ron`, EPPO code, English name, scientific name.
-    fn names(&self) -> [String; 4] {
+    /// Returns the names that identify the species: file name without `.ron`, EPPO code, English name, scientific name, and its names
+    /// in other languages.
+    fn names(&self) -> Vec<String> {
         let SpeciesDesc { name, scientific, eppo, .. } = &self.desc;
-        [self.stem(), eppo.clone(), name.clone(), scientific.clone()]
+        let own = [self.stem(), eppo.clone(), name.clone(), scientific.clone()];
+        own.into_iter().chain(aliases::of(&self.stem()).iter().map(|name| (*name).to_owned())).collect()
     }
 
     /// Returns `true` if `word` is one of the words of the English name, such as `thistle` in "creeping thistle".
@@ -50,7 +53,7 @@ pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
 }
 
 /// Finds the file of the species with this name: `cirsium`, `cirsium.ron`, `CIRAR`, `creeping thistle`, `Cirsium arvense`, or a
-/// word that occurs in the English name of no other species, `thistle`. Returns `None` if `name` is the name of some other file,
+/// word that occurs in the English name of no other species, `thistle`; or by a name in another language, `Ackerkratzdistel`. Returns `None` if `name` is the name of some other file,
 /// and an error if it is not a file name and no species has that name.
 pub fn species(name: &str) -> Result<Option<PathBuf>> {
     let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
@@ -66,7 +69,7 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
         return Ok(None);
     }
     let (all, _) = all_species()?;
-    let called = |species: &&Shipped| species.names().iter().any(|own| own.eq_ignore_ascii_case(wanted));
+    let called = |species: &&Shipped| species.names().iter().any(|own| aliases::same(own, wanted));
     if let Some(species) = all.iter().find(called) {
         return Ok(Some(species.file.clone()));
     }
@@ -79,7 +82,7 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
         [] => {
             let words = |species: &Shipped| species.desc.name.split(' ').map(str::to_owned).collect::<Vec<_>>();
             let mut names: Vec<String> =
-                all.iter().flat_map(|species| [&species.names()[..], &words(species)].concat()).collect();
+                all.iter().flat_map(|species| [species.names(), words(species)].concat()).collect();
             names.retain(|name| !name.is_empty());
             let near = nearest(&names, wanted).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
             Err(Error::input(format!("no built-in species is called `{wanted}`"))
@@ -97,6 +100,20 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
 mod tests {
     use super::*;
 
+    /// Expected: every shipped species has further names, and none of them is a name of another one.
+    #[test]
+    fn no_name_means_two_species() {
+        let all = all_species().unwrap().0;
+        let stems: Vec<String> = all.iter().map(Shipped::stem).collect();
+        assert_eq!(stems, aliases::ALIASES.map(|(stem, _)| stem));
+        for one in &all {
+            for other in all.iter().filter(|other| other.file != one.file) {
+                let twice = one.names().into_iter().find(|a| other.names().iter().any(|b| aliases::same(a, b)));
+                assert_eq!(twice, None, "{} and {}", one.stem(), other.stem());
+            }
+        }
+    }
+
     #[test]
     fn every_name_of_a_species_leads_to_its_file() {
         for species in all_species().unwrap().0 {
@@ -108,6 +125,18 @@ mod tests {
         let stem = |name| species(name).unwrap().map(|file| file.file_stem().unwrap().to_str().unwrap().to_owned());
         for name in ["cirsium", "cirsium.ron", "CIRAR", "cirar", "Cirsium arvense", "creeping thistle", "thistle"] {
             assert_eq!(stem(name).as_deref(), Some("cirsium"), "{name}");
+        }
+        for (name, file) in [
+            ("corn", "maize"),
+            ("Canola", "rape"),
+            ("lambsquarters", "chenopodium"),
+            ("Zuckerrübe", "sugar_beet"),
+            ("zuckerruebe", "sugar_beet"),
+            ("betterave sucriere", "sugar_beet"),
+            ("Shepherds-purse", "capsella"),
+            ("trigo", "wheat"),
+        ] {
+            assert_eq!(stem(name).as_deref(), Some(file), "{name}");
         }
         assert_eq!((stem("thistle.ron"), stem("a.glb")), (None, None));
     }

@@ -203,6 +203,7 @@ impl Renderer {
                 .into_iter()
                 .chain(edit)
                 .chain(left_out.map(String::from))
+                .chain(grown.assigned.iter().map(|value| format!("set: {value}")))
                 .collect(),
             kernels: self.kernels().into(),
         }

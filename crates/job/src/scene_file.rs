@@ -5,6 +5,7 @@ use super::threads::Threads;
 use furrow_base::Result;
 use furrow_base::input::Scope;
 use furrow_base::math::ToInt;
+use furrow_base::ron_file::Assignment;
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::{BuildProgress, Options, Preview, Scanner, Source};
 use furrow_field::estimate::Estimate;
@@ -40,6 +41,20 @@ impl SceneFile {
     pub fn open_within(path: impl AsRef<Path>, edit: &'static Edit, scope: Scope) -> Result<Self> {
         let source = Arc::new(edit.open(path.as_ref(), scope)?);
         Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
+    }
+
+    /// Returns the scene file of a text, with one edit. Its paths are relative to the folder of `path`, which need not exist.
+    pub fn of_text(path: impl AsRef<Path>, text: &str, edit: &'static Edit) -> Result<Self> {
+        let source = Arc::new(edit.of_text(path.as_ref(), text)?);
+        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
+    }
+
+    /// Returns the scene file with these values instead of its own. Errors about a value are shown in the value.
+    pub fn assign(self, values: &[Assignment]) -> Result<Self> {
+        if values.is_empty() {
+            return Ok(self);
+        }
+        Ok(Self { source: Arc::new(self.source.assign(values)?), ..self })
     }
 
     /// Reads the scene file again from disk, or takes `text` instead. Species, textures and models that did not change are not decoded

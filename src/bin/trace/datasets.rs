@@ -1,6 +1,6 @@
 //! Commands that make and compare sets of images; compiled with the feature `datasets`.
 
-use crate::{ablate, compare, dataset, sequence, stream};
+use crate::{ablate, compare, dataset, sequence, serve, stream};
 use clap::Subcommand;
 use furrow_base::Result;
 use furrow_cli::cli::signal::Signals;
@@ -14,6 +14,8 @@ pub(crate) enum Verb {
     Dataset(Box<dataset::Cli>),
     /// Write images with their labels to stdout as they are rendered, as a tar archive for another program.
     Stream(Box<stream::Args>),
+    /// Render images on request of another program, one after the other, without a process for each.
+    Serve(serve::Args),
     /// Drive through a field, or return to it on several days, and render all images of its cameras with poses, optical
     /// flow and tracks.
     Sequence(Box<sequence::Args>),
@@ -28,6 +30,7 @@ pub(crate) fn run(verb: &Verb, signals: &Signals) -> Result<Vec<PathBuf>> {
         Verb::Compare(args) => compare::run(args),
         Verb::Dataset(args) => dataset::run(args, signals),
         Verb::Stream(args) => stream::run(args, signals),
+        Verb::Serve(args) => serve::run(args),
         Verb::Sequence(args) => sequence::run(args, signals),
         Verb::Ablate(args) => ablate::run(args, signals),
     }

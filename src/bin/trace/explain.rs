@@ -1,8 +1,10 @@
 //! `trace explain`: reference of the fields of scene files, species files and texture recipes.
 
-use furrow_base::Result;
+use furrow_base::input::shipped;
+use furrow_base::ron_file::RonFile;
+use furrow_base::{Error, Result};
 use furrow_cli::cli;
-use furrow_cli::reference::{answer, distribution, scene, species, texture};
+use furrow_cli::reference::{answer, distribution, scene, search, species, texture};
 use std::path::PathBuf;
 
 /// The path to explain.
@@ -10,14 +12,38 @@ use std::path::PathBuf;
 pub(crate) struct Args {
     /// Path such as soil.clods or crops.rows.spacing_m: in a scene file, unless it starts with species, texture or
     /// distribution. Default: the tree of all paths.
-    #[arg(value_name = "PATH")]
+    #[arg(value_name = "PATH", conflicts_with = "search")]
     path: Option<String>,
+    /// List the fields, shipped scene files and soil textures whose name or description contains this word, or a word
+    /// for the same: cracks, tilt, insects.
+    #[arg(long, value_name = "WORD")]
+    search: Option<String>,
 }
 
 /// Prints the explanation.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let words =
-        answer(args.path.as_deref().unwrap_or_default(), &[scene(), species(), texture(), distribution()], "trace")?;
-    cli::print(&words)?;
+    let references = [scene(), species(), texture(), distribution()];
+    if let Some(word) = &args.search {
+        let found = search(word, &references, &shipped_files()?);
+        if found.is_empty() {
+            return Err(Error::misuse(format!("nothing contains `{word}`")).help("`trace explain` lists all paths"));
+        }
+        cli::print_rows(&found.into_iter().map(<[String; 2]>::from).collect::<Vec<_>>())?;
+    } else {
+        cli::print(&answer(args.path.as_deref().unwrap_or_default(), &references, "trace")?)?;
+    }
     Ok(Vec::new())
+}
+
+/// Returns the shipped scene files with their first comments, and the soil textures.
+fn shipped_files() -> Result<Vec<(String, String)>> {
+    let mut all = Vec::new();
+    for name in shipped::scene_names()? {
+        let text = RonFile::read(&shipped::scene_file(name.clone().into())).map(|page| page.text).unwrap_or_default();
+        let comment = text.lines().map_while(|line| line.strip_prefix("//")).collect::<String>();
+        all.push((format!("trace --scene {name}"), comment.trim().to_owned()));
+    }
+    let soils = shipped::soil_textures()?;
+    all.extend(soils.iter().map(|file| (file.display().to_string(), "soil texture".to_owned())));
+    Ok(all)
 }

@@ -3,6 +3,7 @@
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use furrow_base::input::shipped;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
+use furrow_base::ron_file::Assignment;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_field::ablation::Edit;
@@ -16,6 +17,8 @@ pub(crate) struct SceneArgs {
     /// Scene file (RON): soil, plants, lights and cameras. A bare name such as `field` also finds a shipped one.
     #[arg(long, value_name = "FILE", required = true, value_parser = scene_file())]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
     /// Seed that overrides the scene file's.
     #[arg(long, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
@@ -26,6 +29,15 @@ pub(crate) struct SceneArgs {
     /// Image height in pixels.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub(crate) height: Option<u32>,
+}
+
+/// Values that replace those of the scene file.
+#[derive(clap::Args)]
+pub(crate) struct SetArgs {
+    /// Replace or add a value of the scene file, by its path: camera.height_m=1.2, crops[0].species=maize. May be
+    /// repeated. Values are written as in the file; a text needs no quotes.
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = Assignment::parse)]
+    pub(crate) values: Vec<Assignment>,
 }
 
 /// Memory limit of a field.
@@ -106,10 +118,19 @@ impl FieldArgs {
         asked: impl FnOnce(SceneFile) -> SceneFile,
         warn: impl Fn(&str),
     ) -> Result<Field> {
-        let warn = |warning: &String| warn(warning);
+        self.grow(&asked(self.of(SceneFile::edited(self.path(), edit)?)?), warn)
+    }
+
+    /// Returns a scene file with the values, seed, size, day and memory limit of these options.
+    pub(crate) fn of(&self, scene: SceneFile) -> Result<SceneFile> {
         let SceneArgs { seed, width, height, .. } = self.scene;
-        let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);
-        let scene = asked(scene.day(self.day).memory(self.memory.bytes));
+        let scene = scene.assign(&self.scene.set.values)?.seed(seed).width(width).height(height);
+        Ok(scene.day(self.day).memory(self.memory.bytes))
+    }
+
+    /// Builds the field of a scene file. Warnings are passed to `warn` as soon as they are known.
+    pub(crate) fn grow(&self, scene: &SceneFile, warn: impl Fn(&str)) -> Result<Field> {
+        let warn = |warning: &String| warn(warning);
         let expected_warnings = scene.expected_warnings(self.index)?;
         expected_warnings.iter().for_each(warn);
         let mut field = scene.field(self.index)?;

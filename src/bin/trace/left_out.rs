@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub(crate) enum Verb {
     /// Needs the feature `datasets`.
     #[cfg(not(feature = "datasets"))]
-    #[command(hide = true, aliases = ["stream", "sequence", "ablate", "compare"])]
+    #[command(hide = true, aliases = ["stream", "serve", "sequence", "ablate", "compare"])]
     Dataset(Arguments),
     /// Needs the feature `watch`.
     #[cfg(not(feature = "watch"))]

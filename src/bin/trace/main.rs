@@ -31,6 +31,8 @@ mod scan;
 #[cfg(feature = "datasets")]
 mod sequence;
 #[cfg(feature = "datasets")]
+mod serve;
+#[cfg(feature = "datasets")]
 mod stream;
 mod texture;
 #[cfg(feature = "datasets")]

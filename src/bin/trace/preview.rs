@@ -1,6 +1,6 @@
 //! `trace preview`: several fields of a scene file on one sheet, each with its index.
 
-use crate::field::{MemoryArgs, scene_file};
+use crate::field::{MemoryArgs, SetArgs, scene_file};
 use crate::letters;
 use crate::quality::{samples, threads};
 use crate::render::plants;
@@ -34,6 +34,8 @@ pub(crate) struct Args {
     /// Scene file (RON).
     #[arg(value_name = "FILE", value_parser = scene_file())]
     scene: PathBuf,
+    #[command(flatten)]
+    set: SetArgs,
     /// Indices of the fields: from the first, up to but excluding the last.
     #[arg(long, value_name = "FROM..TO", value_parser = indices, default_value = "0..12")]
     indices: Range<u64>,
@@ -88,7 +90,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     });
     cli::check_png(&out, &args.scene)?;
     let renderer = Renderer::open(&RenderOptions::path_traced(Quality::spp(args.spp)))?;
-    let scene = SceneFile::open(&args.scene)?.seed(args.seed).width(args.width).memory(args.memory.bytes);
+    let scene = SceneFile::open(&args.scene)?
+        .assign(&args.set.values)?
+        .seed(args.seed)
+        .width(args.width)
+        .memory(args.memory.bytes);
     let stop = signals.catch();
     let scene = scene.threads(&Threads::new(args.threads)?).until(stop);
     if !args.quiet

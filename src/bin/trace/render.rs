@@ -10,6 +10,8 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_field::ablation::{Edit, FULL};
+#[cfg(feature = "datasets")]
+use furrow_job::SceneFile;
 use furrow_job::{Field, Image, Renderer, Request, Threads, View};
 use furrow_render::film::Film;
 use furrow_render::render::RenderMonitor;
@@ -17,6 +19,8 @@ use furrow_render::settings::{Engine, Quality};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+#[cfg(feature = "datasets")]
+use std::sync::atomic::AtomicBool;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -123,6 +127,60 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
+/// An image and how it was made.
+#[cfg(feature = "datasets")]
+pub(crate) struct Made<'a> {
+    pub(crate) scene: &'a SceneFile,
+    pub(crate) renderer: &'a Renderer,
+    pub(crate) image: Image<'a>,
+    /// Whether the image shows all that the camera sees.
+    pub(crate) whole: bool,
+}
+
+#[cfg(feature = "datasets")]
+impl Args {
+    /// Edit of the field.
+    pub(crate) fn edit(&self) -> Result<&'static Edit> {
+        self.edit.as_deref().map_or(Ok(&FULL), Edit::named)
+    }
+
+    /// Renders the image of a scene file without writing it, and returns what `then` makes of it. `progress` gets the fraction
+    /// of the samples that is done, `warn` the warnings.
+    pub(crate) fn image<T>(
+        &self,
+        scene: SceneFile,
+        progress: &(dyn Fn(f64) + Sync),
+        warn: &dyn Fn(&str),
+        then: impl FnOnce(Made<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let begin = Instant::now();
+        let options = self.edit()?.options(self.technique.options(self.quality.quality(self.denoise)));
+        self.integrator.check(&options)?;
+        let renderer = Renderer::open(&options)?;
+        let scene = self.field.of(scene.threads(&Threads::new(self.threads)?))?;
+        let field = self.field.grow(&scene, |words| warn(words.trim_start_matches("warning: ")))?;
+        renderer.warning(&field).into_iter().for_each(warn);
+        let camera = &field.grown().scene.camera;
+        let window = self.crop.unwrap_or(Window::full(camera.width(), camera.height()));
+        cli::check_crop(window, camera.width(), camera.height())?;
+        let all = samples(&options.quality, window).to_f64();
+        let sampled = AtomicU64::new(0);
+        let done = |samples| progress((sampled.fetch_add(samples, Ordering::Relaxed) + samples).to_f64() / all);
+        let watch = RenderMonitor { done: &done, stop: &AtomicBool::new(false) };
+        let request = Request { window: self.crop, view: self.integrator, begin: Some(begin), watch };
+        let image = renderer.render(&field, &request)?;
+        for words in missed(&options.quality, &image.film, begin.elapsed()) {
+            warn(&words);
+        }
+        then(Made { scene: &scene, renderer: &renderer, image, whole: self.crop.is_none() })
+    }
+}
+
+/// Number of samples of an image; the largest possible one if it depends on the error or the time.
+fn samples(quality: &Quality, window: Window) -> u64 {
+    u64::from(window.width()) * u64::from(window.height()) * u64::from(quality.spp)
+}
+
 impl Args {
     fn say(&self, text: &str) {
         if !self.quiet {
@@ -190,7 +248,7 @@ fn progress(quality: &Quality, window: Window, quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let samples = u64::from(window.width()) * u64::from(window.height()) * u64::from(quality.spp);
+    let samples = samples(quality, window);
     let (bar, template) = if quality.is_fixed() {
         (ProgressBar::new(samples), "{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
     } else {

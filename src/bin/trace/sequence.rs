@@ -72,7 +72,7 @@ fn days(text: &str) -> Result<Days, String> {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     args.scene.check()?;
     let days = args.days.as_ref().map_or(&[][..], |days| &days.0);
-    let scene = SceneFile::open(args.scene.path())?.days(days);
+    let scene = SceneFile::open(args.scene.path())?.assign(&args.scene.set.values)?.days(days);
     let captures = scene.captures();
     if captures == 1 && scene.seen_days().is_empty() {
         return Err(Error::input("it renders one image of each field, which is not a sequence")
@@ -82,6 +82,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut order = Order::new(args.scene.path(), args.fields * captures);
     (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
     order.days = days.to_vec();
+    order.assigned.clone_from(&args.scene.set.values);
     order.memory = args.memory.bytes;
     order.formats = if args.format.is_empty() {
         usual_formats(captures, scene.seen_days().len(), args.look.labels_only)

@@ -109,6 +109,7 @@ impl Args {
     fn order(&self) -> Result<Order> {
         let count = self.count.unwrap_or(MOST_IMAGES - self.first);
         let mut order = Order {
+            assigned: self.scene.set.values.clone(),
             seed: self.scene.seed,
             width: self.scene.width,
             height: self.scene.height,

@@ -1,7 +1,7 @@
 //! A RON file: its text, its deserialization, and errors that point into it.
 
 use super::fault::{Fault, NAME_EXPECTED, locate, plain};
-use super::place::{Step, fields_around, lacks, offset_of, path_at, place, quoted};
+use super::place::{Step, fields_around, lacks, mismatch, offset_of, path_at, place, quoted, value_end};
 use super::schema::{self, Name};
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
@@ -83,6 +83,11 @@ impl RonFile {
     /// Checks only that the text is valid RON, not what it contains.
     pub fn check_syntax(&self) -> Result<()> {
         self.parse::<Box<ron::value::RawValue>>().map(drop)
+    }
+
+    /// Returns `true` if the text is one value, without anything before or behind it.
+    pub(super) fn is_value(&self) -> bool {
+        value_end(&self.text, 0) == self.text.len() && mismatch(&self.text).is_none() && self.check_syntax().is_ok()
     }
 
     /// Builds an error about a byte range of the text.

@@ -7,15 +7,21 @@
 //!
 //! [`Spliced`] is a text assembled from several files. Its errors are shown where the text was originally written.
 //!
+//! [`Assignment`] replaces or adds one value of a text by its path.
+//!
+//! [`to_json`] and [`from_json`] convert texts for programs that edit them as nested tables.
+//!
 //! `quantities` lists the numbers and distributions of a text with their positions, for programs that show or replace
 //! one of them.
 //!
 //! Types that deserialize themselves from raw text use [`from_raw`]; they report a [`Fault`], which keeps its position.
 
+mod assignment;
 mod bound;
 mod entries;
 mod fault;
 mod file;
+mod json;
 mod num;
 mod place;
 mod quantities;
@@ -24,10 +30,12 @@ mod spliced;
 mod suggest;
 mod vary;
 
+pub use assignment::Assignment;
 pub use bound::{Bound, Count, Elevation, Factor, Fraction, NonNegative, Positive, PositiveCount, Signed};
 pub use entries::entries;
 pub use fault::{Fault, from_raw, inside, parse_in, whole};
 pub use file::RonFile;
+pub use json::{from_json, to_json};
 pub use num::Num;
 pub use place::{Step, place};
 pub use quantities::{Quantity, Value, quantities};

@@ -79,7 +79,7 @@ pub(super) fn fields_around(text: &str, offset: usize) -> Vec<&str> {
 }
 
 /// Returns the value one step into the bracketed value at `whole`.
-fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>> {
+pub(super) fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<Range<usize>> {
     let wanted = |(number, (key, _)): &(usize, (Option<&str>, Range<usize>))| match step {
         Step::Field(name) => key.is_some_and(|key| key.trim_matches('"') == name),
         Step::Item(n) => n == *number,
@@ -209,7 +209,7 @@ fn key_end(text: &str, at: usize) -> Option<usize> {
 
 /// Returns the end of the value that starts at `at`: before the comma or the closing bracket of the enclosing value,
 /// without trailing space and comments.
-fn value_end(text: &str, mut at: usize) -> usize {
+pub(super) fn value_end(text: &str, mut at: usize) -> usize {
     let (mut depth, mut end) = (0_usize, at);
     while let Some(c) = text[at..].chars().next() {
         match c {

@@ -50,19 +50,40 @@ pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> 
 /// at its end. Names inside a number are not checked.
 pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
     let root = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
-    let mut at = resolved(&root, &root);
+    match at_end(&root, path) {
+        Ok(at) if at.get(KIND).is_some() => (path.len(), Vec::new()),
+        Ok(at) => (path.len(), names(&root, at)),
+        Err(depth) => (depth, Vec::new()),
+    }
+}
+
+/// Returns the schema at the end of a path, or that of the number in which it ends; else the number of names on the path
+/// that exist.
+fn at_end<'a>(root: &'a Value, path: &[&str]) -> Result<&'a Value, usize> {
+    let mut at = resolved(root, root);
     for (k, step) in path.iter().enumerate() {
         if at.get(KIND).is_some() {
-            return (path.len(), Vec::new());
+            break;
         }
-        match within(&root, at, step) {
-            Some(inner) => at = inner,
+        match within(at, step) {
+            Some(inner) => at = resolved(root, inner),
             // The file's own name, or the name in front of a struct's fields.
             None if k == 0 || step.starts_with(char::is_uppercase) && at.get("properties").is_some() => {}
-            None => return (k, Vec::new()),
+            None => return Err(k),
         }
     }
-    (path.len(), names(&root, at))
+    Ok(at)
+}
+
+/// Returns `true` if `T`'s file has a string at the end of a path that exists.
+pub(super) fn is_text<T: JsonSchema>(path: &[&str]) -> bool {
+    at_end(&SchemaGenerator::default().into_root_schema_for::<T>().to_value(), path).is_ok_and(|at| {
+        match at.get("type") {
+            Some(Value::String(one)) => one == "string",
+            Some(Value::Array(several)) => several.iter().any(|one| one == "string"),
+            _ => false,
+        }
+    })
 }
 
 /// A name allowed at a place, and whether it takes a number in brackets.
@@ -71,24 +92,33 @@ pub(super) struct Name {
     pub(super) takes_number: bool,
 }
 
-/// Follows references, options, lists and tables to the inner schema.
-fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
-    let reference = schema.get("$ref").and_then(Value::as_str).and_then(|path| path.strip_prefix("#/$defs/"));
+/// Returns the schema that a reference or an option leads to; `None` for any other.
+pub(super) fn referenced<'a>(root: &'a Value, schema: &'a Value) -> Option<&'a Value> {
+    let path = schema.get("$ref").and_then(Value::as_str);
+    if path == Some("#") {
+        return Some(root);
+    }
+    let reference = path.and_then(|path| path.strip_prefix("#/$defs/"));
     let some = schema.get("anyOf").and_then(Value::as_array);
-    let inner = reference
+    reference
         .and_then(|name| root.get("$defs")?.get(name))
         .or_else(|| some?.iter().find(|of| of.get("type") != Some(&"null".into())))
+}
+
+/// Follows references, options, lists and tables to the inner schema.
+fn resolved<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
+    let inner = referenced(root, schema)
         .or_else(|| schema.get("items").filter(|of| of.is_object()))
         .or_else(|| schema.get("additionalProperties").filter(|of| of.is_object()));
     inner.map_or(schema, |inner| resolved(root, inner))
 }
 
 /// Returns the schema of a field's value or of a variant's content, whichever `at` has under this name.
-fn within<'a>(root: &'a Value, at: &'a Value, step: &str) -> Option<&'a Value> {
+pub(super) fn within<'a>(at: &'a Value, step: &str) -> Option<&'a Value> {
     let field = at.get("properties").and_then(|fields| fields.get(step));
     let inside = || variants(at).find_map(|variant| variant.get("properties")?.get(step));
     let bare = || variants(at).find(|variant| variant.get("const").is_some_and(|name| name == step));
-    field.or_else(inside).or_else(bare).map(|inner| resolved(root, inner))
+    field.or_else(inside).or_else(bare)
 }
 
 fn variants(at: &Value) -> impl Iterator<Item = &Value> {

@@ -236,7 +236,8 @@ impl Spliced {
 
     fn make(&mut self, text: &str, page: &RonFile, from: Range<usize>) {
         let (start, source) = (self.page.text.len(), self.source(page));
-        self.push(text, Piece { start, source, from, copied: false });
+        let copied = page.text.get(from.clone()) == Some(text);
+        self.push(text, Piece { start, source, from, copied });
     }
 
     /// Appends bytes of another spliced text together with their sources.

@@ -2,7 +2,7 @@
 //!
 //! The reference is generated. Types derive a JSON schema from their fields and doc comments (`schemars`). [`Reference`] turns it into
 //! sections named by the path to a value, such as `soil.clods`, and finds a section by its path. `markdown` writes documentation pages,
-//! `manual` does so for command lines, `terminal` and `answer` implement `trace explain`. `sample` creates an example of a value and a
+//! `manual` does so for command lines, `terminal`, `answer` and `search` implement `trace explain`. `sample` creates an example of a value and a
 //! whole file around it.
 
 mod answer;
@@ -11,6 +11,7 @@ mod markdown;
 mod node;
 mod ron;
 mod sample;
+mod search;
 mod section;
 mod terminal;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod walk;
 
 pub use answer::answer;
 pub use manual::manual;
+pub use search::search;
 pub use section::{Entry, Section};
 pub use walk::Reference;
 

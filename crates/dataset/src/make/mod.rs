@@ -12,6 +12,7 @@ pub mod plan;
 pub mod push;
 pub mod render;
 pub mod scene_files;
+pub mod single;
 pub mod status;
 pub mod task;
 pub mod time_left;

@@ -19,6 +19,7 @@ use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
 use furrow_base::math::ToInt;
+use furrow_base::ron_file::Assignment;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::BuildProgress;
@@ -34,6 +35,8 @@ use std::sync::atomic::AtomicBool;
 pub struct Order {
     /// The scene file.
     pub scene: PathBuf,
+    /// Values that replace those of the scene file; the dataset's copy of the file contains them.
+    pub assigned: Vec<Assignment>,
     /// Seed; `None` for the scene file's.
     pub seed: Option<u64>,
     /// Number of images.
@@ -80,6 +83,7 @@ impl Order {
     pub fn new(scene: impl Into<PathBuf>, count: u64) -> Self {
         Self {
             scene: scene.into(),
+            assigned: Vec::new(),
             seed: None,
             count,
             days: Vec::new(),
@@ -167,7 +171,8 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         .in_file(&order.scene)
         .help("split it into two scene files"));
     }
-    let SceneFiles { files, scene, rewritten } = collect_files(&field.files, &field.shipped, &order.scene)?;
+    let SceneFiles { files, scene, rewritten } =
+        collect_files(&field.files, &field.shipped, (&order.scene, &field.text))?;
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene, stop)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
@@ -233,7 +238,7 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<OptionalMa
 
 /// Opens a scene file with the edit, seed, days, size and limits of an order.
 fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
-    let scene = SceneFile::edited(scene, order.edit)?;
+    let scene = SceneFile::edited(scene, order.edit)?.assign(&order.assigned)?;
     let scene = scene.seed(order.seed).days(&order.days).width(order.width).height(order.height).memory(order.memory);
     Ok(scene.unlit(order.labels_only).progress(&order.progress))
 }
@@ -243,6 +248,8 @@ fn opened(scene: &Path, order: &Order) -> Result<SceneFile> {
 fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicBool>) -> Result<String> {
     let folder = tempfile::tempdir().map_err(Error::io(&std::env::temp_dir()))?;
     checksum_record::write_files(folder.path(), files)?;
+    // The copy already has the assigned values.
+    let order = &Order { assigned: Vec::new(), ..order.clone() };
     let first = opened(&folder.path().join(scene), order)?.until(stop).records_only().field(0)?;
     let field = first.grown();
     match field.files.iter().find(|file| !file.starts_with(folder.path())) {

@@ -172,7 +172,7 @@ fn label(
 }
 
 /// Returns the sample of a rendered image.
-fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
+pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field();
     let Image { film, labels, denoised, .. } = image;

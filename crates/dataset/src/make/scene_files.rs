@@ -23,12 +23,12 @@ pub(crate) struct SceneFiles {
     pub(crate) rewritten: bool,
 }
 
-/// Reads the files at `paths`, which are all files of a scene including `scene` itself, as they were opened. `shipped`
-/// maps names in the scene file to files that ship with the program.
+/// Reads the files at `paths`, which are all files of a scene including `scene` itself, as they were opened; the copy of
+/// `scene` gets `text`. `shipped` maps names in the scene file to files that ship with the program.
 pub(crate) fn collect_files(
     paths: &[PathBuf],
     shipped: &BTreeMap<String, PathBuf>,
-    scene: &Path,
+    (scene, text): (&Path, &str),
 ) -> Result<SceneFiles> {
     let places = places(paths, scene)?;
     let scene = absolute(scene)?;
@@ -40,12 +40,16 @@ pub(crate) fn collect_files(
     let mut rewritten = false;
     let mut gathered = Vec::new();
     for (from, to) in &places {
-        let mut bytes = furrow_base::input::contents(from).map_err(Error::reading(from))?;
+        let is_scene = *from == scene;
+        let mut bytes = if is_scene {
+            text.as_bytes().to_vec()
+        } else {
+            furrow_base::input::contents(from).map_err(Error::reading(from))?
+        };
         if from.extension().is_some_and(|e| e == "ron")
             && let Ok(text) = std::str::from_utf8(&bytes)
         {
             let page = RonFile { path: from.clone(), text: text.to_owned() };
-            let is_scene = *from == scene;
             // A scene file without `layers` uses files that ship with the program; the copy must name them.
             let whole = is_scene.then(|| page.written_out("soil", "layers", LAYERS)).flatten();
             let text = whole.as_ref().unwrap_or(&page.text);

@@ -77,8 +77,16 @@ impl Edit {
 
     /// Opens a scene file for [`Edit::field`]. Neither it nor the files that it names may be outside `scope`.
     pub fn open(&self, page: &Path, scope: Scope) -> Result<Source> {
-        let growing = if let Change::Growth(growing) = self.change { growing } else { SceneEdit::default() };
-        Ok(Source::open_within(page, scope)?.growing(growing))
+        Ok(Source::open_within(page, scope)?.growing(self.growing()))
+    }
+
+    /// Takes `text` as the scene file at `page` for [`Edit::field`].
+    pub fn of_text(&self, page: &Path, text: &str) -> Result<Source> {
+        Ok(Source::of_text(page, text)?.growing(self.growing()))
+    }
+
+    fn growing(&self) -> SceneEdit {
+        if let Change::Growth(growing) = self.change { growing } else { SceneEdit::default() }
     }
 
     /// Builds a field of a scene file opened with [`Edit::open`]. Call it inside a thread pool.

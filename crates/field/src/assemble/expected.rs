@@ -25,7 +25,7 @@ impl Source {
                 ground::soil(drawn, library, soil, sight.view)?;
             }
             for model in &self.desc.models {
-                library.model(&self.page, model)?;
+                library.model(self.page(), model)?;
             }
             warnings.extend(plausibility::camera(drawn));
             warnings.extend(plausibility::plants(drawn, library)?);
@@ -43,8 +43,10 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let mut library = held().clone();
         let desc = lidar::grown(&self.desc, options.scan.as_ref());
-        let (drawn, _, mut warnings) = Drawn::draw(&self.page, &desc, options, &mut library)?;
-        let answer = question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })?;
+        let drawn = Drawn::draw(self.page(), &desc, options, &mut library);
+        let answer = self.located(drawn.and_then(|(drawn, _, mut warnings)| {
+            question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
+        }))?;
         // Keep the files that were read for the next field.
         *held() = library;
         Ok(answer)

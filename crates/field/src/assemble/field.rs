@@ -46,8 +46,10 @@ pub struct Field {
     pub files: Vec<PathBuf>,
     /// Names in the scene file that refer to files shipped with the program, with the paths of those files.
     pub shipped: BTreeMap<String, PathBuf>,
-    /// Text of the scene file.
+    /// Text of the scene file, with the assigned values.
     pub text: String,
+    /// Values that were assigned to the scene file, each `PATH=VALUE`.
+    pub assigned: Vec<String>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }

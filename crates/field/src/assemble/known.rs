@@ -10,23 +10,26 @@ use furrow_base::ron_file::Step;
 use furrow_base::sampling::Purpose;
 use furrow_base::{Error, Result};
 use furrow_grow::scatter::{Rows, WeedsRecord};
+use furrow_render::scene::tag::Class;
 
 /// Returns every species that the scene file can place (crops, weeds, plants, models), in the scene file's order, each once. The
-/// list is the same for every index, even if a field has no plant of a species.
+/// list is the same for every index, even if a field has no plant of a species. The lists of crops and weeds decide on the class, for
+/// single plants the species file.
 pub(super) fn species(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<SpeciesRecord>> {
     let (page, desc) = (drawn.page, drawn.desc);
-    let crops = desc.crops.iter().map(|c| &c.species);
-    let weeds = desc.weeds.iter().map(|w| &w.species);
-    let plants = desc.plants.iter().map(|p| &p.species);
+    let crops = desc.crops.iter().map(|c| (&c.species, Some(Class::Crop)));
+    let weeds = desc.weeds.iter().map(|w| (&w.species, Some(Class::Weed)));
+    let plants = desc.plants.iter().map(|p| (&p.species, None));
     let mut all: Vec<SpeciesRecord> = Vec::new();
     let mut add = |record| {
         if !all.contains(&record) {
             all.push(record);
         }
     };
-    for path in crops.chain(weeds).chain(plants) {
+    for (path, class) in crops.chain(weeds).chain(plants) {
         let desc = &library.species(page, path)?.desc;
-        add(SpeciesRecord { name: desc.name.clone(), eppo: desc.eppo.clone(), class: desc.role.class() });
+        let class = class.unwrap_or(desc.role.class());
+        add(SpeciesRecord { name: desc.name.clone(), eppo: desc.eppo.clone(), class });
     }
     for desc in &desc.models {
         let model = library.model(page, desc)?;

@@ -47,7 +47,7 @@ pub use field::Field;
 use furrow_base::Result;
 use furrow_base::input::Scope;
 use furrow_base::math::{RoundTo, ToInt};
-use furrow_base::ron_file::{RonFile, Step};
+use furrow_base::ron_file::{Assignment, RonFile, Spliced, Step};
 use furrow_base::sampling::Purpose;
 use furrow_render::scene::Scene;
 pub use lighting::Lighting;
@@ -68,13 +68,15 @@ pub fn field(path: &Path, options: &Options) -> Result<Field> {
 
 /// Builds a field from the text of a scene file. Paths are relative to the working directory.
 pub fn field_of(text: &str, options: &Options) -> Result<Field> {
-    Source::of(RonFile::of(text), Library::default())?.field(options)
+    Source::of(Spliced::of(RonFile::of(text)), Library::default())?.field(options)
 }
 
 /// A scene file with a cache of the files that its fields have read, so that the next field does not read them again. Several fields may
 /// be built concurrently.
 pub struct Source {
-    page: RonFile,
+    /// Text of the scene file with the values that were assigned.
+    text: Spliced,
+    assigned: Vec<Assignment>,
     desc: FieldDesc,
     days: Vec<u32>,
     library: Mutex<Library>,
@@ -91,7 +93,19 @@ impl Source {
         let path = scope.check(path.into())?;
         let mut library = Library::within(scope);
         let page = library.page(&path)?;
-        Self::of(page, library)
+        Self::of(Spliced::of(page), library)
+    }
+
+    /// Takes `text` as the scene file at `path`, which need not exist and may name files anywhere.
+    pub fn of_text(path: &Path, text: &str) -> Result<Self> {
+        let mut library = Library::default();
+        let page = library.page_of(path, text);
+        Self::of(Spliced::of(page), library)
+    }
+
+    /// Returns the scene file with these values instead of its own.
+    pub fn assign(&self, values: &[Assignment]) -> Result<Self> {
+        self.read(Some(&self.page().text), values)
     }
 
     /// Returns `true` if any model of the scene file may name files outside the model's own folder.
@@ -99,24 +113,42 @@ impl Source {
         self.desc.models.iter().any(|model| model.allow_outside)
     }
 
-    /// Reads the scene file again from disk, or takes `text` instead. Cached data of files that did not change is kept.
+    /// Reads the scene file again from disk, or takes `text` instead, and assigns the same values. Cached data of files that did not change
+    /// is kept.
     pub fn reread(&self, text: Option<&str>) -> Result<Self> {
-        let mut library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone().renewed();
-        let page = match text {
-            None => library.page(&self.page.path)?,
-            Some(text) => library.page_of(&self.page.path, text),
-        };
-        let growing = library.growing;
-        Ok(Self::of(page, library)?.growing(growing))
+        self.read(text, &self.assigned)
     }
 
-    fn of(page: RonFile, library: Library) -> Result<Self> {
-        let desc: FieldDesc = page.parse_all()?;
+    fn read(&self, text: Option<&str>, values: &[Assignment]) -> Result<Self> {
+        let mut library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone().renewed();
+        let page = match text {
+            None => library.page(&self.page().path)?,
+            Some(text) => library.page_of(&self.page().path, text),
+        };
+        let text = values.iter().try_fold(Spliced::of(page), |text, value| value.apply::<FieldDesc>(&text))?;
+        // The hash of the scene is that of the text with these values.
+        library.page_of(&self.page().path, &text.page.text);
+        let growing = library.growing;
+        Ok(Self { assigned: values.to_vec(), ..Self::of(text, library)? }.growing(growing))
+    }
+
+    fn of(text: Spliced, library: Library) -> Result<Self> {
+        let page = &text.page;
+        let desc: FieldDesc = page.parse_all().map_err(|e| text.locate(e))?;
         let days = match &desc.days {
-            Some(days) => days.list().map_err(|e| page.blame(&[Step::Field("days")], e))?,
+            Some(days) => days.list().map_err(|e| text.locate(page.blame(&[Step::Field("days")], e)))?,
             None => Vec::new(),
         };
-        Ok(Self { page, desc, days, library: Mutex::new(library) })
+        Ok(Self { text, assigned: Vec::new(), desc, days, library: Mutex::new(library) })
+    }
+
+    fn page(&self) -> &RonFile {
+        &self.text.page
+    }
+
+    /// Moves an error about the text to the place where the faulty part was written, in the scene file or in an assigned value.
+    fn located<T>(&self, done: Result<T>) -> Result<T> {
+        if self.assigned.is_empty() { done } else { done.map_err(|error| self.text.locate(error)) }
     }
 
     /// Applies an experiment's changes to the descriptions of field and species.
@@ -146,7 +178,8 @@ impl Source {
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
         let mut library = held().clone();
         let desc = lidar::grown(&self.desc, options.scan.as_ref());
-        let field = build(&self.page, &desc, options, &mut library)?;
+        let mut field = self.located(build(self.page(), &desc, options, &mut library))?;
+        field.assigned = self.assigned.iter().map(Assignment::to_string).collect();
         *held() = library;
         Ok(field)
     }
@@ -209,6 +242,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         files: library.files(),
         shipped: library.shipped(),
         text: page.text.clone(),
+        assigned: Vec::new(),
         sensor: desc.sensor.clone(),
         hash: library.hash(),
         seed: drawn.seed,

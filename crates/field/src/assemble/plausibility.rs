@@ -46,7 +46,8 @@ pub(super) fn camera(drawn: &Drawn<'_>) -> Vec<String> {
     warnings
 }
 
-/// Returns warnings about row spacing and growth stages of the field's crops, and about growth stages of its weeds and single plants.
+/// Returns warnings about row spacing and growth stages of the field's crops, about growth stages of its weeds and
+/// single plants, and about species in a list of another class than that of their files.
 pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     let (page, desc) = (drawn.page, drawn.desc);
@@ -60,6 +61,19 @@ pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Str
         }
         if in_row > WIDE_IN_ROW_M {
             let words = format!("{species} stands {in_row} m apart in its rows; in_row_m is in metres, 0.16 for 16 cm");
+            warnings.push(words);
+        }
+    }
+    let crops = desc.crops.iter().map(|crop| (&crop.species, Class::Crop));
+    let weeds = desc.weeds.iter().map(|weed| (&weed.species, Class::Weed));
+    for (path, class) in crops.chain(weeds) {
+        let species = library.species(page, path)?;
+        let (own, list) = (species.desc.role.class(), if class == Class::Crop { "crops" } else { "weeds" });
+        let (name, listed, own_name) = (&species.desc.name, class.name(), own.name());
+        let words = format!(
+            "{name} is labelled {listed} because `{list}` lists it; the role in its species file, {own_name}, is that of single `plants`"
+        );
+        if own != class && !warnings.contains(&words) {
             warnings.push(words);
         }
     }

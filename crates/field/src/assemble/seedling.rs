@@ -16,6 +16,7 @@ use furrow_grow::scatter;
 use furrow_optics::optics::{Pigments, ageing};
 use furrow_render::material::LeafMaterial;
 use furrow_render::scene::Part;
+use furrow_render::scene::tag::Class;
 use furrow_render::scene::tag::Tag;
 use std::sync::Arc;
 
@@ -28,6 +29,8 @@ const AXIS_NOISE_DEG: f32 = 4.0;
 #[derive(Clone, PartialEq)]
 pub(super) struct Seedling {
     pub(super) species: Arc<Species>,
+    /// Class of its pixels.
+    pub(super) class: Class,
     pub(super) growth: Growth,
     /// Index that the field has drawn for all `Either` lists of growths.
     pub(super) season: usize,
@@ -105,7 +108,7 @@ pub(super) fn grow(
     let ahead = Vec3::new(s.turn.sin(), s.turn.cos(), 0.0);
     let frame = Frame::with_tangent(axis, ahead.cross(axis));
     let rotation = Mat3::from_cols(frame.x, frame.y, frame.z);
-    let class = desc.role.class();
+    let class = s.class;
     let kept = |leaf: u16| s.only_leaf.is_none_or(|l| leaf == l);
     let to_world = |p: Vec3| rotation * p + foot;
     let axes = plant.leaf_axes().filter(|a| kept(a.leaf));
@@ -196,7 +199,7 @@ fn unborn(s: &Seedling, normal: Vec3, height: f32) -> PlantRecord {
         species: desc.name.clone(),
         eppo: desc.eppo.clone(),
         kind: 0,
-        class: desc.role.class(),
+        class: s.class,
         position: s.position.extend(height),
         axis: normal,
         bbch: 0,

@@ -14,6 +14,7 @@ use furrow_base::math::{RoundTo, ToInt, vec2};
 use furrow_base::ron_file::Vary;
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::{self, Disc, Spot};
+use furrow_render::scene::tag::Class;
 use std::sync::Arc;
 
 /// Returns the plants to be grown, and the range of each population among them. Adding a species at the end of the scene file does
@@ -38,7 +39,7 @@ pub(super) fn seedlings(
                 continue;
             }
             census.close(all.len())?;
-            let seedling = seedling(drawn, &species, &crop.growth, spot, 1 + k.to_u64());
+            let seedling = seedling(drawn, (&species, Class::Crop), &crop.growth, spot, 1 + k.to_u64());
             all.push(seedling.tended(&crop.vigour, crop.condition.as_ref()));
         }
     }
@@ -51,7 +52,7 @@ pub(super) fn seedlings(
                 continue;
             }
             census.close(all.len())?;
-            let seedling = seedling(drawn, &species, &weed.growth, spot, 1001 + k.to_u64());
+            let seedling = seedling(drawn, (&species, Class::Weed), &weed.growth, spot, 1001 + k.to_u64());
             all.push(seedling.tended(&weed.vigour, weed.condition.as_ref()));
         }
     }
@@ -62,6 +63,7 @@ pub(super) fn seedlings(
         let position = vec2(placed.position_m.0.draw32(&mut stream), placed.position_m.1.draw32(&mut stream));
         let seedling = Seedling {
             species: species.clone(),
+            class: species.desc.role.class(),
             growth: placed.growth.clone(),
             season: drawn.season.place(),
             today: drawn.today.clone(),
@@ -82,10 +84,17 @@ pub(super) fn seedlings(
     Ok((all, populations))
 }
 
-fn seedling(drawn: &Drawn<'_>, species: &Arc<Species>, growth: &Growth, spot: Spot, population: u64) -> Seedling {
+fn seedling(
+    drawn: &Drawn<'_>,
+    (species, class): (&Arc<Species>, Class),
+    growth: &Growth,
+    spot: Spot,
+    population: u64,
+) -> Seedling {
     let stream = drawn.stream(Purpose::Plant, population).child(Purpose::Plant, spot.key);
     Seedling {
         species: species.clone(),
+        class,
         growth: growth.clone(),
         season: drawn.season.place(),
         today: drawn.today.clone(),

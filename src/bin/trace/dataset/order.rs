@@ -218,6 +218,7 @@ impl ImageArgs {
         formats.sort();
         formats.dedup();
         let mut order = Order {
+            assigned: self.scene.set.values.clone(),
             seed: self.scene.seed,
             width: self.scene.width,
             height: self.scene.height,

@@ -26,7 +26,7 @@ mod sliders;
 mod tev;
 mod worker;
 
-use crate::field::{MemoryArgs, scene_file};
+use crate::field::{MemoryArgs, SetArgs, scene_file};
 use crate::quality::{samples, threads};
 use clap::ValueEnum;
 use furrow_base::{Error, Result};
@@ -47,6 +47,8 @@ pub(crate) struct Args {
     /// Scene file (RON). It is rendered again whenever it, or a file that it names, is saved.
     #[arg(value_name = "FILE", value_parser = scene_file())]
     scene: PathBuf,
+    #[command(flatten)]
+    set: SetArgs,
     /// Index of the field shown first.
     #[arg(long, default_value_t = 0)]
     index: u64,
@@ -97,7 +99,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let threads = Threads::new(args.threads)?;
     let stop = signals.catch();
     let wish = PageRequest { index: args.index, seed: args.seed, width: args.width, ..PageRequest::default() };
-    let session = Arc::new(Session::new(args.scene.clone(), wish, args.spp));
+    let session = Arc::new(Session::new(args.scene.clone(), args.set.values.clone(), wish, args.spp));
     session.show(|shown| shown.photo = photo.is_some());
     let guard = Guard::new(args.host)?;
     let server = Server::open(args.host, args.port, guard, session.clone(), photo)?;

@@ -263,7 +263,8 @@ impl ServerState {
                 let _alone = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
                 let seen = self.session.shown(|shown| shown.text.clone());
                 let new = sliders::write(self.session.path(), &path, value, &seen)?;
-                self.session.show(|shown| (shown.sliders, shown.text) = (sliders::sliders(&new), new));
+                self.session
+                    .show(|shown| (shown.sliders, shown.text) = (sliders::sliders(&new, self.session.assigned()), new));
                 self.session.reload();
                 self.session.wish(|wish| {
                     wish.values.remove(&path);

@@ -3,6 +3,7 @@
 use super::contact_sheet::ContactSheet;
 use super::live_image::LiveImage;
 use super::sliders::Slider;
+use furrow_base::ron_file::Assignment;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -60,6 +61,8 @@ struct Inner {
 /// Session of one watched scene file.
 pub(super) struct Session {
     path: PathBuf,
+    /// Values of the command line, which replace those of the file.
+    assigned: Vec<Assignment>,
     /// Samples per pixel of a complete image.
     spp: u32,
     inner: Mutex<Inner>,
@@ -70,14 +73,19 @@ pub(super) struct Session {
 
 impl Session {
     /// Creates a session without an image.
-    pub(super) fn new(path: PathBuf, wish: PageRequest, spp: u32) -> Self {
+    pub(super) fn new(path: PathBuf, assigned: Vec<Assignment>, wish: PageRequest, spp: u32) -> Self {
         let inner = Inner { wish, asked: 1, version: 1, shown: PageState::default(), ended: false };
-        Self { path, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: Arc::default() }
+        Self { path, assigned, spp, inner: Mutex::new(inner), changed: Condvar::new(), outdated: Arc::default() }
     }
 
     /// Path of the scene file.
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Values of the command line, which replace those of the file.
+    pub(super) fn assigned(&self) -> &[Assignment] {
+        &self.assigned
     }
 
     /// Samples per pixel of a complete image.

@@ -1,6 +1,6 @@
 //! Numbers of a scene file as sliders: previews of the field with other values, and writing a value into the file.
 
-use furrow_base::ron_file::{Distribution, Quantity, Value, quantities};
+use furrow_base::ron_file::{Assignment, Distribution, Quantity, Value, quantities};
 use furrow_base::{Error, Result};
 use furrow_job::SceneFile;
 use serde::Serialize;
@@ -34,9 +34,13 @@ pub(super) struct Slider {
     values: Vec<f64>,
 }
 
-/// Returns the sliders of a text, those of distributions first.
-pub(super) fn sliders(text: &str) -> Vec<Slider> {
-    let mut all: Vec<Slider> = quantities(text).into_iter().filter_map(|q| slider(text, &q)).collect();
+/// Returns the sliders of a text, those of distributions first. Numbers that the command line assigns have none.
+pub(super) fn sliders(text: &str, assigned: &[Assignment]) -> Vec<Slider> {
+    let within = |path: &str, outer: &str| {
+        path.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    let free = |q: &Quantity| assigned.iter().all(|value| !within(&q.path, value.path()));
+    let mut all: Vec<Slider> = quantities(text).into_iter().filter(free).filter_map(|q| slider(text, &q)).collect();
     all.sort_by_key(|slider| !slider.drawn);
     all
 }
@@ -142,7 +146,7 @@ mod tests {
 
     #[test]
     fn sliders_reach_what_may_be_drawn() {
-        let all = sliders(TEXT);
+        let all = sliders(TEXT, &[]);
         let paths: Vec<&str> = all.iter().map(|s| s.path.as_str()).collect();
         assert_eq!(paths, ["camera.height_m", "crops[0].growth.Bbch", "crops[0].n", "camera.yaw_deg"]);
         let [height, stage, n, yaw] = all.as_slice() else { panic!("{all:?}") };
@@ -151,6 +155,9 @@ mod tests {
         assert_eq!(stage.values, [12.0, 14.0]);
         assert_eq!((n.low, n.high, n.step, n.at), (1.0, 9.0, 1.0, 5.0));
         assert_eq!((yaw.drawn, yaw.low, yaw.high), (false, -10.0, 10.0));
+        let assigned = [Assignment::parse("crops[0]=()").unwrap(), Assignment::parse("camera.yaw_deg=1").unwrap()];
+        let paths: Vec<String> = sliders(TEXT, &assigned).into_iter().map(|s| s.path).collect();
+        assert_eq!(paths, ["camera.height_m"]);
     }
 
     /// Expected: distributions with empty bounds have no slider; they are reported when the file is read as a scene.
@@ -158,7 +165,7 @@ mod tests {
     fn bounds_that_hold_nothing_have_no_slider() {
         let normal =
             "Field(a: Normal(mean: 3, sd: 1, min: 9, max: 2), b: LogNormal(median: 3, sigma: 1, min: 9, max: 2), c: 2)";
-        let paths: Vec<String> = sliders(normal).into_iter().map(|slider| slider.path).collect();
+        let paths: Vec<String> = sliders(normal, &[]).into_iter().map(|slider| slider.path).collect();
         assert_eq!(paths, ["c"]);
     }
 

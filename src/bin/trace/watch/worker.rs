@@ -97,7 +97,7 @@ impl Worker {
         let text = RonFile::read(session.path())?.text;
         session.show(|shown| {
             if shown.text != text || shown.sliders.is_empty() {
-                shown.sliders = sliders(&text);
+                shown.sliders = sliders(&text, session.assigned());
                 shown.text.clone_from(&text);
             }
             shown.doing = "building the scene";
@@ -105,7 +105,10 @@ impl Worker {
         let text = with(&text, &wish.values);
         let scene = match &self.known {
             Some(known) => known.reread(Some(&text))?,
-            None => SceneFile::open(session.path())?.threads(&self.threads).reread(Some(&text))?,
+            None => SceneFile::open(session.path())?
+                .threads(&self.threads)
+                .assign(session.assigned())?
+                .reread(Some(&text))?,
         };
         let scene = scene.seed(wish.seed).memory(self.memory).preview(&self.preview).until(session.outdated());
         let expected_warnings = scene.expected_warnings(wish.index)?;

@@ -1,0 +1,141 @@
+//! `trace serve`: renders images for another program, one request after the other, without a process for each.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `scene` | scene files kept between requests, read again when one of their files has changed |
+//! | `answer` | lines and bytes of an answer |
+
+mod answer;
+mod scene;
+
+use crate::render;
+use answer::{Answer, Progress};
+use clap::Parser;
+use furrow_base::ron_file::to_json;
+use furrow_base::supervise::supervised;
+use furrow_base::{Error, Result};
+use furrow_dataset::make::single;
+use scene::{Kept, SceneSource};
+use serde::Deserialize;
+use serde_json::Value;
+use std::cell::RefCell;
+use std::io::{self, BufRead, IsTerminal};
+use std::path::PathBuf;
+
+/// No options.
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(crate) struct Args {}
+
+const AFTER: &str = "\
+Each line of stdin is a request, a JSON object; each answer on stdout is a line of JSON, followed by the bytes of its maps. The program ends
+with its input. The Python module `furrow` uses it.
+
+  {\"open\": \"field\"}                                   the scene file as JSON: {\"scene\": {…}, \"file\": \"…\"}
+  {\"write\": {\"scene\": {…}, \"folder\": \"…\"}}            the text of a scene file: {\"text\": \"Field(…)\"}
+  {\"render\": {\"file\": \"field\", \"arguments\": [\"--spp\", \"1\"]}}   an image, with the options of `trace --scene`
+  {\"render\": {\"scene\": {…}, \"folder\": \"…\", \"arguments\": []}}   the same of a scene as JSON; its paths are relative to the folder
+
+An image is {\"maps\": [{\"name\": \"rgb\", \"type\": \"u1\", \"shape\": [72, 96, 3]}, …], \"record\": {…}, \"provenance\": \"…\", \"warnings\": […]} and the
+maps' bytes, in their order, rows from the top, little-endian. Before it, lines {\"progress\": 0.4} may come, with \"progress\": true in the
+request. A failed request is {\"error\": {…}} with message, kind, help and place.";
+
+/// A request.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "lowercase")]
+enum Request {
+    /// Returns a scene file as JSON.
+    Open(PathBuf),
+    /// Returns the text of a scene given as JSON.
+    Write(SceneSource),
+    /// Renders an image.
+    Render(RenderRequest),
+}
+
+/// An image to render.
+#[derive(Deserialize)]
+struct RenderRequest {
+    #[serde(flatten)]
+    source: SceneSource,
+    /// Options of `trace --scene`.
+    #[serde(default)]
+    arguments: Vec<String>,
+    /// Whether lines of progress are sent before the answer.
+    #[serde(default)]
+    progress: bool,
+}
+
+/// Options of an image, parsed like those of the command line.
+#[derive(Parser)]
+#[command(name = "trace", no_binary_name = true)]
+struct Options {
+    #[command(flatten)]
+    render: render::Args,
+}
+
+/// Answers requests until the input ends.
+pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
+    if io::stdin().is_terminal() {
+        return Err(Error::misuse("stdin is a terminal, and requests come from a program")
+            .help("use the Python module `furrow`, or see `trace serve --help`"));
+    }
+    let mut kept = Kept::default();
+    for line in io::stdin().lock().lines() {
+        let line = line.map_err(|e| Error::failed(format!("cannot read stdin: {e}")))?;
+        let answer = supervised(|| answer(&line, &mut kept)).and_then(|answer| answer);
+        if answer.is_err() {
+            // An error may have interrupted a change of what is kept.
+            kept = Kept::default();
+        }
+        if !answer::send(answer)? {
+            break;
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn answer(line: &str, kept: &mut Kept) -> Result<Answer> {
+    let request = serde_json::from_str(line)
+        .map_err(|e| Error::misuse(format!("this is not a request: {e}")).help("see `trace serve --help`"))?;
+    match request {
+        Request::Open(file) => {
+            let file = furrow_base::input::shipped::scene_file(file);
+            let text = SceneSource::of(file.clone()).text()?;
+            Ok(Answer::of("scene", to_json(&text)).with("file", &file.to_string_lossy().into()))
+        }
+        Request::Write(source) => Ok(Answer::of("text", Value::from(source.absolute_text()?).to_string())),
+        Request::Render(request) => image(&request, kept),
+    }
+}
+
+/// Renders an image and describes it.
+fn image(request: &RenderRequest, kept: &mut Kept) -> Result<Answer> {
+    let path = request.source.path().display().to_string();
+    let words = ["--scene".to_owned(), path, "--quiet".to_owned()].into_iter().chain(request.arguments.iter().cloned());
+    let options = Options::try_parse_from(words).map_err(|e| unparsed(&e))?.render;
+    let scene = kept.scene(&request.source, options.edit()?)?;
+    let warnings = RefCell::new(Vec::new());
+    let warn = |words: &str| warnings.borrow_mut().push(words.to_owned());
+    let sent = request.progress.then(Progress::begin);
+    let progress = |done: f64| sent.iter().for_each(|progress| progress.send(done));
+    let (answer, files) = options.image(scene, &progress, &warn, |made| {
+        let files = made.image.field().grown().files.clone();
+        let provenance = made.image.provenance.photograph_text(made.image.denoised.is_some());
+        let answer = if made.whole {
+            Answer::sample(&single::sample(made.scene, made.renderer, made.image)?)?
+        } else {
+            made.image.check_denoised()?;
+            Answer::part(&made.image)
+        };
+        Ok((answer.with("provenance", &provenance.into()), files))
+    })?;
+    kept.read(&files);
+    Ok(answer.with("warnings", &warnings.into_inner().into()))
+}
+
+/// Converts an error of the command line.
+fn unparsed(error: &clap::Error) -> Error {
+    let text = error.render().to_string();
+    let words = text.strip_prefix("error: ").unwrap_or(&text);
+    Error::misuse(words.split("\n\nUsage").next().unwrap_or(words).split("\n\nFor more").next().unwrap_or(words).trim())
+}
