@@ -1,6 +1,6 @@
 //! Ground in a scene file: soil, clods, stones and litter.
 
-use super::{SoilColor, WheelDesc};
+use super::{PigmentsDesc, SoilColor, WheelDesc};
 use furrow_base::math::Spectrum;
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Signed, Vary};
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,9 @@ pub struct SoilDesc {
     /// around it. If empty, the textures' colours are used.
     #[serde(default)]
     pub colors: Vec<SoilColor>,
+    /// Variation of the colour over the ground.
+    #[serde(default)]
+    pub pigments: PigmentsDesc,
     /// Blending of the layers.
     #[serde(default)]
     pub blend: BlendDesc,

@@ -1,6 +1,6 @@
 //! Stones: worn bodies, placed before anything else.
 
-use super::body::{self, Pose, Shape, ShapeParameters};
+use super::body::{self, Placed, Pose, Shape, ShapeParameters};
 use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
 use furrow_base::geometry::{Cost, Mesh};
@@ -140,12 +140,10 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
     let (support, _) = pile.support(at, 0.5 * (axes.x + axes.y));
     let centre = at.extend(support - sink * (pose.high - pose.low) - pose.low);
     let mut mesh = Mesh::default();
-    body::emit(
+    Placed::new(&shape, &pose, centre).emit(
         &mut mesh,
         &shape,
-        &pose,
-        centre,
-        |corners, _| corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 1e-3),
+        |corners, _| corners.iter().any(|c| c.z >= ground.height(c.x, c.y) - 1e-3),
         |p, _| {
             let p = p.normalize_or(furrow_base::math::Vec3::Z);
             vec2(p.y.atan2(p.x) / std::f32::consts::TAU + 0.5, p.z.clamp(-1.0, 1.0).acos() / std::f32::consts::PI)

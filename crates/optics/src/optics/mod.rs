@@ -15,8 +15,10 @@ mod pigments;
 pub mod prospect;
 pub mod shadowing;
 pub mod soil;
+mod soil_tint;
 
 pub use leaf::{Leaf, LeafOptics};
 pub use munsell::Munsell;
 pub use pigments::{LeafBands, Pigments};
 pub use shadowing::{Shadowing, UnmeshedRelief};
+pub use soil_tint::SoilTint;
