@@ -6,6 +6,7 @@ use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cel
 use furrow_base::geometry::{Cost, Mesh};
 use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_optics::optics::Rock;
 
 /// Shape parameters of stones.
 const CUT: ShapeParameters =
@@ -153,13 +154,18 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
     Debris {
         kind: DebrisKind::Stone,
         mesh,
-        albedo: desc.albedo,
+        albedo: rock(&desc.rocks, s).map_or(desc.albedo, Rock::reflectance),
         tint: (desc.tint_sigma.f32() * s.normal().to_f32()).exp(),
         hue: s.uniform32(),
         dust: desc.dust.draw32(s),
         centre,
         radius: axes.x,
     }
+}
+
+/// Draws the rock of a stone; `None` if the description lists none.
+fn rock(rocks: &[Rock], s: &Stream) -> Option<Rock> {
+    (!rocks.is_empty()).then(|| rocks[s.child(Purpose::Page, 1).index(rocks.len())])
 }
 
 #[cfg(test)]
