@@ -29,18 +29,18 @@ fn sd(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Returns the standard deviations of a* and b* over blocks of 4 × 4 pixels of bare ground, white-balanced and exposed to
-/// a mean luminance of 0.2, under an even sky.
+/// Returns the standard deviations of a* and b* over blocks of 4 × 4 pixels of ground in the sun, exposed to a mean
+/// luminance of 0.2.
 fn chroma(soil: &str) -> [f64; 2] {
-    let (width, height) = (160, 120);
+    let (width, height) = (240, 180);
     let text = format!(
         r#"Field(
             seed: 5,
-            camera: Pinhole(size: ({width}, {height}), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5)),
-            lights: [Constant(radiance: (1, 1, 1, 1))],
+            camera: Pinhole(size: ({width}, {height}), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.24)),
+            lights: [Daylight(sun: Angles(elevation_deg: 50, azimuth_deg: 150), turbidity: 3)],
             soil: (
                 layers: [(albedo: "textures/soil/dirt.png", height: "textures/soil/dirt.height.png", size_m: 0.5, height_mm: (-4, 8))],
-                litter: (bits_per_m2: 0, sticks_per_m2: 0, straw_cover: 0), {soil}
+                {soil}
             ),
         )"#
     );
@@ -59,18 +59,20 @@ fn chroma(soil: &str) -> [f64; 2] {
     [1, 2].map(|band| sd(&blocks.iter().map(|block| block[band]).collect::<Vec<f64>>()))
 }
 
-/// Rationale: ground of one hue gives a render away at once. Expected: the standard deviations of a* and b* of default
-/// bare ground, on average over soils, are within those of photographs; without pigments they are below. Source: six
-/// public data sets; `docs/results/ground.md`.
+/// Rationale: ground of one hue gives a render away at once. Expected: with default iron and humus, and with algae,
+/// stones and litter as in photographs, the standard deviations of a* and b* are within those of photographs; ground of
+/// one soil has a standard deviation of a* below them, and of b* below the other. Source: six public data sets;
+/// `docs/results/ground.md`.
 #[test]
-fn chroma_of_bare_ground_varies_as_in_photographs() {
-    let none = "pigments: (iron: 0, humus: 0, lime: 0), clods: (hue_sigma: 0)";
-    let soils = ["Loess", "Sandy", "Reddish"];
+fn chroma_of_ground_varies_as_in_photographs() {
+    let one = "pigments: (iron: 0, humus: 0, lime: 0), clods: (hue_sigma: 0)";
+    let many = "pigments: (algae: 2), stones: [(cover: 0.02, median_mm: 6, min_mm: 2, rocks: [Quartz, Flint, Granite, Brick])]";
+    let soils = ["Loess", "Reddish"];
     let mean = |extra: &str| {
         let all = soils.map(|soil| chroma(&format!("colors: [{soil}], {extra}")));
         [0, 1].map(|k| all.iter().map(|found| found[k]).sum::<f64>() / soils.len() as f64)
     };
-    let ([a, b], [plain_a, plain_b]) = (mean(""), mean(none));
+    let ([a, b], [plain_a, plain_b]) = (mean(many), mean(one));
     assert!((REAL_A.0..REAL_A.1).contains(&a) && (REAL_B.0..REAL_B.1).contains(&b), "{a} {b}");
-    assert!(plain_a < 0.7 * REAL_A.0 && plain_b < b, "{plain_a} {plain_b}");
+    assert!(plain_a < 0.8 * REAL_A.0 && plain_b < 0.9 * b, "{plain_a} {plain_b}");
 }

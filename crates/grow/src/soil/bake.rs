@@ -166,16 +166,14 @@ impl Ground {
         let texel = FABRIC_M / side.to_f32();
         let raster = Raster { origin: Vec2::splat(0.5 * texel), step: texel, width: side, height: side };
         let crumbs = self.fabric_crumbs(raster);
-        let (pits, slope) = (self.pores(raster, &crumbs.height), differences(&crumbs.height, raster));
+        let (pits, slope) = (pores(raster, &crumbs.height), differences(&crumbs.height, raster));
         let slope: Vec<Vec2> = slope.into_iter().map(|slope| slope.clamp_length_max(STEEPEST_PORE)).collect();
         let open = |k: usize| 1.0 / closing(pits[k], HALF_SKY_M);
         // A clod is as bright as without pores: they are part of what was measured as the reflectance of soil.
         let lost = |k: usize| open(k) / (1.0 + slope[k].length_squared()).sqrt();
         let gain = pits.len().to_f32() / (0..pits.len()).map(lost).sum::<f32>();
-        let (hues, tints) = (
-            self.crumb_hues(),
-            self.pigments.factors(raster, (0.004 / texel).trunc_to::<usize>().max(1), |_| CLODS_MOIST),
-        );
+        let (hues, tints) =
+            (self.crumb_hues(), self.tints(raster, (0.004 / texel).trunc_to::<usize>().max(1), |_| CLODS_MOIST));
         let texel_at = |k: usize| {
             let p = raster.origin + vec2((k % side).to_f32(), (k / side).to_f32()) * texel;
             let mut noise = [0.0; MAX_LAYERS];
@@ -194,7 +192,7 @@ impl Ground {
         let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>();
         let ao: Vec<u8> = (0..pits.len()).map(|k| byte(open(k))).collect();
         let slope: Vec<[i8; 2]> =
-            slope.iter().map(|s| (*s * GroundMaps::SLOPE_STEPS).to_array().map(|s| s.trunc_to::<i8>())).collect();
+            slope.iter().map(|s| (*s * GroundMaps::SLOPE_STEPS).to_array().map(RoundTo::trunc_to::<i8>)).collect();
         self.clods_moisture().map(|moisture| GroundMaps {
             width: side,
             height: side,
@@ -224,12 +222,6 @@ impl Ground {
             *height += ROUGH_HEIGHT_M * noise.fbm2(f64::from(q.x) + 0.3, f64::from(q.y) + 0.7, octaves, 0.6).to_f32();
         });
         crumbs
-    }
-
-    /// Returns the depth of each texel below the mean of its surroundings, metres.
-    fn pores(&self, raster: Raster, height: &[f32]) -> Vec<f32> {
-        let around = blur(height, raster.width, (0.0008 / raster.step).ceil_to::<usize>());
-        height.iter().zip(around).map(|(height, around)| (around - height).max(0.0)).collect()
     }
 
     /// Returns the colours of crumbs, relative to that of the soil around them.
@@ -295,6 +287,12 @@ impl Ground {
         let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
         GroundMaps { moisture, ao, lost, ..painted.maps }
     }
+}
+
+/// Returns the depth of each sample below the mean of its surroundings, metres.
+fn pores(raster: Raster, height: &[f32]) -> Vec<f32> {
+    let around = blur(height, raster.width, (0.0008 / raster.step).ceil_to::<usize>());
+    height.iter().zip(around).map(|(height, around)| (around - height).max(0.0)).collect()
 }
 
 fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {

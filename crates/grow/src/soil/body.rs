@@ -162,16 +162,25 @@ impl Pose {
 /// Shape at its place in the world.
 pub(super) struct Placed {
     pub(super) positions: Vec<Vec3>,
-    pub(super) normals: Vec<Vec3>,
+    /// Linear map of normals from the shape to the world.
+    normals: Mat3,
+    /// Upward vector to add to each normal, relative to its length; empty for none.
+    pub(super) raised: Vec<f32>,
 }
 
 impl Placed {
     pub(super) fn new(shape: &Shape, pose: &Pose, centre: Vec3) -> Self {
-        let normals = pose.basis.inverse().transpose();
         Self {
             positions: shape.positions.iter().map(|p| centre + pose.basis * *p).collect(),
-            normals: shape.normals.iter().map(|n| (normals * *n).normalize_or(Vec3::Z)).collect(),
+            normals: pose.basis.inverse().transpose(),
+            raised: Vec::new(),
         }
+    }
+
+    /// Returns the normal of vertex `i` of its shape.
+    fn normal(&self, shape: &Shape, i: usize) -> Vec3 {
+        let own = (self.normals * shape.normals[i]).normalize_or(Vec3::Z);
+        self.raised.get(i).map_or(own, |raised| (own + Vec3::Z * *raised).normalize_or(Vec3::Z))
     }
 
     /// Adds the triangles to a mesh for which `shown` returns `true`. Its arguments are the vertices and the upward part
@@ -195,7 +204,7 @@ impl Placed {
                 if index[i] == u32::MAX {
                     index[i] = mesh.positions.len().to_u32();
                     mesh.positions.push(self.positions[i]);
-                    mesh.normals.push(self.normals[i]);
+                    mesh.normals.push(self.normal(shape, i));
                     mesh.uvs.push(uv(shape.positions[i], self.positions[i]));
                 }
                 index[i]

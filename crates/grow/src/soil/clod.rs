@@ -30,7 +30,8 @@ const AXES: (f32, f32) = (0.77, 0.55);
 
 /// Fraction of the dry clods that have kept a part of the ground's moisture.
 const HALF_DRY: f32 = 0.25;
-/// Relative heights below which a clod is one level moister, and the length above which a clod has such a base, mm.
+/// Relative heights below which a clod is one level moister, and the length above which a clod has such a base and is
+/// joined to the ground, mm.
 const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
 const GRADED_MM: f32 = 6.0;
 /// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
@@ -132,7 +133,10 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let centre = at.extend(support - (sink * height).max(height - free) - pose.low);
         if seen.holds(at, half) {
             let mut body = Placed::new(shape, &pose, centre);
-            weld(&mut body, centre, (pose.low, pose.high), 1.0 - ground.law.loose, |p| pile.at(p));
+            let graded = clod.mm > GRADED_MM;
+            if graded {
+                weld(&mut body, centre, (pose.low, pose.high), 1.0 - ground.law.loose, |p| pile.at(p));
+            }
             let (slack, top) = (0.06 * height, centre.z + pose.high - support);
             let hidden = |corners: [Vec3; 3], up: f32| {
                 if up < 0.0 {
@@ -144,14 +148,15 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
             // The base is moister than the top.
             let moister = |corners: [Vec3; 3]| {
                 let relative = (corners.iter().map(|c| c.z).sum::<f32>() / 3.0 - support) / top;
-                let steps = MOIST_BELOW.iter().filter(|below| clod.mm > GRADED_MM && relative < **below).count();
+                let steps = MOIST_BELOW.iter().filter(|below| relative < **below).count();
                 (moisture + steps).min(MOISTURE_LEVELS - 1)
             };
-            for level in moisture..MOISTURE_LEVELS.min(moisture + MOIST_BELOW.len() + 1) {
+            let bases = if graded { MOIST_BELOW.len() } else { 0 };
+            for level in moisture..MOISTURE_LEVELS.min(moisture + bases + 1) {
                 body.emit(
                     &mut groups[(level * HUES + hue) * TONES + tone(tint, ground.law.tint_sigma)],
                     shape,
-                    |corners, up| moister(corners) == level && !hidden(corners, up),
+                    |corners, up| (!graded || moister(corners) == level) && !hidden(corners, up),
                     |_, p| Ground::fabric_uv(from, p - at.extend(0.0)),
                 );
             }
@@ -192,14 +197,15 @@ fn hues(sigma: f32, pigments: &Pigments, stream: &mut Stream) -> [Spectrum; HUES
 /// `amount` the strength (0 for loose bodies, 1 for welded ones), `height` that of the surface below.
 fn weld(body: &mut Placed, centre: Vec3, reach: (f32, f32), amount: f32, height: impl Fn(Vec2) -> f32) {
     let (equator, half) = (centre.z + 0.5 * (reach.0 + reach.1), 0.5 * (reach.1 - reach.0));
-    for (p, normal) in body.positions.iter_mut().zip(&mut body.normals) {
+    body.raised = Vec::with_capacity(body.positions.len());
+    for p in &mut body.positions {
         let near = 1.0 - ((p.z - height(p.truncate())) / (FILLET * half)).clamp(0.0, 1.0);
         // Profile of an ellipsoid below its equator.
         let below = ((equator - p.z) / half).clamp(0.0, 0.85);
         let upright = 1.0 / (1.0 - below * below).sqrt();
         let wider = 1.0 + amount * (upright * (1.0 + FLARE * near * near) - 1.0);
         *p = centre + ((*p - centre).truncate() * wider).extend(p.z - centre.z);
-        *normal = (*normal + Vec3::Z * (amount * near * near)).normalize_or(Vec3::Z);
+        body.raised.push(amount * near * near);
     }
 }
 

@@ -256,7 +256,7 @@ impl Ground {
         let moisture = (patches.iter().zip(&out))
             .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
             .collect();
-        let tint = self.pigments.factors(raster, self.every(), |k| patches[k]);
+        let tint = self.tints(raster, self.every(), |k| patches[k]);
         Appearance { moisture, tint }
     }
 
@@ -265,6 +265,14 @@ impl Ground {
     pub(super) fn clods_moisture(&self) -> [f32; MOISTURE_LEVELS] {
         let dry = |k: usize| 1.0 - k.to_f32() / (MOISTURE_LEVELS - 1).to_f32();
         std::array::from_fn(|k| self.moisture.mean * (1.0 - self.law.dryness * dry(k)))
+    }
+
+    /// Returns the factors on the reflectance at the samples of a raster; noise is computed at every `every`-th of them.
+    /// `moist` returns the moisture of a sample in standard deviations from the mean.
+    pub(super) fn tints(&self, raster: Raster, every: usize, moist: impl Fn(usize) -> f32 + Sync) -> Vec<Spectrum> {
+        let noise = [0, 1, 2].map(|of| slowly(raster, every, |p| self.pigments.noise(of, p)));
+        let sample = |k: usize| self.pigments.place(noise.each_ref().map(|noise| noise[k]), moist(k));
+        (0..raster.width * raster.height).into_par_iter().map(sample).collect()
     }
 
     /// Returns the record of the drawn parameters. `debris` is the stream of the stones, `litter` that of the litter.
@@ -511,7 +519,7 @@ fn check(desc: &SoilDesc, maps: usize, site: &Site) -> Result<()> {
 }
 
 /// Evaluates `f` at every `every`-th sample of a raster and interpolates between them.
-pub(super) fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f32> {
+fn slowly(raster: Raster, every: usize, f: impl Fn(Vec2) -> f32 + Sync) -> Vec<f32> {
     let lines = |n: usize| (n - 1).div_ceil(every) + 1;
     let (w, h) = (lines(raster.width), lines(raster.height));
     // The last line may be beyond the raster, so that all are evenly spaced.

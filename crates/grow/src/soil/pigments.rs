@@ -3,8 +3,6 @@
 //! Iron and humus vary from the largest patches down to a centimetre, and from aggregate to aggregate. Their amounts are
 //! log-normal, as most contents of soil are (Ahrens 1954, Geochim. Cosmochim. Acta 5:49): rich places are rare and strong. Lime and salts are left where water evaporates, at the rims of moist patches. Algae grow in moist ones.
 
-use super::crumb::Raster;
-use super::ground::slowly;
 use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec2, smoothstep};
 use furrow_base::ron_file::{Fraction, NonNegative, Num, Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
@@ -59,8 +57,8 @@ pub struct PigmentsDesc {
 impl Default for PigmentsDesc {
     fn default() -> Self {
         Self {
-            iron: Vary::uniform(0.12, 0.36),
-            humus: Vary::uniform(0.06, 0.16),
+            iron: Vary::uniform(0.25, 0.55),
+            humus: Vary::uniform(0.08, 0.2),
             lime: Vary::uniform(0.0, 0.12),
             algae: Vary::fixed(0.0),
             patch_m: Vary::uniform(0.15, 0.4),
@@ -101,7 +99,7 @@ impl Pigments {
     }
 
     /// Returns noise with mean 0 and standard deviation 1 at a point: of iron, humus or algae, for `k` 0 to 2.
-    fn noise(&self, k: usize, p: Vec2) -> f32 {
+    pub(super) fn noise(&self, k: usize, p: Vec2) -> f32 {
         let q = p / self.patch_m + 0.5;
         let squares = (1.0 - GAIN.powi(2).powf(self.octaves.to_f32())) / (1.0 - GAIN.powi(2));
         let sum = (1.0 - GAIN.powf(self.octaves.to_f32())) / (1.0 - GAIN);
@@ -110,25 +108,19 @@ impl Pigments {
         (noise.to_f32() / sd).clamp(-MOST, MOST)
     }
 
-    /// Returns the factors on the reflectance at the samples of a raster, every `every`-th of which is computed.
-    /// `moist` returns the moisture of a sample in standard deviations from the mean.
-    pub(super) fn factors(&self, raster: Raster, every: usize, moist: impl Fn(usize) -> f32) -> Vec<Spectrum> {
-        let [iron, humus, algae] = [0, 1, 2].map(|k| slowly(raster, every, |p| self.noise(k, p)));
+    /// Returns the factors on the reflectance of a place, from its noise of iron, humus and algae and from its moisture, in
+    /// standard deviations from the mean.
+    pub(super) fn place(&self, [iron, humus, algae]: [f32; 3], moist: f32) -> Spectrum {
+        let rim = ((moist + RIM.0) / RIM.1).powi(2);
         let SoilTint { iron: i, humus: h, lime, algae: a } = self.amounts;
-        let factor = |k: usize| {
-            let moist = moist(k);
-            let rim = ((moist + RIM.0) / RIM.1).powi(2);
-            let grown = smoothstep(GROWN.0, GROWN.1, algae[k]) * smoothstep(MOIST.0, MOIST.1, moist);
-            SoilTint {
-                iron: i * log_normal(iron[k]),
-                humus: h * log_normal(humus[k]),
-                // Salts are left in patches of the rims.
-                lime: lime * (-0.5 * rim).exp() * smoothstep(-0.5, 1.5, humus[k] - iron[k]),
-                algae: a * grown,
-            }
-            .factors()
-        };
-        (0..iron.len()).map(factor).collect()
+        SoilTint {
+            iron: i * log_normal(iron),
+            humus: h * log_normal(humus),
+            // Salts are left in patches of the rims.
+            lime: lime * (-0.5 * rim).exp() * smoothstep(-0.5, 1.5, humus - iron),
+            algae: a * smoothstep(GROWN.0, GROWN.1, algae) * smoothstep(MOIST.0, MOIST.1, moist),
+        }
+        .factors()
     }
 
     /// Returns the factors on the reflectance of an aggregate, from two standard normal numbers.
@@ -209,9 +201,7 @@ mod tests {
             lime: Vary::fixed(0.0),
             ..PigmentsDesc::default()
         };
-        let raster = Raster { origin: Vec2::ZERO, step: 0.01, width: 12, height: 9 };
-        let factors = pigments(&none).factors(raster, 2, |_| 0.0);
-        assert_eq!(factors, vec![Spectrum::ONE; 108]);
+        assert_eq!(pigments(&none).place([1.0, -1.0, 2.0], 0.0), Spectrum::ONE);
         let some = pigments(&PigmentsDesc { iron: Vary::fixed(1.0), mixing: Num::new(0.6), ..none });
         let [red, pale] = [1.0, -1.0].map(|iron| some.aggregate(iron, 0.0).to_array());
         assert!(red[0] / red[2] > 1.2 && (0.7..0.9).contains(&(pale[0] / pale[2])), "{red:?} {pale:?}");
@@ -238,10 +228,11 @@ mod tests {
             lime: Vary::fixed(0.0),
             ..PigmentsDesc::default()
         };
-        let raster = Raster { origin: Vec2::ZERO, step: 0.05, width: 120, height: 120 };
         let mean = |desc: &PigmentsDesc, moist: f32, ratio: fn(Spectrum) -> f32| {
-            let all = pigments(desc).factors(raster, 1, |_| moist);
-            all.iter().map(|f| ratio(*f)).sum::<f32>() / all.len().to_f32()
+            let pigments = pigments(desc);
+            let place = |k: usize| vec2((k % 120).to_f32(), (k / 120).to_f32()) * 0.05;
+            let noise = |k: usize| [0, 1, 2].map(|of| pigments.noise(of, place(k)));
+            (0..14_400).map(|k| ratio(pigments.place(noise(k), moist))).sum::<f32>() / 14_400.0
         };
         let limed = PigmentsDesc { lime: Vary::fixed(1.0), ..bare.clone() };
         let blue: fn(Spectrum) -> f32 = |f| f.0.z;

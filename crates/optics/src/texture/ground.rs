@@ -38,7 +38,7 @@ impl GroundMaps {
 
     /// Horizontal shift per unit of height of the projection that maps the material of clods onto their surface. The
     /// projection is slanted, so that vertical faces show no streaks.
-    pub const LEAN: Vec2 = Vec2::new(0.8, 0.6);
+    pub const LEAN: Vec2 = Vec2::new(0.4, 0.3);
 
     /// Returns the reflectance of a stored albedo.
     pub fn decode(albedo: [u8; 4]) -> Spectrum {
