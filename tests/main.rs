@@ -57,6 +57,7 @@ mod fit;
 mod formats;
 mod fuzz_corpus;
 mod gap;
+mod ground;
 mod guide;
 mod import;
 mod instances;

@@ -4,7 +4,7 @@ use super::ground_view::Viewpoint;
 use crate::desc::Detail;
 use crate::layer::Layer;
 use furrow_base::math::Spectrum;
-use furrow_grow::soil::{Debris, Ground, Pile, Site, SoilDesc};
+use furrow_grow::soil::{Debris, Ground, MOISTURE_LEVELS, Pile, Site, SoilDesc};
 use furrow_render::material::BakedGround;
 use std::sync::Arc;
 
@@ -33,10 +33,10 @@ pub(super) struct GroundAndStones {
     pub(super) stones: Vec<Debris>,
 }
 
-/// Baked textures of the ground and of its clods (dry, damp).
+/// Baked textures of the ground and of its clods at each level of moisture.
 pub(super) struct BakedGrounds {
     pub(super) ground: Arc<BakedGround>,
-    pub(super) clods: [Arc<BakedGround>; 2],
+    pub(super) clods: [Arc<BakedGround>; MOISTURE_LEVELS],
     /// Reflectance of the dry soil that covers stones and straw as dust.
     pub(super) dust: Spectrum,
 }

@@ -242,10 +242,9 @@ fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> Baked
         Detail::Full => maps.clone(),
         Detail::ByPixel | Detail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
     };
-    let fabric = |wet| Arc::new(BakedGround::bake(&ground.fabric(&seen, *texel, wet)));
     BakedGrounds {
         ground: Arc::new(BakedGround::bake(&ground.bake(&seen, *texel))),
-        clods: ground.clods_moisture().map(fabric),
+        clods: ground.fabrics(&seen, *texel).map(|maps| Arc::new(BakedGround::bake(&maps))),
         dust: ground.mean_dry(maps),
     }
 }
@@ -276,7 +275,7 @@ fn lay(
     let shown = baked.map(|baked| Material::Ground(GroundMaterial::new(baked.ground.clone())));
     add(mesh, shown.unwrap_or_else(black), PartKind::Soil);
     for group in clods {
-        let maps = baked.map(|baked| baked.clods[usize::from(group.damp)].clone());
+        let maps = baked.map(|baked| baked.clods[group.moisture].clone());
         let shown = maps.map(|maps| Material::Ground(GroundMaterial::clods(maps, group.tint)));
         add(group.mesh, shown.unwrap_or_else(black), PartKind::Soil);
     }

@@ -1,23 +1,42 @@
 //! Baked texture of the ground: colour, wetness and all relief that is finer than its grid.
 
 use super::blend::Weights;
-use super::crumb::Raster;
+use super::crumb::{Crumbs, Raster, SizeRange};
 use super::ground::blur;
-use super::{Ground, LayerMaps, MAX_LAYERS};
-use furrow_base::math::{RoundTo, ToFloat, Vec2, Vec3, vec2};
+use super::pigments::quantile;
+use super::{Ground, LayerMaps, MAX_LAYERS, MOISTURE_LEVELS};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
+use furrow_base::sampling::Purpose;
 use furrow_optics::optics::UnmeshedRelief;
+use furrow_optics::optics::soil::at as four_bands;
 use furrow_optics::texture::ground::GroundMaps;
+use furrow_optics::texture::noise::Perlin;
 use rayon::prelude::*;
 
 /// Depth of a pit between crumbs that hides half of the sky, metres; for coarse ground [`Ground::shade`] computes it.
 pub(super) const HALF_SKY_M: f32 = 0.0005;
 
-/// Side of the material texture of clods, metres (see [`Ground::fabric`]): larger than the longest clod of usual scene
+/// Side of the material texture of clods, metres (see [`Ground::fabrics`]): larger than the longest clod of usual scene
 /// files.
 const FABRIC_M: f32 = 0.12;
 
 /// Increase of the moisture in such a pit.
 const PIT_WETTING: f32 = 0.2;
+
+/// Crumbs on the surface of clods: range of lengths, mm, and the area of all relative to that of the surface. An aggregate
+/// consists of smaller ones, down to grains of silt.
+const GRAINS_MM: (f32, f32) = (0.6, 4.0);
+const GRAINS_COVER: f32 = 1.2;
+/// Moisture of the soil that clods consist of, in standard deviations from the mean: they come from below the surface, where
+/// no lime is deposited.
+const CLODS_MOIST: f32 = 1.0;
+/// Length of the finest relief of clods, texels.
+const FINEST_TEXELS: f32 = 2.0;
+/// Longest wavelength and height of the roughness between these crumbs, metres.
+const ROUGH_M: f32 = 0.006;
+const ROUGH_HEIGHT_M: f32 = 0.0006;
+/// Largest slope of this relief.
+const STEEPEST_PORE: f32 = 1.0;
 
 /// Maps of the ground before ambient occlusion and moisture are computed from its pits.
 pub(super) struct UnshadedMaps {
@@ -99,24 +118,25 @@ impl Ground {
             height,
             origin: area.corners()[0],
             texel_m: texel,
-            albedo: vec![[0; 3]; n],
+            albedo: vec![[0; 4]; n],
             weights: vec![[0; MAX_LAYERS]; n],
             moisture: Vec::new(),
             slope: Vec::new(),
             ao: Vec::new(),
-            like: self.color.like,
             lost: None,
         };
         let look = self.appearance();
         let crumbs = self.crumbs(raster, laid);
+        let hues = self.crumb_hues();
         let mut detail = crumbs.height;
         let rows = (
             detail.par_chunks_mut(width),
             baked.albedo.par_chunks_mut(width),
             baked.weights.par_chunks_mut(width),
             crumbs.tint.par_chunks(width),
+            crumbs.hue.par_chunks(width),
         );
-        rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints))| {
+        rows.into_par_iter().enumerate().for_each(|(j, (detail, albedo, weights, tints, hue))| {
             for i in 0..width {
                 let p = raster.origin + vec2(i.to_f32(), j.to_f32()) * texel;
                 let cell = self.texel_cell(i, j, split);
@@ -127,12 +147,11 @@ impl Ground {
                 let heights = self.blend.heights(maps, p);
                 let share = self.blend.weights(noise, heights);
                 detail[i] += self.blend.displacement(share, heights);
-                let tint = match tints[i] {
-                    0 => 1.0,
-                    t => f32::from(t) / 128.0,
+                let crumb = match tints[i] {
+                    0 => Spectrum::ONE,
+                    t => hues[usize::from(hue[i])] * (f32::from(t) / 128.0),
                 };
-                let tone = tint * cell.mix(|v| look.tone[v]);
-                albedo[i] = GroundMaps::encode(self.dry(maps, share, p).map(|a| a * tone));
+                albedo[i] = GroundMaps::encode(self.dry(maps, share, p) * crumb * cell.mix_spectra(&look.tint));
                 weights[i] = share.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>());
             }
         });
@@ -140,51 +159,91 @@ impl Ground {
         UnshadedMaps { maps: baked, pits: self.pits(raster, split, detail), dry: crumbs.dry, split }
     }
 
-    /// Bakes the material of clods: a square of 12 cm of the ground's soil without crumbs or relief and with uniform
-    /// `moisture`, 0..1. Each clod samples it at its own offset.
-    pub fn fabric<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32, moisture: f32) -> GroundMaps {
+    /// Bakes the material of clods at each moisture level: a square of 12 cm of the ground's soil, with crumbs and pores.
+    /// Each clod samples it at its own offset.
+    pub fn fabrics<L: LayerMaps + Sync>(&self, maps: &[L], texel_m: f32) -> [GroundMaps; MOISTURE_LEVELS] {
         let side = (FABRIC_M / texel_m).trunc_to::<usize>().clamp(16, 1024);
         let texel = FABRIC_M / side.to_f32();
-        let n = side * side;
-        let rest = |p: Vec2| {
+        let raster = Raster { origin: Vec2::splat(0.5 * texel), step: texel, width: side, height: side };
+        let crumbs = self.fabric_crumbs(raster);
+        let (pits, slope) = (pores(raster, &crumbs.height), differences(&crumbs.height, raster));
+        let slope: Vec<Vec2> = slope.into_iter().map(|slope| slope.clamp_length_max(STEEPEST_PORE)).collect();
+        let open = |k: usize| 1.0 / closing(pits[k], HALF_SKY_M);
+        // A clod is as bright as without pores: they are part of what was measured as the reflectance of soil.
+        let lost = |k: usize| open(k) / (1.0 + slope[k].length_squared()).sqrt();
+        let gain = pits.len().to_f32() / (0..pits.len()).map(lost).sum::<f32>();
+        let (hues, tints) =
+            (self.crumb_hues(), self.tints(raster, (0.004 / texel).trunc_to::<usize>().max(1), |_| CLODS_MOIST));
+        let texel_at = |k: usize| {
+            let p = raster.origin + vec2((k % side).to_f32(), (k / side).to_f32()) * texel;
             let mut noise = [0.0; MAX_LAYERS];
             for (i, n) in noise.iter_mut().enumerate().take(self.blend.layers()) {
                 *n = self.blend.noise(i, p);
             }
-            (p, self.blend.weights(noise, self.blend.heights(maps, p)))
+            let weights = self.blend.weights(noise, self.blend.heights(maps, p));
+            let crumb = match crumbs.tint[k] {
+                0 => Spectrum::ONE,
+                t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
+            };
+            let albedo = self.dry(maps, weights, p) * tints[k] * crumb * gain;
+            (GroundMaps::encode(albedo), weights.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>()))
         };
-        let place = |k: usize| vec2((k % side).to_f32() + 0.5, (k / side).to_f32() + 0.5) * texel;
-        let (albedo, weights) = (0..n)
-            .into_par_iter()
-            .map(|k| rest(place(k)))
-            .map(|(p, w)| (GroundMaps::encode(self.dry(maps, w, p)), w.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>())))
-            .unzip();
-        GroundMaps {
+        let (albedo, weights): (Vec<_>, Vec<_>) = (0..side * side).into_par_iter().map(texel_at).unzip();
+        let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>();
+        let ao: Vec<u8> = (0..pits.len()).map(|k| byte(open(k))).collect();
+        let slope: Vec<[i8; 2]> =
+            slope.iter().map(|s| (*s * GroundMaps::SLOPE_STEPS).to_array().map(RoundTo::trunc_to::<i8>)).collect();
+        self.clods_moisture().map(|moisture| GroundMaps {
             width: side,
             height: side,
             origin: Vec2::ZERO,
             texel_m: texel,
-            albedo,
-            weights,
-            moisture: vec![(moisture.clamp(0.0, 1.0) * 255.0 + 0.5).trunc_to::<u8>(); n],
-            slope: vec![[0; 2]; n],
-            ao: vec![255; n],
-            like: self.color.like,
+            albedo: albedo.clone(),
+            weights: weights.clone(),
+            moisture: pits.iter().map(|pit| byte(moisture + PIT_WETTING * moisture * wet(*pit, HALF_SKY_M))).collect(),
+            slope: slope.clone(),
+            ao: ao.clone(),
             lost: None,
-        }
+        })
+    }
+
+    /// Rasterizes the crumbs on the surface of clods: they cover most of it, and the noise between them is rough.
+    fn fabric_crumbs(&self, raster: Raster) -> Crumbs {
+        let stream = self.stream.child(Purpose::Debris, 103);
+        let finest = (1e3 * FINEST_TEXELS * raster.step).max(GRAINS_MM.0);
+        let mm = (finest, GRAINS_MM.1.max(finest));
+        let amount = GRAINS_COVER / self.law.at(Vec2::ZERO, 1.0).cover(mm).max(f32::MIN_POSITIVE);
+        let [grains, none] = [mm, (mm.1, mm.1)].map(|mm| SizeRange { mm, amount, gain: |_| 0.0 });
+        let mut crumbs = Crumbs::draw(raster, &self.law, [grains, none], [none; 2], &stream, |_| 1.0);
+        let noise = Perlin::new(stream.child(Purpose::Texture, 0).seed32());
+        let octaves = (ROUGH_M / (FINEST_TEXELS * raster.step)).log2().clamp(0.0, 6.0).trunc_to::<u32>();
+        crumbs.height.par_iter_mut().enumerate().for_each(|(k, height)| {
+            let q = vec2((k % raster.width).to_f32(), (k / raster.width).to_f32()) * (raster.step / ROUGH_M);
+            *height += ROUGH_HEIGHT_M * noise.fbm2(f64::from(q.x) + 0.3, f64::from(q.y) + 0.7, octaves, 0.6).to_f32();
+        });
+        crumbs
+    }
+
+    /// Returns the colours of crumbs, relative to that of the soil around them.
+    fn crumb_hues(&self) -> [Spectrum; 256] {
+        // Two permutations of evenly spaced quantiles, so that iron and humus are independent.
+        let normal = |byte: u8| quantile((f32::from(byte) + 0.5) / 256.0);
+        std::array::from_fn(|k| {
+            let byte = k.to_u8();
+            self.pigments.aggregate(normal(byte), normal(byte.reverse_bits()))
+        })
     }
 
     /// Returns the reflectance of the dry soil where the layers have the weights `share`.
-    fn dry<L: LayerMaps>(&self, maps: &[L], share: Weights, p: Vec2) -> [f32; 3] {
+    fn dry<L: LayerMaps>(&self, maps: &[L], share: Weights, p: Vec2) -> Spectrum {
         let painted = self.blend.albedo(maps, share, p);
-        std::array::from_fn(|k| painted[k] * self.color.gain[k])
+        four_bands(std::array::from_fn(|k| painted[k] * self.color.gain[k]), self.color.like)
     }
 
-    /// Returns the texture coordinates in [`Ground::fabric`] of a vertex of a body with the offset `from`. The square
+    /// Returns the texture coordinates in [`Ground::fabrics`] of a vertex of a body with the offset `from`. The square
     /// continues mirrored.
     pub(super) fn fabric_uv(from: Vec2, p: Vec3) -> Vec2 {
-        // The projection is slanted, so that vertical faces show no streaks.
-        let leaning = p.truncate() + vec2(0.8, 0.6) * p.z;
+        let leaning = p.truncate() + GroundMaps::LEAN * p.z;
         let fold = |x: f32| {
             let t = x.rem_euclid(2.0);
             if t > 1.0 { 2.0 - t } else { t }
@@ -228,6 +287,12 @@ impl Ground {
         let (ao, moisture) = (0..painted.pits.len()).into_par_iter().map(|k| (shade(k), moisture(k))).unzip();
         GroundMaps { moisture, ao, lost, ..painted.maps }
     }
+}
+
+/// Returns the depth of each sample below the mean of its surroundings, metres.
+fn pores(raster: Raster, height: &[f32]) -> Vec<f32> {
+    let around = blur(height, raster.width, (0.0008 / raster.step).ceil_to::<usize>());
+    height.iter().zip(around).map(|(height, around)| (around - height).max(0.0)).collect()
 }
 
 fn differences(values: &[f32], raster: Raster) -> Vec<Vec2> {

@@ -4,16 +4,17 @@
 //! them, as on a seedbed. Each is sunk by a fifth to a half of its height, large ones deeper. Triangles that face down
 //! into the ground, about half of them, are left out because no ray can reach them.
 
-use super::body::{self, LEVELS, Pose, Shape, ShapeParameters};
+use super::body::{self, LEVELS, Placed, Pose, Shape, ShapeParameters};
 use super::crumb::{LOOSE_GAIN, Local, loose_gain, sink};
-use super::{Canopy, Ground, InView, Pile, Rect};
+use super::pigments::{Pigments, quantile, rank};
+use super::{Canopy, Ground, InView, MOISTURE_LEVELS, Pile, Rect};
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, vec2, vec3};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of broken aggregates.
 pub(super) const CUT: ShapeParameters =
-    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.22, rough: 0.24 };
+    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.26, rough: 0.3 };
 
 /// Number of different shapes; each clod rotates and stretches one of them.
 const SHAPES: usize = 24;
@@ -26,6 +27,16 @@ const HUES: usize = 6;
 
 /// Ratio of the middle and the short axis to the long one. Source: Aubertot et al. 1999.
 const AXES: (f32, f32) = (0.77, 0.55);
+
+/// Fraction of the dry clods that have kept a part of the ground's moisture.
+const HALF_DRY: f32 = 0.25;
+/// Relative heights below which a clod is one level moister, and the length above which a clod has such a base and is
+/// joined to the ground, mm.
+const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
+const GRADED_MM: f32 = 6.0;
+/// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
+const FILLET: f32 = 0.6;
+const FLARE: f32 = 0.2;
 
 /// Grid spacing for which the levels of detail are designed, metres: about four pixels of 0.25 mm.
 const FINE_M: f32 = 0.0009;
@@ -67,9 +78,9 @@ struct Candidate {
 pub struct Clods {
     /// Factor on the reflectance of the ground's material.
     pub tint: Spectrum,
-    /// Whether they are as wet as the ground; else they have dried.
-    pub damp: bool,
-    /// Mesh of the bodies, with texture coordinates of [`Ground::fabric`].
+    /// Level of their moisture: 0 for dry clods, the last of [`MOISTURE_LEVELS`] for those as moist as the ground.
+    pub moisture: usize,
+    /// Mesh of the bodies, with texture coordinates of [`Ground::fabrics`].
     pub mesh: Mesh,
 }
 
@@ -82,7 +93,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
     let own = stream.child(Purpose::Page, 0);
     let scale = (FINE_M / ground.step()).min(1.0);
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
-    let mut groups: Vec<Mesh> = vec![Mesh::default(); 2 * HUES * TONES];
+    let mut groups: Vec<Mesh> = vec![Mesh::default(); MOISTURE_LEVELS * HUES * TONES];
     for clod in candidates(ground, &stream) {
         if pile.given_up() {
             break;
@@ -102,7 +113,9 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
         let from = vec2(s.uniform32(), s.uniform32());
-        let hue = if ground.law.hue_sigma > 0.0 { s.index(HUES) } else { 0 };
+        let iron = ground.pigments.clod(clod.at, s.normal().to_f32());
+        let hue = (rank(iron) * HUES.to_f32()).trunc_to::<usize>().min(HUES - 1);
+        let moisture = if damp { MOISTURE_LEVELS - 1 } else { usize::from(s.uniform32() < HALF_DRY) };
 
         let radius = 0.5 * (axes.x + axes.y);
         let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { Some(clod.at) };
@@ -119,46 +132,81 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         // Leaves push down the clods below them.
         let centre = at.extend(support - (sink * height).max(height - free) - pose.low);
         if seen.holds(at, half) {
-            let mesh = &mut groups[(usize::from(damp) * HUES + hue) * TONES + tone(tint, ground.law.tint_sigma)];
-            let slack = 0.06 * height;
-            body::emit(
-                mesh,
-                shape,
-                &pose,
-                centre,
-                |corners, up| {
-                    if up < 0.0 {
-                        corners.iter().all(|c| c.z < pile.at(c.truncate()) + slack)
-                    } else {
-                        corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 3e-4)
-                    }
-                },
-                |_, p| Ground::fabric_uv(from, p - at.extend(0.0)),
-            );
+            let mut body = Placed::new(shape, &pose, centre);
+            let graded = clod.mm > GRADED_MM;
+            if graded {
+                weld(&mut body, centre, (pose.low, pose.high), 1.0 - ground.law.loose, |p| pile.at(p));
+            }
+            let (slack, top) = (0.06 * height, centre.z + pose.high - support);
+            let hidden = |corners: [Vec3; 3], up: f32| {
+                if up < 0.0 {
+                    corners.iter().all(|c| c.z < pile.at(c.truncate()) + slack)
+                } else {
+                    corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 3e-4)
+                }
+            };
+            // The base is moister than the top.
+            let moister = |corners: [Vec3; 3]| {
+                let relative = (corners.iter().map(|c| c.z).sum::<f32>() / 3.0 - support) / top;
+                let steps = MOIST_BELOW.iter().filter(|below| relative < **below).count();
+                (moisture + steps).min(MOISTURE_LEVELS - 1)
+            };
+            let bases = if graded { MOIST_BELOW.len() } else { 0 };
+            for level in moisture..MOISTURE_LEVELS.min(moisture + bases + 1) {
+                body.emit(
+                    &mut groups[(level * HUES + hue) * TONES + tone(tint, ground.law.tint_sigma)],
+                    shape,
+                    |corners, up| (!graded || moister(corners) == level) && !hidden(corners, up),
+                    |_, p| Ground::fabric_uv(from, p - at.extend(0.0)),
+                );
+            }
         }
         pile.heap(at, pose.turn, 0.92 * axes.x, 0.92 * axes.y, support, centre.z + 0.95 * pose.high);
     }
-    let hues = hues(ground.law.hue_sigma, &mut stream.child(Purpose::Page, 1));
+    let hues = hues(ground.law.hue_sigma, &ground.pigments, &mut stream.child(Purpose::Page, 1));
     let brightness = |g: usize| tone_tint(g % TONES, ground.law.tint_sigma);
     (groups.into_iter().enumerate().filter(|(_, mesh)| !mesh.triangles.is_empty()))
-        .map(|(g, mesh)| Clods { tint: hues[g / TONES % HUES] * brightness(g), damp: g >= HUES * TONES, mesh })
+        .map(|(g, mesh)| Clods { tint: hues[g / TONES % HUES] * brightness(g), moisture: g / (HUES * TONES), mesh })
         .collect()
 }
 
 /// Draws factors on the reflectance in R, G, B; near infrared has no hue.
 ///
 /// Most material has one hue and a small part is much greener or yellower: green over red and blue over green are at
-/// the midpoints of equal parts of an exponential distribution, each in its own random order.
-fn hues(sigma: f32, stream: &mut Stream) -> [Spectrum; HUES] {
-    let beyond_mean = |k: usize| -(1.0 - (k.to_f32() + 0.5) / HUES.to_f32()).ln() - 1.0;
-    let mut order: [usize; HUES] = std::array::from_fn(|k| k);
-    for k in (1..HUES).rev() {
-        order.swap(k, stream.index(k + 1));
-    }
+/// the midpoints of equal parts of an exponential distribution. They are ordered by iron, the most reddish last, and in
+/// random order by humus and by blue.
+fn hues(sigma: f32, pigments: &Pigments, stream: &mut Stream) -> [Spectrum; HUES] {
+    let part = |k: usize| (k.to_f32() + 0.5) / HUES.to_f32();
+    let beyond_mean = |k: usize| -(1.0 - part(k)).ln() - 1.0;
+    let [blues, humus] = std::array::from_fn(|_| {
+        let mut order: [usize; HUES] = std::array::from_fn(|k| k);
+        for k in (1..HUES).rev() {
+            order.swap(k, stream.index(k + 1));
+        }
+        order
+    });
     std::array::from_fn(|k| {
-        let (green, blue) = (sigma * beyond_mean(k), -sigma * beyond_mean(order[k]));
-        Spectrum::new((-0.5 * green).exp(), (0.5 * green).exp(), (0.5 * green + blue).exp(), 1.0)
+        let (green, blue) = (sigma * beyond_mean(HUES - 1 - k), -sigma * beyond_mean(blues[k]));
+        let hue = Spectrum::new((-0.5 * green).exp(), (0.5 * green).exp(), (0.5 * green + blue).exp(), 1.0);
+        hue * pigments.aggregate(quantile(part(k)), quantile(part(humus[k])))
     })
+}
+
+/// Joins a body to the ground below it: between its equator and the ground it does not taper but widens towards the
+/// ground, as where rain has washed soil against it. `reach` is its lowest and highest point relative to `centre`,
+/// `amount` the strength (0 for loose bodies, 1 for welded ones), `height` that of the surface below.
+fn weld(body: &mut Placed, centre: Vec3, reach: (f32, f32), amount: f32, height: impl Fn(Vec2) -> f32) {
+    let (equator, half) = (centre.z + 0.5 * (reach.0 + reach.1), 0.5 * (reach.1 - reach.0));
+    body.raised = Vec::with_capacity(body.positions.len());
+    for p in &mut body.positions {
+        let near = 1.0 - ((p.z - height(p.truncate())) / (FILLET * half)).clamp(0.0, 1.0);
+        // Profile of an ellipsoid below its equator.
+        let below = ((equator - p.z) / half).clamp(0.0, 0.85);
+        let upright = 1.0 / (1.0 - below * below).sqrt();
+        let wider = 1.0 + amount * (upright * (1.0 + FLARE * near * near) - 1.0);
+        *p = centre + ((*p - centre).truncate() * wider).extend(p.z - centre.z);
+        body.raised.push(amount * near * near);
+    }
 }
 
 /// Estimates the cost of the clods of a ground. `places` are samples of the local size distribution, `mm` the range of

@@ -196,8 +196,17 @@ pub(super) struct Crumbs {
     pub(super) height: Vec<f32>,
     /// Brightness times 128; 0 where there is no crumb.
     pub(super) tint: Vec<u8>,
+    /// Index of the crumb's colour.
+    pub(super) hue: Vec<u8>,
     /// Fraction of the ground's moisture that is lost, times 255.
     pub(super) dry: Vec<u8>,
+}
+
+/// Returns the index of a crumb's colour from the difference of the two numbers in 0..1 whose sum is its brightness.
+fn hue(difference: f32) -> u8 {
+    // The difference is independent of the sum to second order; its distribution is triangular.
+    let below = 0.5 * (1.0 - difference.abs()).powi(2);
+    ((if difference < 0.0 { below } else { 1.0 - below }) * 255.0 + 0.5).trunc_to::<u8>()
 }
 
 /// Positions of a raster's samples.
@@ -235,6 +244,7 @@ struct Band<'a> {
     rows: Range<usize>,
     height: &'a mut [f32],
     tint: &'a mut [u8],
+    hue: &'a mut [u8],
     dry: &'a mut [u8],
 }
 
@@ -251,7 +261,7 @@ impl Crumbs {
         share: impl Fn(Vec2) -> f32 + Sync,
     ) -> Self {
         let n = raster.width * raster.height;
-        let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], dry: vec![0; n] };
+        let mut crumbs = Self { height: vec![0.0; n], tint: vec![0; n], hue: vec![0; n], dry: vec![0; n] };
         crumbs.bands(raster).into_par_iter().for_each(|mut band| {
             for (k, part) in seen.into_iter().enumerate().filter(|(_, part)| part.is_some()) {
                 let stream = if k == 0 { stream.clone() } else { stream.child(Purpose::Debris, k.to_u64()) };
@@ -274,7 +284,8 @@ impl Crumbs {
     fn bands(&mut self, raster: Raster) -> Vec<Band<'_>> {
         let Rect { y0, y1, .. } = raster.area();
         let mut cells = (y0 / CELL_M).floor_to::<i32>()..(y1 / CELL_M).ceil_to::<i32>();
-        let mut left = (self.height.as_mut_slice(), self.tint.as_mut_slice(), self.dry.as_mut_slice());
+        let mut left =
+            (self.height.as_mut_slice(), [&mut self.tint, &mut self.hue, &mut self.dry].map(Vec::as_mut_slice));
         let many = (cells.len().to_i32() / BANDS).max(LEAST_CELLS);
         let mut bands = Vec::new();
         let mut first = 0;
@@ -282,12 +293,12 @@ impl Crumbs {
             let own = cells.start..(cells.start + many).min(cells.end);
             cells.start = own.end;
             let end = if cells.is_empty() { raster.height } else { raster.first_row(own.end) };
-            let (height, tint, dry);
             let texels = (end - first) * raster.width;
-            ((height, left.0), (tint, left.1), (dry, left.2)) =
-                (left.0.split_at_mut(texels), left.1.split_at_mut(texels), left.2.split_at_mut(texels));
+            let (height, heights) = left.0.split_at_mut(texels);
+            let [(tint, tints), (hue, hues), (dry, drys)] = left.1.map(|bytes| bytes.split_at_mut(texels));
+            left = (heights, [tints, hues, drys]);
             if texels > 0 {
-                bands.push(Band { raster, cells: own, rows: first..end, height, tint, dry });
+                bands.push(Band { raster, cells: own, rows: first..end, height, tint, hue, dry });
             }
             first = end;
         }
@@ -318,6 +329,7 @@ impl Band<'_> {
                         let part = &parts[usize::from(s.uniform32() >= first)];
                         let u = [s.uniform32(), s.uniform32(), s.uniform32()];
                         (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1));
+                        self.hue[k] = hue(u[0] - u[1]);
                     }
                 }
             }
@@ -337,6 +349,7 @@ impl Band<'_> {
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
         let (tint, dry) = law.shade([u[8], u[9], u[10]], gain(length_mm));
+        let hue = hue(u[8] - u[9]);
         // The outline is an ellipse cut by straight breaks, so that crumbs are angular and all different.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
             let at = (k.to_f32() + 0.8 * u[11 + k]) / BREAKS.to_f32();
@@ -364,6 +377,7 @@ impl Band<'_> {
                 if z > self.height[k] {
                     self.height[k] = z;
                     self.tint[k] = tint;
+                    self.hue[k] = hue;
                     self.dry[k] = dry;
                 }
             }

@@ -1,8 +1,9 @@
 //! Ground in a scene file: soil, clods, stones and litter.
 
-use super::{SoilColor, WheelDesc};
+use super::{PigmentsDesc, SoilColor, WheelDesc};
 use furrow_base::math::Spectrum;
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Signed, Vary};
+use furrow_optics::optics::Rock;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -45,6 +46,9 @@ pub struct SoilDesc {
     /// around it. If empty, the textures' colours are used.
     #[serde(default)]
     pub colors: Vec<SoilColor>,
+    /// Variation of the colour over the ground.
+    #[serde(default)]
+    pub pigments: PigmentsDesc,
     /// Blending of the layers.
     #[serde(default)]
     pub blend: BlendDesc,
@@ -305,6 +309,10 @@ pub struct StonesDesc {
     #[serde(deserialize_with = "reflectance")]
     #[schemars(with = "(Num<Fraction>, Num<Fraction>, Num<Fraction>, Num<Fraction>)")]
     pub albedo: Spectrum,
+    /// Rocks of the stones, each equally frequent; one that is listed twice is twice as frequent. If empty, all stones
+    /// have the mean reflectance `albedo`.
+    #[schemars(extend("x-example" = "[Quartz, Flint, Flint, Brick]"))]
+    pub rocks: Vec<Rock>,
     /// Standard deviation of the logarithm of their brightness.
     pub tint_sigma: Num<NonNegative<10>>,
     /// Fraction of a stone's upward faces that is covered by soil, drawn for each stone.
@@ -330,6 +338,7 @@ impl Default for StonesDesc {
             min_mm: Num::new(5.0),
             max_mm: Num::new(60.0),
             albedo: Spectrum::new(0.30, 0.27, 0.23, 0.36),
+            rocks: Vec::new(),
             tint_sigma: Num::new(0.28),
             dust: Vary::uniform(0.1, 0.6),
             together: Vary::fixed(1.0),

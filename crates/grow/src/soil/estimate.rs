@@ -15,9 +15,9 @@ use furrow_base::sampling::{Purpose, Stream};
 const PLACES: usize = 12;
 /// Memory per vertex of the grid in bytes, without its two triangles: heights, slopes, noise of the layers, moisture,
 /// the pile.
-const BYTES_PER_VERTEX: f64 = 110.0;
+const BYTES_PER_VERTEX: f64 = 126.0;
 /// Memory per texel of the ground's maps in bytes, including temporary data.
-const BYTES_PER_TEXEL: f64 = 30.0;
+const BYTES_PER_TEXEL: f64 = 32.0;
 /// Core seconds per vertex or texel.
 const SECONDS_PER_CELL: f64 = 1e-6;
 /// Core seconds to rasterize a crumb, which is done on the grid and on the maps.

@@ -4,6 +4,7 @@ use super::blend::{Blend, Weights};
 use super::color::{ColorTransform, mean};
 use super::crumb::{Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
 use super::grid::Grid;
+use super::pigments::Pigments;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
 use super::relief::Relief;
 use super::site::{FULL_CELL_M, Site, Sizes};
@@ -35,14 +36,17 @@ pub(super) struct FineGridPoint {
     pub(super) share: Vec<f32>,
 }
 
-/// Moisture and brightness at each vertex of the fine grid.
+/// Moisture and colour at each vertex of the fine grid.
 #[derive(Clone, Debug)]
 pub(super) struct Appearance {
     /// Moisture, 0..1.
     pub(super) moisture: Vec<f32>,
-    /// Brightness factor, about 1.
-    pub(super) tone: Vec<f32>,
+    /// Factors on the reflectance.
+    pub(super) tint: Vec<Spectrum>,
 }
+
+/// Number of levels of the clods' moisture.
+pub const MOISTURE_LEVELS: usize = 4;
 
 /// One piece of ground.
 #[derive(Clone, Debug)]
@@ -56,6 +60,7 @@ pub struct Ground {
     pub(super) blend: Blend,
     pub(super) law: SizeDistribution,
     pub(super) color: ColorTransform,
+    pub(super) pigments: Pigments,
     pub(super) sizes: Sizes,
     pub(super) crumbs_amount: f32,
     pub(super) stream: Stream,
@@ -108,6 +113,7 @@ impl Ground {
             blend,
             law,
             color: ColorTransform::draw(colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
+            pigments: Pigments::new(&desc.pigments, stream),
             sizes: site.sizes(desc),
             crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
             stream: stream.clone(),
@@ -139,6 +145,7 @@ impl Ground {
             blend: self.blend.clone(),
             law: self.law.clone(),
             color: self.color,
+            pigments: self.pigments.clone(),
             sizes,
             crumbs_amount: self.crumbs_amount,
             stream: self.stream.clone(),
@@ -222,7 +229,7 @@ impl Ground {
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
     }
 
-    /// Returns moisture and brightness.
+    /// Returns moisture and colour.
     pub(super) fn appearance(&self) -> &Appearance {
         self.look.get_or_init(|| self.wet())
     }
@@ -233,7 +240,6 @@ impl Ground {
         let drying = self.drying;
         let frequency = 1.0 / patch_m;
         let patches = Perlin::new(child(33).seed32());
-        let tones = Perlin::new(child(34).seed32());
         let raster = self.raster();
         let heights: Vec<f32> = (0..raster.height)
             .flat_map(|j| (0..raster.width).map(move |i| (i, j)))
@@ -247,19 +253,26 @@ impl Ground {
             let (x, y) = (f64::from(p.x) * frequency, f64::from(p.y) * frequency);
             patches.fbm2(x + 0.5, y + 0.5, 4, 0.6).to_f32() / FBM4_SD
         });
-        let tone = slowly(raster, self.every(), |p| {
-            let tone = tones.fbm2(f64::from(p.x) / 0.03 + 0.5, f64::from(p.y) / 0.03 + 0.5, 3, 0.6).to_f32() / FBM4_SD;
-            1.0 + 0.06 * tone.clamp(-2.5, 2.5)
-        });
         let moisture = (patches.iter().zip(&out))
             .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
             .collect();
-        Appearance { moisture, tone }
+        let tint = self.tints(raster, self.every(), |k| patches[k]);
+        Appearance { moisture, tint }
     }
 
-    /// Returns the moisture of the dry and of the damp clods, 0..1.
-    pub fn clods_moisture(&self) -> [f32; 2] {
-        [self.moisture.mean * (1.0 - self.law.dryness), self.moisture.mean]
+    /// Returns the moisture of clods at each of [`MOISTURE_LEVELS`], from those that are as dry as the scene file says to
+    /// those that are as moist as the ground.
+    pub(super) fn clods_moisture(&self) -> [f32; MOISTURE_LEVELS] {
+        let dry = |k: usize| 1.0 - k.to_f32() / (MOISTURE_LEVELS - 1).to_f32();
+        std::array::from_fn(|k| self.moisture.mean * (1.0 - self.law.dryness * dry(k)))
+    }
+
+    /// Returns the factors on the reflectance at the samples of a raster; noise is computed at every `every`-th of them.
+    /// `moist` returns the moisture of a sample in standard deviations from the mean.
+    pub(super) fn tints(&self, raster: Raster, every: usize, moist: impl Fn(usize) -> f32 + Sync) -> Vec<Spectrum> {
+        let noise = [0, 1, 2].map(|of| slowly(raster, every, |p| self.pigments.noise(of, p)));
+        let sample = |k: usize| self.pigments.place(noise.each_ref().map(|noise| noise[k]), moist(k));
+        (0..raster.width * raster.height).into_par_iter().map(sample).collect()
     }
 
     /// Returns the record of the drawn parameters. `debris` is the stream of the stones, `litter` that of the litter.
@@ -460,6 +473,13 @@ impl FineCell {
         let south = value(self.k) + self.t.x * (value(self.k + 1) - value(self.k));
         let (c, d) = (value(self.k + self.n), value(self.k + self.n + 1));
         south + self.t.y * (c + self.t.x * (d - c) - south)
+    }
+
+    /// Returns the bilinear interpolation of spectra at the four corners.
+    #[inline]
+    pub(super) fn mix_spectra(self, values: &[Spectrum]) -> Spectrum {
+        let row = |k: usize| values[k].lerp(values[k + 1], self.t.x);
+        row(self.k).lerp(row(self.k + self.n), self.t.y)
     }
 }
 

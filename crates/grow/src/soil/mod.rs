@@ -26,6 +26,7 @@ mod in_view;
 mod lit;
 mod litter;
 mod openness;
+mod pigments;
 mod pile;
 mod record;
 mod relief;
@@ -48,9 +49,10 @@ pub use desc::{
 };
 pub use envelope::Envelope;
 pub use estimate::{Expected, expected};
-pub use ground::Ground;
+pub use ground::{Ground, MOISTURE_LEVELS};
 pub use in_view::InView;
 pub use litter::litter;
+pub use pigments::PigmentsDesc;
 pub use pile::Pile;
 pub use record::{
     ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,

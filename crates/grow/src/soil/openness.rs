@@ -261,7 +261,7 @@ impl Ground {
         let (k, slope) = painted.at(p);
         let mesh = if self.flat { Vec3::Z } else { self.normal(p.x, p.y) };
         let normal = Vec3::new(mesh.x - slope.x * mesh.z, mesh.y - slope.y * mesh.z, mesh.z).normalize();
-        let albedo = GroundMaps::decode(painted.maps.albedo[k]).iter().sum();
+        let albedo = GroundMaps::decode(painted.maps.albedo[k]).0.truncate().element_sum();
         let height = self.height(p.x, p.y);
         let rise = |d: Vec2| if self.flat { 0.0 } else { self.height(p.x + d.x, p.y + d.y) - height };
         Sample {

@@ -1,11 +1,12 @@
 //! Stones: worn bodies, placed before anything else.
 
-use super::body::{self, Pose, Shape, ShapeParameters};
+use super::body::{self, Placed, Pose, Shape, ShapeParameters};
 use super::stone_cover::{cover, own};
 use super::{Debris, DebrisKind, Ground, Pile, Rect, StonesDesc, cell_stream, cells};
 use furrow_base::geometry::{Cost, Mesh};
 use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2, vec3};
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_optics::optics::Rock;
 
 /// Shape parameters of stones.
 const CUT: ShapeParameters =
@@ -140,12 +141,10 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
     let (support, _) = pile.support(at, 0.5 * (axes.x + axes.y));
     let centre = at.extend(support - sink * (pose.high - pose.low) - pose.low);
     let mut mesh = Mesh::default();
-    body::emit(
+    Placed::new(&shape, &pose, centre).emit(
         &mut mesh,
         &shape,
-        &pose,
-        centre,
-        |corners, _| corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 1e-3),
+        |corners, _| corners.iter().any(|c| c.z >= ground.height(c.x, c.y) - 1e-3),
         |p, _| {
             let p = p.normalize_or(furrow_base::math::Vec3::Z);
             vec2(p.y.atan2(p.x) / std::f32::consts::TAU + 0.5, p.z.clamp(-1.0, 1.0).acos() / std::f32::consts::PI)
@@ -155,13 +154,18 @@ fn stone(desc: &StonesDesc, ground: &Ground, pile: &mut Pile, at: Vec2, mm: f32,
     Debris {
         kind: DebrisKind::Stone,
         mesh,
-        albedo: desc.albedo,
+        albedo: rock(&desc.rocks, s).map_or(desc.albedo, Rock::reflectance),
         tint: (desc.tint_sigma.f32() * s.normal().to_f32()).exp(),
         hue: s.uniform32(),
         dust: desc.dust.draw32(s),
         centre,
         radius: axes.x,
     }
+}
+
+/// Draws the rock of a stone; `None` if the description lists none.
+fn rock(rocks: &[Rock], s: &Stream) -> Option<Rock> {
+    (!rocks.is_empty()).then(|| rocks[s.child(Purpose::Page, 1).index(rocks.len())])
 }
 
 #[cfg(test)]

@@ -13,10 +13,14 @@ pub mod measured;
 mod munsell;
 mod pigments;
 pub mod prospect;
+mod rock;
 pub mod shadowing;
 pub mod soil;
+mod soil_tint;
 
 pub use leaf::{Leaf, LeafOptics};
 pub use munsell::Munsell;
 pub use pigments::{LeafBands, Pigments};
+pub use rock::Rock;
 pub use shadowing::{Shadowing, UnmeshedRelief};
+pub use soil_tint::SoilTint;

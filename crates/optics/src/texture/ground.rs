@@ -18,8 +18,8 @@ pub struct GroundMaps {
     pub origin: Vec2,
     /// Side of a texel, metres.
     pub texel_m: f32,
-    /// Linear reflectance R, G, B of the dry soil, each stored as 255·√reflectance; see [`GroundMaps::decode`].
-    pub albedo: Vec<[u8; 3]>,
+    /// Linear reflectance R, G, B, NIR of the dry soil, each stored as 255·√reflectance; see [`GroundMaps::decode`].
+    pub albedo: Vec<[u8; 4]>,
     /// Weight of each layer times 255.
     pub weights: Vec<[u8; MAX_LAYERS]>,
     /// Moisture: 0 air-dry, 255 saturated.
@@ -28,8 +28,6 @@ pub struct GroundMaps {
     pub slope: Vec<[i8; 2]>,
     /// Ambient occlusion by relief finer than the mesh: visible fraction of the sky times 255.
     pub ao: Vec<u8>,
-    /// Mean reflectance of the dry soil; its ratio of NIR to red applies to every texel.
-    pub like: Spectrum,
     /// Relief that is in neither the mesh nor the maps; `None` at full detail.
     pub lost: Option<UnmeshedRelief>,
 }
@@ -38,13 +36,17 @@ impl GroundMaps {
     /// Number of steps of [`GroundMaps::slope`] per unit of slope.
     pub const SLOPE_STEPS: f32 = 60.0;
 
+    /// Horizontal shift per unit of height of the projection that maps the material of clods onto their surface. The
+    /// projection is slanted, so that vertical faces show no streaks.
+    pub const LEAN: Vec2 = Vec2::new(0.4, 0.3);
+
     /// Returns the reflectance of a stored albedo.
-    pub fn decode(albedo: [u8; 3]) -> [f32; 3] {
-        albedo.map(|a| (f32::from(a) / 255.0).powi(2))
+    pub fn decode(albedo: [u8; 4]) -> Spectrum {
+        Spectrum::from(albedo.map(|a| (f32::from(a) / 255.0).powi(2)))
     }
 
     /// Returns the stored form of a reflectance.
-    pub fn encode(albedo: [f32; 3]) -> [u8; 3] {
-        albedo.map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0).trunc_to::<u8>())
+    pub fn encode(albedo: Spectrum) -> [u8; 4] {
+        albedo.to_array().map(|a| (a.max(0.0).sqrt() * 255.0 + 0.5).min(255.0).trunc_to::<u8>())
     }
 }

@@ -8,7 +8,7 @@ use furrow_base::geometry::Interaction;
 use furrow_base::math::{Frame, RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
 use furrow_optics::bsdf::{Bsdf, OrenNayar, Rough, Shadowed, Wet};
 use furrow_optics::optics::Shadowing;
-use furrow_optics::optics::soil::{FACETS, at as four_bands, wet};
+use furrow_optics::optics::soil::{FACETS, wet};
 use furrow_optics::texture::ground::GroundMaps;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -56,12 +56,12 @@ pub struct BakedGround {
 }
 
 impl BakedGround {
-    /// Bakes the soil maps: moisture darkens, NIR follows from red, and pits finer than the mesh are darkened by
+    /// Bakes the soil maps: moisture darkens, and pits finer than the mesh are darkened by
     /// ambient occlusion.
     pub fn bake(maps: &GroundMaps) -> Self {
         let texel = |i: usize| {
             let open = f32::from(maps.ao[i]) / 255.0;
-            let dry = four_bands(GroundMaps::decode(maps.albedo[i]), maps.like) * open;
+            let dry = GroundMaps::decode(maps.albedo[i]) * open;
             let (moist, film) = wet(dry, f32::from(maps.moisture[i]) / 255.0);
             let moist = maps.lost.map_or(moist, |lost| moist.map(|r| lost.darken(r)));
             Texel {
@@ -107,12 +107,23 @@ impl BakedGround {
     }
 }
 
+/// Relief of the maps that tilts the shading normal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Relief {
+    /// None.
+    None,
+    /// Heights above the horizontal plane.
+    Level,
+    /// Heights above the surface of a body onto which the maps are projected along [`GroundMaps::LEAN`].
+    Leaning,
+}
+
 /// Material of the ground or of its clods.
 #[derive(Clone, Debug)]
 pub struct Ground {
     baked: Arc<BakedGround>,
     tint: Spectrum,
-    relief: bool,
+    relief: Relief,
     /// Slope angle of the microfacets, radians; `None` for Lambertian soil without gloss.
     facets: Option<f32>,
 }
@@ -120,18 +131,18 @@ pub struct Ground {
 impl Ground {
     /// Material of the ground. Its fine relief tilts the shading normal.
     pub fn new(baked: Arc<BakedGround>) -> Self {
-        Self { baked, tint: Spectrum::ONE, relief: true, facets: Some(FACETS) }
+        Self { baked, tint: Spectrum::ONE, relief: Relief::Level, facets: Some(FACETS) }
     }
 
-    /// Material of the clods, with reflectance multiplied by `tint`. Their meshes have a relief of their own.
+    /// Material of the clods, with reflectance multiplied by `tint`. Their pores tilt the shading normal.
     pub fn clods(baked: Arc<BakedGround>, tint: Spectrum) -> Self {
-        Self { baked, tint, relief: false, facets: Some(FACETS) }
+        Self { baked, tint, relief: Relief::Leaning, facets: Some(FACETS) }
     }
 
     pub(super) fn leave_out(&mut self, feature: Feature) {
         match feature {
             Feature::Facets => self.facets = None,
-            Feature::Relief => self.relief = false,
+            Feature::Relief => self.relief = Relief::None,
             Feature::Transmission | Feature::Coat | Feature::Texture => {}
         }
     }
@@ -154,7 +165,7 @@ impl Ground {
         };
         Swatch::pictured(key, size, texel, mean, 1.0)
             .tinted(self.tint.0.truncate(), Vec3::ONE)
-            .raised(slope, f32::from(u8::from(self.relief)))
+            .raised(slope, f32::from(u8::from(self.relief == Relief::Level)))
             .grained(move |x, y| {
                 let film = baked.texels[y.to_usize() * baked.width + x.to_usize()].film;
                 Grain { open: 1.0, film: f32::from(film) / 255.0 }
@@ -170,12 +181,18 @@ impl Ground {
         let (reflectance, slope, film) = self.baked.sample(at.uv);
         let BakedGround { shadowing, most, film_roughness, gloss, .. } = *self.baked;
         let reflectance = (reflectance * self.tint).clamp(0.0, most);
-        let normal = if self.relief {
-            // Height slopes over the plane add up; the mesh normal is proportional to (−∂z/∂x, −∂z/∂y, 1).
-            let n = at.ns / at.ns.z.max(0.05);
-            Vec3::new(n.x - slope.x, n.y - slope.y, n.z).normalize_or(at.ns)
-        } else {
-            at.ns
+        let normal = match self.relief {
+            Relief::None => at.ns,
+            Relief::Level => {
+                // Height slopes over the plane add up; the mesh normal is proportional to (−∂z/∂x, −∂z/∂y, 1).
+                let n = at.ns / at.ns.z.max(0.05);
+                Vec3::new(n.x - slope.x, n.y - slope.y, n.z).normalize_or(at.ns)
+            }
+            Relief::Leaning => {
+                // Gradient of a height that depends on x + LEAN.x z and y + LEAN.y z, along the surface.
+                let gradient = slope.extend(slope.dot(GroundMaps::LEAN));
+                (at.ns - gradient + at.ns * gradient.dot(at.ns)).normalize_or(at.ns)
+            }
         };
         let base = match self.facets {
             None => Rough::Dry(OrenNayar::new(reflectance, 0.0)),
