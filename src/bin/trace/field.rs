@@ -7,7 +7,7 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_field::ablation::Edit;
 use furrow_field::drive::FIRST;
-use furrow_job::{Field, SceneFile};
+use furrow_job::{PreparedField, SceneFile};
 use std::path::{Path, PathBuf};
 
 /// A scene file's distribution over fields, at one image size.
@@ -100,7 +100,7 @@ impl FieldArgs {
         edit: &'static Edit,
         asked: impl FnOnce(SceneFile) -> SceneFile,
         note: impl Fn(&str),
-    ) -> Result<Field> {
+    ) -> Result<PreparedField> {
         let note = |warning: &String| note(&format!("warning: {warning}"));
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = SceneFile::edited(self.path(), edit)?.seed(seed).width(width).height(height);

@@ -10,7 +10,7 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_field::ablation::{Edit, FULL};
-use furrow_job::{Field, Image, Renderer, Request, Threads, View};
+use furrow_job::{Image, PreparedField, Renderer, Request, Threads, View};
 use furrow_render::film::Film;
 use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Engine, Quality};
@@ -136,7 +136,7 @@ pub(crate) fn plants(number: usize) -> String {
 }
 
 /// Describes the field, with the times for growing its plants and building the BVH.
-fn grown(path: &Path, field: &Field) -> String {
+fn grown(path: &Path, field: &PreparedField) -> String {
     let (grow, build) = field.times();
     let scene = &field.grown().scene;
     format!(
