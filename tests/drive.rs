@@ -17,7 +17,7 @@ use furrow_dataset::read::native;
 use furrow_dataset::{Callbacks, Order, Record, Set, Work};
 use furrow_field::PartKind;
 use furrow_field::assemble::{self, Options, Source};
-use furrow_job::{Field, SceneFile};
+use furrow_job::{PreparedField, SceneFile};
 use furrow_render::accel::EmbreeAccel;
 use furrow_render::render;
 use furrow_render::settings::{Quality, RenderOptions};
@@ -43,12 +43,12 @@ fn page(folder: &Path, name: &str, change: &dyn Fn(String) -> String) -> PathBuf
     path
 }
 
-fn grown(page: &Path) -> Field {
+fn grown(page: &Path) -> PreparedField {
     SceneFile::open(page).unwrap().field(0).unwrap()
 }
 
 /// Renders the labels of the field's current capture.
-fn labels(field: &Field) -> render::LabelMap {
+fn labels(field: &PreparedField) -> render::LabelMap {
     let scene = &field.grown().scene;
     let window = Window::full(scene.camera.width(), scene.camera.height());
     let geometry = field.geometry().unwrap();

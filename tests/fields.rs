@@ -9,7 +9,7 @@ use furrow_base::math::{Spectrum, Vec3, vec3};
 use furrow_field::assemble::{self, Options, Preview};
 use furrow_field::{Field, PartKind, PlantRecord};
 use furrow_grow::plant::OrganKind;
-use furrow_job::{Field as Shown, SceneFile};
+use furrow_job::{PreparedField, SceneFile};
 use furrow_optics::light::LightRecord;
 use furrow_render::scene::tag::{Class, Tag};
 use furrow_render::settings::Quality;
@@ -672,7 +672,7 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
     let mut scene = SceneFile::open(&path).unwrap();
     let preview = Preview::default();
     let grow = |scene: &SceneFile, preview: &Preview| scene.clone().preview(preview).field(0).unwrap();
-    let image = |field: &Shown| field.render(&Quality::spp(1)).unwrap().film.pixels;
+    let image = |field: &PreparedField| field.render(&Quality::spp(1)).unwrap().film.pixels;
     // Text before and after the change; whether the plants' meshes are reused, and whether the ground's are.
     let steps = [
         ("seed: 4", "seed: 4", true, true),
@@ -689,7 +689,7 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
         before.geometry().unwrap();
         scene = first.reread(Some(&text.replace(from, to))).unwrap();
         let (kept, fresh) = (grow(&scene, &preview), grow(&scene, &Preview::default()));
-        let parts = |field: &Shown| -> Vec<_> {
+        let parts = |field: &PreparedField| -> Vec<_> {
             let parts = field.grown().scene.parts.iter();
             parts.map(|part| (part.mesh.clone(), part.mask.clone(), part.material, part.tag)).collect()
         };
@@ -697,14 +697,14 @@ fn a_preview_keeps_what_did_not_change_and_nothing_else() {
         assert_eq!(kept.grown().plants, fresh.grown().plants, "{to}");
         assert!(image(&kept) == image(&fresh), "{to}: the image of the reused field differs from a fresh one");
         let shared = |plants: bool| {
-            let meshes = |field: &Shown| -> Vec<_> {
+            let meshes = |field: &PreparedField| -> Vec<_> {
                 let parts = field.grown().scene.parts.iter().filter(|part| (part.tag.plant > 0) == plants);
                 parts.map(|part| Arc::as_ptr(&part.mesh)).collect()
             };
             meshes(&kept) == meshes(&before)
         };
         assert_eq!((shared(true), shared(false)), (same_plants, same_ground), "{to}");
-        let built = |field: &Shown| std::ptr::from_ref(field.geometry().unwrap());
+        let built = |field: &PreparedField| std::ptr::from_ref(field.geometry().unwrap());
         assert_eq!(built(&kept) == built(&before), same_plants && same_ground, "{to}");
     }
 }
@@ -719,8 +719,9 @@ fn a_preview_of_a_file_that_did_not_change_is_not_grown_again() {
         let before = scene.field(index).unwrap();
         let built = std::ptr::from_ref(before.geometry().unwrap());
         let again = scene.reread(None).unwrap().field(index).unwrap();
-        let meshes =
-            |field: &Shown| field.grown().scene.parts.iter().map(|part| Arc::as_ptr(&part.mesh)).collect::<Vec<_>>();
+        let meshes = |field: &PreparedField| {
+            field.grown().scene.parts.iter().map(|part| Arc::as_ptr(&part.mesh)).collect::<Vec<_>>()
+        };
         assert!(meshes(&before) == meshes(&again), "{name} {index}");
         assert_eq!(built, std::ptr::from_ref(again.geometry().unwrap()), "{name} {index}");
     }

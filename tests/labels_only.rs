@@ -10,7 +10,7 @@ use crate::common::program::{SMALL, scratch, trace};
 use crate::common::python::python;
 use furrow_dataset::Set;
 use furrow_dataset::read::native;
-use furrow_job::{Field, SceneFile};
+use furrow_job::{PreparedField, SceneFile};
 use std::path::Path;
 use std::process::Command;
 
@@ -60,8 +60,9 @@ fn a_field_built_for_its_records_has_the_same_records() {
     for page in [SMALL, "scenes/synthetic-d.ron"] {
         let file = SceneFile::open(page).unwrap().width(96);
         let (whole, records_alone) = (file.field(1).unwrap(), file.records_only().field(1).unwrap());
-        let triangles =
-            |field: &Field| -> usize { field.grown().scene.parts.iter().map(|part| part.mesh.triangles.len()).sum() };
+        let triangles = |field: &PreparedField| -> usize {
+            field.grown().scene.parts.iter().map(|part| part.mesh.triangles.len()).sum()
+        };
         assert!(triangles(&records_alone) < triangles(&whole), "{page}");
         let (whole, records_alone) = (whole.grown(), records_alone.grown());
         assert_eq!(

@@ -15,7 +15,7 @@ use furrow_base::math::{Spectrum, Vec2, Vec3, vec3};
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_field::assemble::Scanner;
-use furrow_job::{Field, SceneFile, Threads};
+use furrow_job::{PreparedField, SceneFile, Threads};
 use furrow_optics::bsdf::{Bsdf, OrenNayar};
 use furrow_optics::sensor::{Lidar, LidarDesc};
 use furrow_render::render::{self, Echo};
@@ -215,7 +215,7 @@ fn page(folder: &Path, name: &str, more: &str) -> PathBuf {
     path
 }
 
-fn grown(page: &Path, threads: usize) -> Field {
+fn grown(page: &Path, threads: usize) -> PreparedField {
     let threads = Threads::new(threads).unwrap();
     SceneFile::open(page).unwrap().threads(&threads).scanned(Scanner::OfScene).field(0).unwrap()
 }

@@ -11,10 +11,14 @@ pub fn supervised<T>(work: impl FnOnce() -> T) -> Result<T> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| panicked(panic.as_ref()))
 }
 
+/// Returns the message of a panic; `None` if its payload is not text.
+pub fn message(panic: &(dyn Any + Send)) -> Option<&str> {
+    panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+}
+
 /// Returns the error for a panic. The location of the panic was printed by the panic hook.
 fn panicked(panic: &(dyn Any + Send)) -> Error {
-    let literal = panic.downcast_ref::<&str>().copied();
-    let words = literal.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
+    let words = message(panic).unwrap_or("no message");
     Error::failed(format!("the program failed: {words} (a bug; please report it)"))
         .help("report the command and all lines that it printed; the same command continues with what is missing")
 }
@@ -35,6 +39,8 @@ mod tests {
             assert_eq!(error.message(), "the program failed: no plant 7 (a bug; please report it)");
             assert!(error.advice().is_some() && !error.is_of_one_field());
         }
+        let silent = supervised(|| -> u32 { std::panic::panic_any(7) }).unwrap_err();
+        assert!(silent.message().starts_with("the program failed: no message"), "{silent}");
         assert_eq!(supervised(|| number).unwrap(), 7);
     }
 }

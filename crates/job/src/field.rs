@@ -14,7 +14,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// A built field: scene, captures, and ground truth of every plant. The BVH is built on first use.
-pub struct Field {
+pub struct PreparedField {
     grown: furrow_field::Field,
     edit: &'static Edit,
     threads: Threads,
@@ -23,7 +23,7 @@ pub struct Field {
     geometry: OnceLock<(Arc<EmbreeAccel>, Duration)>,
 }
 
-impl Field {
+impl PreparedField {
     pub(super) fn new(
         grown: furrow_field::Field,
         edit: &'static Edit,

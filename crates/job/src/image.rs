@@ -1,6 +1,6 @@
 //! A rendered image of a field, and its output files.
 
-use super::field::Field;
+use super::field::PreparedField;
 use furrow_base::{Error, Result};
 use furrow_optics::sensor::Photograph;
 use furrow_output::Provenance;
@@ -23,7 +23,7 @@ pub struct Times {
 
 /// A rendered and labelled image of a field.
 pub struct Image<'f> {
-    field: &'f Field,
+    field: &'f PreparedField,
     /// Radiance, its variance, and attributes of the first surface, for each pixel.
     pub film: Film,
     /// Denoised film, if denoising was requested and succeeded.
@@ -40,7 +40,7 @@ pub struct Image<'f> {
 
 impl<'f> Image<'f> {
     pub(super) fn new(
-        field: &'f Field,
+        field: &'f PreparedField,
         film: Film,
         denoised: Option<Result<Film>>,
         labels: LabelMap,
@@ -57,7 +57,7 @@ impl<'f> Image<'f> {
     }
 
     /// Returns the field of the image.
-    pub fn field(&self) -> &'f Field {
+    pub fn field(&self) -> &'f PreparedField {
         self.field
     }
 

@@ -1,13 +1,13 @@
 //! From a scene file to files on disk: build → render → label → apply the sensor model → write.
 //!
 //! ```text
-//! SceneFile   a distribution over fields, read once; with edit, seed, image size and threads
+//! SceneFile       a distribution over fields, read once; with edit, seed, image size and threads
 //!    │ field(index)
-//! Field       one field: plants, soil, lights, camera; the BVH is built on first use
+//! PreparedField   one field: plants, soil, lights, camera; the BVH is built on first use
 //!    │ render(quality), or Renderer::render for all options
-//! Image       film, label map, provenance; conversion by the field's sensor model
+//! Image           film, label map, provenance; conversion by the field's sensor model
 //!    │ write(folder)
-//! files       rgb.png, nir.png, radiance.exr, semantics.png, plants.png, leaves.png, overlay.png
+//! files           rgb.png, nir.png, radiance.exr, semantics.png, plants.png, leaves.png, overlay.png
 //! ```
 //!
 //! The edits of an ablation are applied in this crate only: to the scene file when it is opened, to the render options, and to labels and
@@ -37,7 +37,7 @@ mod threads;
 mod view;
 
 pub use expected::ExpectedPlants;
-pub use field::Field;
+pub use field::PreparedField;
 pub use image::{Image, Times};
 pub use renderer::{Renderer, Request};
 pub use scene_file::SceneFile;

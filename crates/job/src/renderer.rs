@@ -1,6 +1,6 @@
 //! An opened render engine, ready to render any number of fields.
 
-use super::field::Field;
+use super::field::PreparedField;
 use super::image::{Image, Times};
 use super::rasterizer::{Card, left_out};
 use super::view::View;
@@ -45,7 +45,7 @@ enum Opened {
     Rasterizer(Card),
 }
 
-impl Field {
+impl PreparedField {
     /// Path traces the camera's view and labels it. [`Renderer`] also offers the rasterizer, crops, progress and cancellation, and can be
     /// used for any number of fields.
     pub fn render(&self, quality: &Quality) -> Result<Image<'_>> {
@@ -83,7 +83,7 @@ impl Renderer {
     }
 
     /// Renders and labels a field. Returns an interruption error if the request's watch stops it.
-    pub fn render<'f>(&self, field: &'f Field, request: &Request<'_>) -> Result<Image<'f>> {
+    pub fn render<'f>(&self, field: &'f PreparedField, request: &Request<'_>) -> Result<Image<'f>> {
         request.view.check(&self.options)?;
         field.threads().install(|| match &self.engine {
             Opened::PathTracer { denoiser, .. } => self.trace(field, request, denoiser.as_ref()),
@@ -95,7 +95,7 @@ impl Renderer {
     /// labels, which are computed once. Returns an interruption error if the request's watch stops it.
     pub fn refine(
         &self,
-        field: &Field,
+        field: &PreparedField,
         request: &Request<'_>,
         passes: &[u32],
         show: &mut (dyn FnMut(&Film, &LabelMap) -> Result<()> + Send),
@@ -120,7 +120,7 @@ impl Renderer {
     }
 
     /// Describes pixel (x, y) as text: label, surface, light.
-    pub fn explain(&self, field: &Field, view: View, (x, y): (u32, u32)) -> Result<String> {
+    pub fn explain(&self, field: &PreparedField, view: View, (x, y): (u32, u32)) -> Result<String> {
         let world = field.world()?;
         let integrator = view.integrator(path(&self.options.techniques));
         let settings = self.settings(field, Window::full(world.scene.camera.width(), world.scene.camera.height()));
@@ -131,7 +131,12 @@ impl Renderer {
         Ok(words + &edit.label().map(|name| format!("\n  edit: {name}, {}", edit.about)).unwrap_or_default())
     }
 
-    fn trace<'f>(&self, field: &'f Field, request: &Request<'_>, denoiser: Option<&Denoiser>) -> Result<Image<'f>> {
+    fn trace<'f>(
+        &self,
+        field: &'f PreparedField,
+        request: &Request<'_>,
+        denoiser: Option<&Denoiser>,
+    ) -> Result<Image<'f>> {
         let begin = request.begin.unwrap_or_else(Instant::now);
         let world = field.world()?;
         let camera = &world.scene.camera;
@@ -157,7 +162,7 @@ impl Renderer {
         Ok(Image::new(field, film, denoised, labels, provenance, times))
     }
 
-    fn rasterize<'f>(&self, field: &'f Field, request: &Request<'_>, card: &Card) -> Result<Image<'f>> {
+    fn rasterize<'f>(&self, field: &'f PreparedField, request: &Request<'_>, card: &Card) -> Result<Image<'f>> {
         if request.view != View::Path {
             return Err(Error::misuse("--integrator has no effect with --engine raster, which traces no rays")
                 .help("use --engine trace, or leave it out"));
@@ -175,19 +180,19 @@ impl Renderer {
     }
 
     /// Returns a warning about effects of the field that this engine cannot render.
-    pub fn warning(&self, field: &Field) -> Option<&'static str> {
+    pub fn warning(&self, field: &PreparedField) -> Option<&'static str> {
         match self.engine {
             Opened::PathTracer { .. } => None,
             Opened::Rasterizer(_) => left_out(&field.grown().scene),
         }
     }
 
-    fn settings(&self, field: &Field, window: Window) -> Settings {
+    fn settings(&self, field: &PreparedField, window: Window) -> Settings {
         let points = if self.options.techniques.has(Technique::Qmc) { Points::Sobol } else { Points::Independent };
         Settings { spp: self.options.quality.spp, seed: field.grown().sample_seed(), window, points }
     }
 
-    fn provenance(&self, field: &Field, spp: Spp, integrator: &str, left_out: Option<&str>) -> Provenance {
+    fn provenance(&self, field: &PreparedField, spp: Spp, integrator: &str, left_out: Option<&str>) -> Provenance {
         let edit = field.edit().label().map(|name| format!("edit: {name}"));
         let grown = field.grown();
         Provenance {

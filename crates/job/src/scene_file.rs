@@ -1,6 +1,6 @@
 //! A scene file, read once for any number of its fields.
 
-use super::field::Field;
+use super::field::PreparedField;
 use super::threads::Threads;
 use furrow_base::Result;
 use furrow_base::input::Scope;
@@ -208,11 +208,11 @@ impl SceneFile {
 
     /// Builds field `index` on its [day](Self::day). The result is always the same for the same file, seed and index; earlier fields are
     /// not built for it.
-    pub fn field(&self, index: u64) -> Result<Field> {
+    pub fn field(&self, index: u64) -> Result<PreparedField> {
         let begin = Instant::now();
         let day = self.options.day.or(self.seen_days().first().copied());
         let options = Options { index, day, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
-        Ok(Field::new(grown, self.edit, self.threads.clone(), options, begin.elapsed()))
+        Ok(PreparedField::new(grown, self.edit, self.threads.clone(), options, begin.elapsed()))
     }
 }

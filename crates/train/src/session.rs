@@ -100,113 +100,103 @@ pub(super) fn train(
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Results> {
-    guarded(|| train_here(plan, crops, begin, photos, machine, folder, callbacks))
-}
-
-fn train_here(
-    plan: &Plan,
-    crops: &[String],
-    begin: Option<&Path>,
-    photos: Option<Photos>,
-    machine: &Machine,
-    folder: &Path,
-    callbacks: &Callbacks<'_>,
-) -> Result<Results> {
-    plan.hyper.check(&plan.shape).map_err(|invalid| invalid.of_flag())?;
-    let place = machine.place(&plan.precision)?;
-    device::set_threads(plan.threads);
-    let open = |selections: &[Selection], otherwise| {
-        Store::open(selections, otherwise, plan.seed, &plan.classes, &plan.shape, false, machine.memory)
-    };
-    let train = open(&plan.train, Pick::Split(Split::Train))?;
-    let val = open(&plan.val, Pick::Split(Split::Val))?;
-    if train.is_empty() {
-        return Err(Error::misuse("there is no training image")
-            .help("name datasets with --set DIR, or other images of them with DIR@all"));
-    }
-    // Training datasets need not contain validation images, but a dataset given with --val must.
-    if val.is_empty() && plan.val.iter().any(|selection| !plan.train.contains(selection)) {
-        return Err(Error::misuse("there is no validation image in the datasets of --val")
-            .help("name other images of them with --val DIR@all, or leave --val out"));
-    }
-    if plan.hyper.logit_adjustment > 0.0 && !plan.classes.begins_with_soil() {
-        return Err(Error::misuse("logit adjustment corrects for frequent soil, and the first class is not soil")
-            .help("name soil first in --classes, or leave --logit-adjustment out"));
-    }
-    let refine = plan.hyper.refine;
-    refine.check(&plan.classes, &plan.shape.bands).map_err(|what| {
-        Error::misuse(format!("--refine {}: {what}", refine.name()))
-            .help("name soil first in --classes and red, green and blue in --bands, or leave --refine out")
-    })?;
-    let begin = match begin {
-        Some(_) if !plan.hyper.pretrained.is_none() => {
-            return Err(Error::misuse("a run to start from and pretrained weights exclude each other")
-                .help("--init starts from all weights of a run, --pretrained only sets the encoder: give one"));
+    guarded(|| {
+        plan.hyper.check(&plan.shape).map_err(|invalid| invalid.of_flag())?;
+        let place = machine.place(&plan.precision)?;
+        device::set_threads(plan.threads);
+        let open = |selections: &[Selection], otherwise| {
+            Store::open(selections, otherwise, plan.seed, &plan.classes, &plan.shape, false, machine.memory)
+        };
+        let train = open(&plan.train, Pick::Split(Split::Train))?;
+        let val = open(&plan.val, Pick::Split(Split::Val))?;
+        if train.is_empty() {
+            return Err(Error::misuse("there is no training image")
+                .help("name datasets with --set DIR, or other images of them with DIR@all"));
         }
-        Some(run) => begun(plan, run)?,
-        None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, plan.classes.len(), plan.seed)?,
-    };
-    let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
-    let identity = Identity::of(&plan, &train, &val)?;
-    // Reads one image, so that missing bands are reported before the folder is claimed.
-    train.get(0)?;
-    if !val.is_empty() {
-        val.get(0)?;
-    }
-    // Records of other programs may contain pixel sizes outside the valid range of a model card.
-    let pixel_mm = match plan.hyper.augment_scale {
-        AugmentScale::PixelMm(lo, hi) => Some((lo * hi).sqrt()),
-        AugmentScale::Relative | AugmentScale::Auto => train.pixel_mm()?,
-    };
-    let pixel_mm = pixel_mm.filter(|mm| run::PIXEL_MM.contains(mm));
-    let pixels = plan.hyper.augment_scale.of(|| train.pixel_sizes_mm())?;
-    identity.claim(folder)?;
-    remove_unfinished(folder)?;
-    if let Some(results) = run::results(folder)? {
-        return Ok(results);
-    }
-    let hash = identity.hash()?;
-    for words in warnings(&plan, train.distinct(), pixels.as_ref()) {
-        (callbacks.warn)(&words);
-    }
-    let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), pixels, loaders: machine.loaders };
-    let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;
-    if plan.hyper.calibrate > 0 {
-        let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;
-        outcome.values = calibrate(&model, &data.train, &outcome.normalization, plan.hyper.calibrate)?;
-    }
-    if plan.hyper.logit_adjustment > 0.0 {
-        logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
-    }
-    let list = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
-    let card = ModelCard {
-        furrow: env!("CARGO_PKG_VERSION").into(),
-        network: plan.network,
-        parameters: list.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum(),
-        input: plan.shape.clone(),
-        normalization: outcome.normalization,
-        resize: plan.hyper.resize.clone(),
-        refine: plan.hyper.refine,
-        pixel_mm,
-        classes: plan.classes.clone(),
-        crops: crops.to_vec(),
-        weights: run::WEIGHTS.into(),
-        weights_sha256: weights::hash(&outcome.values),
-        plan_sha256: hash,
-    };
-    TrainedModel { card, values: outcome.values }.write(folder)?;
-    let results = Results {
-        steps: outcome.steps,
-        best_step: outcome.history.best().map(|pass| pass.step),
-        ended: outcome.ended.into(),
-        images_per_second: (outcome.steps * plan.hyper.accumulate).to_f64() * plan.hyper.batch.to_f64()
-            / outcome.seconds.max(1e-9),
-        history: outcome.history,
-        seconds: outcome.seconds,
-    };
-    run::write_json(&folder.join(run::RESULT), &results)?;
-    Checkpoint::remove(folder)?;
-    Ok(results)
+        // Training datasets need not contain validation images, but a dataset given with --val must.
+        if val.is_empty() && plan.val.iter().any(|selection| !plan.train.contains(selection)) {
+            return Err(Error::misuse("there is no validation image in the datasets of --val")
+                .help("name other images of them with --val DIR@all, or leave --val out"));
+        }
+        if plan.hyper.logit_adjustment > 0.0 && !plan.classes.begins_with_soil() {
+            return Err(Error::misuse("logit adjustment corrects for frequent soil, and the first class is not soil")
+                .help("name soil first in --classes, or leave --logit-adjustment out"));
+        }
+        let refine = plan.hyper.refine;
+        refine.check(&plan.classes, &plan.shape.bands).map_err(|what| {
+            Error::misuse(format!("--refine {}: {what}", refine.name()))
+                .help("name soil first in --classes and red, green and blue in --bands, or leave --refine out")
+        })?;
+        let begin = match begin {
+            Some(_) if !plan.hyper.pretrained.is_none() => {
+                return Err(Error::misuse("a run to start from and pretrained weights exclude each other")
+                    .help("--init starts from all weights of a run, --pretrained only sets the encoder: give one"));
+            }
+            Some(run) => begun(plan, run)?,
+            None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, plan.classes.len(), plan.seed)?,
+        };
+        let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
+        let identity = Identity::of(&plan, &train, &val)?;
+        // Reads one image, so that missing bands are reported before the folder is claimed.
+        train.get(0)?;
+        if !val.is_empty() {
+            val.get(0)?;
+        }
+        // Records of other programs may contain pixel sizes outside the valid range of a model card.
+        let pixel_mm = match plan.hyper.augment_scale {
+            AugmentScale::PixelMm(lo, hi) => Some((lo * hi).sqrt()),
+            AugmentScale::Relative | AugmentScale::Auto => train.pixel_mm()?,
+        };
+        let pixel_mm = pixel_mm.filter(|mm| run::PIXEL_MM.contains(mm));
+        let pixels = plan.hyper.augment_scale.of(|| train.pixel_sizes_mm())?;
+        identity.claim(folder)?;
+        remove_unfinished(folder)?;
+        if let Some(results) = run::results(folder)? {
+            return Ok(results);
+        }
+        let hash = identity.hash()?;
+        for words in warnings(&plan, train.distinct(), pixels.as_ref()) {
+            (callbacks.warn)(&words);
+        }
+        let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), pixels, loaders: machine.loaders };
+        let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;
+        if plan.hyper.calibrate > 0 {
+            let model = Model::with(plan.network, plan.shape.bands.len(), plan.classes.len(), &outcome.values, place)?;
+            outcome.values = calibrate(&model, &data.train, &outcome.normalization, plan.hyper.calibrate)?;
+        }
+        if plan.hyper.logit_adjustment > 0.0 {
+            logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
+        }
+        let list = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
+        let card = ModelCard {
+            furrow: env!("CARGO_PKG_VERSION").into(),
+            network: plan.network,
+            parameters: list.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum(),
+            input: plan.shape.clone(),
+            normalization: outcome.normalization,
+            resize: plan.hyper.resize.clone(),
+            refine: plan.hyper.refine,
+            pixel_mm,
+            classes: plan.classes.clone(),
+            crops: crops.to_vec(),
+            weights: run::WEIGHTS.into(),
+            weights_sha256: weights::hash(&outcome.values),
+            plan_sha256: hash,
+        };
+        TrainedModel { card, values: outcome.values }.write(folder)?;
+        let results = Results {
+            steps: outcome.steps,
+            best_step: outcome.history.best().map(|pass| pass.step),
+            ended: outcome.ended.into(),
+            images_per_second: (outcome.steps * plan.hyper.accumulate).to_f64() * plan.hyper.batch.to_f64()
+                / outcome.seconds.max(1e-9),
+            history: outcome.history,
+            seconds: outcome.seconds,
+        };
+        run::write_json(&folder.join(run::RESULT), &results)?;
+        Checkpoint::remove(folder)?;
+        Ok(results)
+    })
 }
 
 /// Returns the trained model with its class biases calibrated for the best mean intersection over union on `images` images of
@@ -257,52 +247,42 @@ pub fn evaluate(
     stop: &AtomicBool,
     seen: &mut dyn FnMut(&Predicted<'_>) -> Result<()>,
 ) -> Result<Report> {
-    guarded(|| evaluate_here(trained, on, precision, threads, machine, stop, seen))
-}
-
-fn evaluate_here(
-    trained: &Ensemble,
-    on: &Selection,
-    precision: &str,
-    threads: usize,
-    machine: &Machine,
-    stop: &AtomicBool,
-    seen: &mut dyn FnMut(&Predicted<'_>) -> Result<()>,
-) -> Result<Report> {
-    let card = &trained.card;
-    let place = machine.place(precision)?;
-    device::set_threads(threads);
-    let models = trained.models(place)?;
-    let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
-    let trained_at = (card.input.width, card.input.height);
-    let mut evaluation = Evaluation::new(card.classes.names());
-    let open = |place| -> Result<_> {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Error::interrupted());
-        }
-        let (size, example) = match card.resize {
-            Resize::Stretch => (trained_at, store.get(place)?),
-            _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,
+    guarded(|| {
+        let card = &trained.card;
+        let place = machine.place(precision)?;
+        device::set_threads(threads);
+        let models = trained.models(place)?;
+        let store = Store::open(std::slice::from_ref(on), Pick::All, 0, &card.classes, &card.input, true, 0)?;
+        let trained_at = (card.input.width, card.input.height);
+        let mut evaluation = Evaluation::new(card.classes.names());
+        let open = |place| -> Result<_> {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::interrupted());
+            }
+            let (size, example) = match card.resize {
+                Resize::Stretch => (trained_at, store.get(place)?),
+                _ => store.whole(place).map(|(size, example)| (size, Cow::Owned(example)))?,
+            };
+            let sizes = card.resize.sizes(trained_at, size)?;
+            let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
+            Ok((size, example, inputs))
         };
-        let sizes = card.resize.sizes(trained_at, size)?;
-        let inputs = resize::inputs(&example.planes, size, &sizes, &card.normalization);
-        Ok((size, example, inputs))
-    };
-    let (refine, bands) = (card.refine, &card.input.bands);
-    let pictures = multiscale::training_images(refine, store.len()).into_iter();
-    let appearance = multiscale::learn(&models, refine, bands, pictures.map(|place| Ok(open(place)?.2)))?;
-    for place in 0..store.len() {
-        let (size, example, inputs) = open(place)?;
-        let begun = Instant::now();
-        let mut scores = multiscale::scores(&models, refine, &inputs)?;
-        scores.refine(refine, &inputs, bands, appearance.as_ref());
-        let seconds = Some(begun.elapsed().as_secs_f64());
-        let predicted = classes_at(&scores.values, scores.size, size);
-        let (width, height) = size;
-        let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
-        let (name, truth) = (example.name.as_str(), example.labels.as_slice());
-        evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
-        seen(&Predicted { place, example: &example, size, predicted: &predicted })?;
-    }
-    Ok(evaluation.finish())
+        let (refine, bands) = (card.refine, &card.input.bands);
+        let pictures = multiscale::training_images(refine, store.len()).into_iter();
+        let appearance = multiscale::learn(&models, refine, bands, pictures.map(|place| Ok(open(place)?.2)))?;
+        for place in 0..store.len() {
+            let (size, example, inputs) = open(place)?;
+            let begun = Instant::now();
+            let mut scores = multiscale::scores(&models, refine, &inputs)?;
+            scores.refine(refine, &inputs, bands, appearance.as_ref());
+            let seconds = Some(begun.elapsed().as_secs_f64());
+            let predicted = classes_at(&scores.values, scores.size, size);
+            let (width, height) = size;
+            let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
+            let (name, truth) = (example.name.as_str(), example.labels.as_slice());
+            evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+            seen(&Predicted { place, example: &example, size, predicted: &predicted })?;
+        }
+        Ok(evaluation.finish())
+    })
 }

@@ -8,7 +8,7 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_field::ablation::Edit;
 use furrow_field::drive::FIRST;
-use furrow_job::{Field, SceneFile};
+use furrow_job::{PreparedField, SceneFile};
 use std::path::{Path, PathBuf};
 
 /// A scene file's distribution over fields, at one image size.
@@ -117,7 +117,7 @@ impl FieldArgs {
         edit: &'static Edit,
         asked: impl FnOnce(SceneFile) -> SceneFile,
         warn: impl Fn(&str),
-    ) -> Result<Field> {
+    ) -> Result<PreparedField> {
         self.grow(&asked(self.of(SceneFile::edited(self.path(), edit)?)?), warn)
     }
 
@@ -129,7 +129,7 @@ impl FieldArgs {
     }
 
     /// Builds the field of a scene file. Warnings are passed to `warn` as soon as they are known.
-    pub(crate) fn grow(&self, scene: &SceneFile, warn: impl Fn(&str)) -> Result<Field> {
+    pub(crate) fn grow(&self, scene: &SceneFile, warn: impl Fn(&str)) -> Result<PreparedField> {
         let warn = |warning: &String| warn(warning);
         let expected_warnings = scene.expected_warnings(self.index)?;
         expected_warnings.iter().for_each(warn);

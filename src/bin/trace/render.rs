@@ -12,7 +12,7 @@ use furrow_cli::cli::signal::Signals;
 use furrow_field::ablation::{Edit, FULL};
 #[cfg(feature = "datasets")]
 use furrow_job::SceneFile;
-use furrow_job::{Field, Image, Renderer, Request, Threads, View};
+use furrow_job::{Image, PreparedField, Renderer, Request, Threads, View};
 use furrow_render::film::Film;
 use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Engine, Quality};
@@ -158,7 +158,7 @@ impl Args {
         self.integrator.check(&options)?;
         let renderer = Renderer::open(&options)?;
         let scene = self.field.of(scene.threads(&Threads::new(self.threads)?))?;
-        let field = self.field.grow(&scene, |words| warn(words.trim_start_matches("warning: ")))?;
+        let field = self.field.grow(&scene, warn)?;
         renderer.warning(&field).into_iter().for_each(warn);
         let camera = &field.grown().scene.camera;
         let window = self.crop.unwrap_or(Window::full(camera.width(), camera.height()));
@@ -195,7 +195,7 @@ pub(crate) fn plants(number: usize) -> String {
 }
 
 /// Describes the field, with the times for growing its plants and building the BVH.
-fn grown(path: &Path, field: &Field) -> String {
+fn grown(path: &Path, field: &PreparedField) -> String {
     let (grow, build) = field.times();
     let scene = &field.grown().scene;
     format!(

@@ -1,8 +1,8 @@
 //! Containment of panics in decoders of foreign files: a damaged file is an error about that file, whatever its
 //! decoder does.
 
+use crate::supervise::message;
 use crate::{Error, Result};
-use std::any::Any;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::Path;
@@ -45,7 +45,10 @@ pub fn caught<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
     // What `decode` has borrowed mutably is dropped by its caller, which returns the error.
     let result = catch_unwind(AssertUnwindSafe(decode));
     drop(inside);
-    result.map_err(|panic| format!("this file is damaged: its decoder failed ({})", words(&*panic)))
+    result.map_err(|panic| {
+        let first_line = message(&*panic).and_then(|all| all.lines().next()).unwrap_or("without a message");
+        format!("this file is damaged: its decoder failed ({first_line})")
+    })
 }
 
 /// Installs, once, a panic hook that is silent inside [`caught`] and calls the previous hook elsewhere.
@@ -59,12 +62,6 @@ fn install_hook() {
             }
         }));
     });
-}
-
-/// Returns the first line of a panic's message.
-fn words(panic: &(dyn Any + Send)) -> &str {
-    let all = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    all.and_then(|all| all.lines().next()).unwrap_or("without a message")
 }
 
 #[cfg(test)]

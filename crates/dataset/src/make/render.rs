@@ -15,7 +15,7 @@ use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
 use furrow_field::traits::{PlantTraits, Traits};
-use furrow_job::{Field, Image, Renderer, Request, SceneFile};
+use furrow_job::{Image, PreparedField, Renderer, Request, SceneFile};
 use furrow_render::render::{self, LabelMap, RenderMonitor};
 use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
@@ -89,14 +89,14 @@ fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
 /// The field that was built last, reused for further images of it.
 #[derive(Default)]
 pub struct CachedField {
-    field: Option<Field>,
+    field: Option<PreparedField>,
     /// Traits that were measured for the previous image of this field.
     traits: Option<Traits>,
 }
 
 /// The field of an image, set to the image's camera and frame.
 pub(crate) struct FieldAtCamera<'a> {
-    pub(crate) field: &'a Field,
+    pub(crate) field: &'a PreparedField,
     /// Traits that were measured for the previous image of this field; `None` for the first.
     traits: &'a mut Option<Traits>,
     /// Time of building the scene and BVH; zero if the field was reused.
@@ -204,7 +204,7 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
 fn labelled(
     recipe: &Recipe,
     index: u64,
-    of: &Field,
+    of: &PreparedField,
     (labels, known): (LabelMap, &mut Option<Traits>),
 ) -> Result<Sample> {
     let field = of.grown();

@@ -22,12 +22,12 @@ struct Header {
     primaries: Option<Primaries>,
     width: usize,
     height: usize,
-    order: Order,
+    order: PixelOrder,
 }
 
 /// Order of the stored pixels. The default is the usual one: rows from the top, each from the left.
 #[derive(Clone, Copy, Default)]
-struct Order {
+struct PixelOrder {
     /// Columns are stored one after the other instead of rows.
     by_column: bool,
     from_right: bool,
@@ -114,7 +114,7 @@ impl Header {
 }
 
 /// Reads a line like `-Y 512 +X 1024`: the axis that changes slowest comes first, +Y is up.
-fn resolution(line: &str) -> Result<(Order, (usize, usize)), String> {
+fn resolution(line: &str) -> Result<(PixelOrder, (usize, usize)), String> {
     let wrong = || format!("its resolution `{line}` cannot be read");
     let words: Vec<&str> = line.split_whitespace().collect();
     let [first, many, second, few] = words[..] else { return Err(wrong()) };
@@ -126,11 +126,11 @@ fn resolution(line: &str) -> Result<(Order, (usize, usize)), String> {
     if by_column == second.ends_with('X') {
         return Err(wrong());
     }
-    let order = Order { by_column, from_right: right || right_too, from_below: below || below_too };
+    let order = PixelOrder { by_column, from_right: right || right_too, from_below: below || below_too };
     Ok((order, if by_column { (many, few) } else { (few, many) }))
 }
 
-impl Order {
+impl PixelOrder {
     /// Returns where the pixel of column `x` and row `y` is stored, as column and row of the stored image.
     fn place(self, x: usize, y: usize, (width, height): (usize, usize)) -> (usize, usize) {
         let x = if self.from_right { width - 1 - x } else { x };

@@ -1,6 +1,7 @@
 //! Failures of libtorch as errors. The functions of tch without a `Result` panic when libtorch fails, in an operation or
 //! because memory ends.
 
+use furrow_base::supervise::message;
 use furrow_base::{Error, Result};
 use std::any::Any;
 use std::cell::Cell;
@@ -45,7 +46,7 @@ fn silence() {
 
 /// Returns the message of libtorch in a panic of tch; `None` for other panics.
 fn printed(panic: &(dyn Any + Send)) -> Option<&str> {
-    panic.downcast_ref::<String>()?.strip_prefix(UNWRAPPED)
+    message(panic)?.strip_prefix(UNWRAPPED)
 }
 
 /// Returns the error for a message of libtorch as Rust's `Debug` prints it, without its stack trace.

@@ -3,7 +3,7 @@
 use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use furrow_grow::plant::OrganKind;
-use furrow_job::{Field, Renderer, View};
+use furrow_job::{PreparedField, Renderer, View};
 use furrow_optics::sensor::Photograph;
 use furrow_output::ImageData as Png;
 use furrow_render::film::Film;
@@ -27,7 +27,7 @@ pub(super) struct RenderInfo {
 
 /// A field and its image so far.
 pub(super) struct LiveImage {
-    field: Arc<Field>,
+    field: Arc<PreparedField>,
     labels: Arc<LabelMap>,
     photograph: Photograph,
     made: RenderInfo,
@@ -35,7 +35,7 @@ pub(super) struct LiveImage {
 
 impl LiveImage {
     /// Develops the film into an image.
-    pub(super) fn new(field: &Arc<Field>, film: &Film, labels: &Arc<LabelMap>, made: RenderInfo) -> Self {
+    pub(super) fn new(field: &Arc<PreparedField>, film: &Film, labels: &Arc<LabelMap>, made: RenderInfo) -> Self {
         let photograph = field.edit().photograph(field.grown(), film);
         Self { field: field.clone(), labels: labels.clone(), photograph, made }
     }

@@ -13,7 +13,7 @@ use furrow_base::ron_file::RonFile;
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_field::assemble::Preview;
-use furrow_job::{Field, Renderer, Request, SceneFile, Threads};
+use furrow_job::{PreparedField, Renderer, Request, SceneFile, Threads};
 use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Quality, RenderOptions};
 use std::sync::Arc;
@@ -133,7 +133,7 @@ impl Worker {
     }
 
     /// Builds the field at the requested width, or at the camera's own width if that is smaller.
-    fn grow(&mut self, scene: &SceneFile, wish: &PageRequest) -> Result<Field> {
+    fn grow(&mut self, scene: &SceneFile, wish: &PageRequest) -> Result<PreparedField> {
         let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
         let field = scene.clone().width(guess).field(wish.index)?;
         let camera = &field.grown().scene.camera;
@@ -146,7 +146,7 @@ impl Worker {
     /// Renders the field with increasing numbers of samples; `first` returns the time to the first image.
     fn refine(
         &mut self,
-        field: &Arc<Field>,
+        field: &Arc<PreparedField>,
         asked: u64,
         passes: &[u32],
         first: &mut (dyn FnMut() -> Duration + Send),
