@@ -131,10 +131,11 @@ const ALLOWED: &[(&str, &str)] = &[
     // File types describe their own schema.
     ("schemars", "*"),
     ("serde", "*"),
-    // glTF documents, read and written; dataset records and formats; requests and responses of the `watch` page.
+    // glTF documents, read and written; dataset records and formats; requests and responses of the `watch` page
+    // and of `serve`; scene files as JSON.
     (
         "serde_json",
-        "model/document.rs model/gltf/ output/gltf/ dataset/ compare/table.rs compare/gap/known.rs compare/gap/table.rs train/ report/table.rs reference/ ron_file/schema.rs bin/trace/watch/",
+        "model/document.rs model/gltf/ output/gltf/ dataset/ compare/table.rs compare/gap/known.rs compare/gap/table.rs train/ report/table.rs reference/ ron_file/json.rs ron_file/schema.rs bin/trace/serve/ bin/trace/watch/",
     ),
     // Weights, in the format that training frameworks read.
     ("safetensors", "train/weights.rs"),

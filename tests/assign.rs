@@ -61,8 +61,8 @@ fn errors_point_into_the_argument() {
         (&["--scene"][..], "camera.pose.hight_m=1", "--set:1:13: unknown field `hight_m` in Nadir"),
         (
             &["scan", "--lidar", "Vlp16", "--scene"],
-            "crops[0].species=maiz",
-            "--set:1:18: no built-in species is called `maiz`",
+            "crops[0].species=maizee",
+            "--set:1:18: no built-in species is called `maizee`",
         ),
         (
             &["export", "--format", "gltf", "--scene"],
