@@ -324,6 +324,20 @@ fn pictures_are_written_on_the_level_of_each_organ() {
     assert_eq!(sizes, [[32, 32], [8, 8]], "{pictures:?}");
 }
 
+/// Rationale: thousands of leaves of a few species would each have files of their own. Expected: images with equal
+/// content are one file, to which all materials refer.
+#[test]
+fn equal_images_are_one_file() {
+    let mut scene = large_and_small();
+    scene.parts[1].mesh = scene.parts[0].mesh.clone();
+    scene.parts[1].tag.plant = 2;
+    let (folder, text) = exported(&scene);
+    let pictures = names(&folder.path().join("textures"));
+    let count = |what: &str| pictures.iter().filter(|name| name.ends_with(what)).count();
+    assert_eq!([count("-normal.exr"), count("-through.exr"), count("-through-nir.exr")], [1; 3], "{pictures:?}");
+    assert_eq!(text.matches("-normal.exr").count(), 2, "{text}");
+}
+
 /// Expected: `fix_levels` does not change the export; our rays then use one mip level, whatever their width.
 #[test]
 fn fixed_levels_are_those_that_are_written() {

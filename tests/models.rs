@@ -120,6 +120,64 @@ fn colours_and_transmission_survive_the_way_through_the_file() {
     assert!(texels > 1000 && passed > 300 && 100 * cut < texels, "{texels} {passed} {cut}");
 }
 
+/// Rationale: the condition of a leaf changes each texel; with images of its own for each leaf, a field has thousands.
+/// Expected: leaves share the images of their species, with a factor that keeps their mean colours within 2/255 and
+/// their marks missing; leaves with many marks or holes have images of their own, with the relief of the species.
+#[test]
+fn leaves_with_conditions_share_images() {
+    let plant = |k: usize, condition: &str| {
+        let x = 0.08 * k as f32 - 0.2;
+        format!(
+            "(species: \"scenes/species/sugar_beet.ron\", growth: Bbch(14), position_m: ({x}, 0), condition: {condition}),"
+        )
+    };
+    let kinds = ["(dust: 0.03)", "(dust: 0.05)", "(greenness: 0.9)", "(greenness: 1.1)", "(holes: 4)", "(spots: 30)"];
+    let plants: String = kinds.iter().enumerate().map(|(k, condition)| plant(k, condition)).collect();
+    let text =
+        format!("Field(seed: 4, camera: {CAMERA}, lights: [Constant(radiance: (1, 1, 1, 1))], plants: [{plants}])");
+    let field = program::field(&text, &Options::default());
+    let (bytes, _) = furrow_output::gltf::encode(&field.scene, &[], &field.provenance()).unwrap();
+    let file = gltf::Gltf::from_slice(&bytes).unwrap();
+    let named = |what: &str| file.images().filter(|image| image.name().unwrap().starts_with(what)).count();
+    let [reflected, transmitted, relief] = ["reflected", "transmitted", "relief"].map(named);
+    eprintln!(
+        "{} materials, {reflected} reflected, {transmitted} transmitted, {relief} relief",
+        file.materials().len()
+    );
+    assert!(relief <= 2, "{relief}");
+    assert!(2 * reflected < file.materials().len() && reflected > 2, "{reflected} of {}", file.materials().len());
+    assert!(transmitted <= reflected, "{transmitted}");
+
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("scene.glb"), &bytes).unwrap();
+    let again = placed(&folder, "(file: \"scene.glb\")").unwrap();
+    // Mean over the visible texels of a grid.
+    let mean = |part: &Part, field: &Field| {
+        let swatch = field.scene.materials[part.material as usize].swatch();
+        let (w, h) = swatch.size.unwrap_or((1, 1));
+        let mask = part.mask.as_ref();
+        let (mw, mh) = mask.map_or((w, h), |mask| mask.size());
+        let at = |k: u32, n: u32| (2 * k + 1) * n / 64;
+        let there = |&(i, j): &(u32, u32)| mask.is_none_or(|m| m.texel(at(i, mw) as i32, at(j, mh) as i32));
+        let places: Vec<(u32, u32)> = (0..1024).map(|k| (k % 32, k / 32)).filter(there).collect();
+        let tint = if swatch.size.is_some() { [swatch.tint, swatch.tint_transmitted] } else { [Vec3::ONE; 2] };
+        let sum = places.iter().fold([Vec3::ZERO; 2], |[r, t], &(i, j)| {
+            let tone = swatch.texel(at(i, w), at(j, h));
+            [r + tone.reflectance.0.truncate() * tint[0], t + tone.transmittance.0.truncate() * tint[1]]
+        });
+        sum.map(|sum| sum / places.len().max(1) as f32)
+    };
+    let code = |c: f32| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    let there = field.scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty());
+    for (i, (part, other)) in there.zip(&again.scene.parts).enumerate() {
+        for (before, after) in mean(part, &field).into_iter().zip(mean(other, &again)) {
+            let off = (0..3).map(|k| (code(before[k]) - code(after[k])).abs()).fold(0.0, f32::max);
+            assert!(off < 2.0 / 255.0, "part {i}: {before} became {after}");
+        }
+    }
+}
+
 #[test]
 fn the_exported_file_is_the_same_bytes_every_time() {
     let again = program::field(&small_text(), &Options::default());

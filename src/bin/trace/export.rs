@@ -1,12 +1,14 @@
 //! `trace export`: exports one field as a scene of another program.
 
 use crate::field::{FieldArgs, print_warning};
+use crate::growing::Line;
+use crate::quality::threads;
 use clap::ValueEnum;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_field::Field;
 use furrow_field::ablation::FULL;
-use furrow_job::Threads;
+use furrow_job::{SceneFile, Threads};
 use furrow_output::Export;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +30,9 @@ pub(crate) struct Args {
     /// Points per square metre of surface; with `--format ply`. Default: 100000.
     #[arg(long, value_name = "POINTS", value_parser = density)]
     density: Option<f64>,
+    /// Number of threads; 0 for one per core. The files do not depend on it.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
     /// Print nothing but errors, warnings and the paths of the files.
     #[arg(long)]
     quiet: bool,
@@ -86,9 +91,14 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         return Err(Error::misuse(words).help("use --format ply, or leave --density out"));
     }
     let density = args.density.unwrap_or(DENSITY);
-    let threads = Threads::all()?;
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).rigged(args.skins), print_warning)?;
+    let threads = Threads::new(args.threads)?;
+    let growing = Line::begin(args.quiet);
+    let warn = |words: &str| growing.pause(|| print_warning(words));
+    let wanted = |scene: SceneFile| scene.threads(&threads).rigged(args.skins).progress(growing.progress());
+    let field = args.field.grow_as(&FULL, wanted, warn)?;
+    growing.show("writing files");
     let export = field.threads().install(|| args.format.write(&out, field.grown(), density))?;
+    growing.end();
     for warning in &export.warnings {
         print_warning(warning);
     }

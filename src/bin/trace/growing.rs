@@ -40,13 +40,18 @@ impl Line {
     /// Shows the current step, together with fields being built for it. A log gets its first line at once, later ones
     /// at intervals of [`LOGGED`].
     pub(crate) fn say(&self, work: &str) {
-        self.bar.set_message(format!("{work}  "));
+        self.show(work);
         let Some(log) = &self.log else { return };
         let mut last = log.lock().unwrap_or_else(PoisonError::into_inner);
         if last.is_none_or(|last| last.elapsed() >= LOGGED) {
             *last = Some(Instant::now());
             furrow_cli::message!("{work}");
         }
+    }
+
+    /// Shows the current step on a terminal only.
+    pub(crate) fn show(&self, work: &str) {
+        self.bar.set_message(format!("{work}  "));
     }
 
     /// Returns the build progress that is displayed, for fields to update.

@@ -1,12 +1,14 @@
 //! `trace scan`: simulates a LiDAR scan of one field.
 
 use crate::field::{FieldArgs, print_warning};
+use crate::growing::Line;
+use crate::quality::threads;
 use clap::builder::PossibleValuesParser;
 use furrow_base::Result;
 use furrow_cli::cli;
 use furrow_field::ablation::FULL;
 use furrow_field::assemble::Scanner;
-use furrow_job::Threads;
+use furrow_job::{SceneFile, Threads};
 use furrow_optics::sensor::{LIDARS, LidarDesc};
 use std::path::PathBuf;
 
@@ -21,6 +23,9 @@ pub(crate) struct Args {
     /// Folder for `scan.ply`. Default: `out/`, the scene file's name and `scan`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Number of threads; 0 for one per core. The file does not depend on it.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
     /// Print nothing but errors, warnings and the path of the file.
     #[arg(long)]
     quiet: bool,
@@ -36,11 +41,16 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
             furrow_cli::message!("{words}");
         }
     };
-    let threads = Threads::all()?;
+    let threads = Threads::new(args.threads)?;
+    let growing = Line::begin(args.quiet);
+    let warn = |words: &str| growing.pause(|| print_warning(words));
     let named = args.lidar.as_deref().and_then(LidarDesc::named);
     let scanner = named.map_or(Scanner::OfScene, |lidar| Scanner::AtCamera(Box::new(lidar)));
-    let field = args.field.grow_as(&FULL, |scene| scene.threads(&threads).scanned(scanner), print_warning)?;
+    let wanted = |scene: SceneFile| scene.threads(&threads).scanned(scanner).progress(growing.progress());
+    let field = args.field.grow_as(&FULL, wanted, warn)?;
+    growing.show("scanning");
     let (lidar, echoes) = field.scan()?;
+    growing.end();
     if echoes.is_empty() {
         print_warning("there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }

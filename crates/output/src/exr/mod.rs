@@ -19,6 +19,9 @@ use furrow_render::render::{self, LabelMap, label::NONE};
 use furrow_render::scene::tag::{Class, Tag};
 use std::path::Path;
 
+/// Largest height of an image that is compressed by one thread.
+const SMALL_ROWS: u32 = 128;
+
 /// Channels of one layer.
 type Channels = SmallVec<[AnyChannel<FlatSamples>; 4]>;
 
@@ -219,7 +222,9 @@ fn write_with(
     let size = Vec2(w.width().to_usize(), w.height().to_usize());
     let image = Image::from_layer(Layer::new(size, attributes, encoding, AnyChannels::sort(channels)));
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image.write().to_unbuffered(&mut bytes).map_err(|e| failed(&e))?;
+    // Threads are started for every file, which takes longer than to compress a small one.
+    let writer = if w.height() <= SMALL_ROWS { image.write().non_parallel() } else { image.write() };
+    writer.to_unbuffered(&mut bytes).map_err(|e| failed(&e))?;
     let bytes = bytes.into_inner();
     if with_words { order::sorted(bytes).ok_or_else(|| failed(&"its header is incomplete")) } else { Ok(bytes) }
 }

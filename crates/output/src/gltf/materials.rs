@@ -1,23 +1,32 @@
 //! Conversion of materials and masks to glTF materials, textures and images; each image is written once.
 
+use super::look::Look;
 use super::pack::Pack;
-use crate::png::{self, ImageData};
+use super::pictures::{self, Colors, SharedColors};
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::{RoundTo, ToInt, Vec3};
+use furrow_base::math::{ToInt, Vec3};
 use furrow_grow::model::document::{
     CLAMP_TO_EDGE, DIFFUSE_TRANSMISSION, DiffuseTransmission, Document, Image, LINEAR, LINEAR_MIPMAP_LINEAR, Material,
     NEAREST, NormalInfo, Pbr, Sampler, Texture, TextureInfo,
 };
-use furrow_optics::texture::ColorSpace;
 use furrow_render::material::swatch::{Dye, Swatch};
 use furrow_render::scene::{Part, Scene};
+use rayon::prelude::*;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Identity of an image: the swatch's key, and the mask's address.
-type Key = ([usize; 2], usize);
+/// Identity of an image of colours. For a plain material, which has none, the number of the glTF material.
+type ColorKey = [usize; 2];
+/// Identity of a texture of reflected colours: the image, and the mask's address. All plain materials with one mask
+/// share a white image.
+type ReflectedKey = (ColorKey, usize);
+
+/// Index of the glTF sampler of images with a mask, which are not filtered, as in this renderer.
+const UNFILTERED: usize = 0;
+/// Index of the glTF sampler of other images.
+const FILTERED: usize = 1;
 
 /// Materials used by the parts, in order of first use.
 pub(super) struct Materials<'a> {
@@ -29,21 +38,6 @@ pub(super) struct Materials<'a> {
 
 /// Material with a tint and a mask.
 type MaterialVariant<'a> = (u32, Vec3, Option<&'a Arc<AlphaMask>>);
-
-/// Image shared by several glTF materials.
-struct SharedImage<'a> {
-    swatch: Swatch<'a>,
-    mask: Option<&'a AlphaMask>,
-    /// Component-wise maximum of the tints of all users. The image is multiplied by it so that no factor exceeds one.
-    tint: Vec3,
-    tint_transmitted: Vec3,
-    /// Largest reflectance, then largest transmittance.
-    most: [Vec3; 2],
-    /// Diffuse transmission factor f: reflected colours are divided by 1 − f, transmitted ones by f.
-    share: f32,
-    /// Whether any user has a relief.
-    raised: bool,
-}
 
 fn address(mask: Option<&Arc<AlphaMask>>) -> usize {
     mask.map_or(0, |m| Arc::as_ptr(m).addr())
@@ -64,95 +58,159 @@ impl<'a> Materials<'a> {
         })
     }
 
-    /// Returns the swatches of all materials in use.
-    fn swatches(&self) -> BTreeMap<u32, Swatch<'a>> {
-        let scene = self.scene;
-        let worn: BTreeSet<u32> = self.worn.iter().map(|(material, ..)| *material).collect();
-        worn.into_iter().map(|material| (material, scene.materials[material.to_usize()].swatch())).collect()
+    /// Returns the images of all materials in use.
+    fn looks(&self) -> BTreeMap<u32, Look<'a>> {
+        let mut masks: BTreeMap<u32, Option<&'a Arc<AlphaMask>>> = BTreeMap::new();
+        let mut users: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
+        for (material, _, mask) in &self.worn {
+            masks.entry(*material).or_insert(*mask);
+            users.entry(address(*mask)).or_default().insert(*material);
+        }
+        let look = |(material, mask): (u32, Option<&'a Arc<AlphaMask>>)| {
+            let of = &self.scene.materials[material.to_usize()];
+            // Opacity and colour are one image, so a leaf with a mask of its own has no image to share.
+            let look = if users[&address(mask)].len() > 1 { Look::of(of, mask.map(|m| &**m)) } else { Look::own(of) };
+            (material, look)
+        };
+        masks.into_par_iter().map(look).collect()
     }
 
     /// Writes materials, textures, samplers and images.
     pub(super) fn write(&self, document: &mut Document, pack: &mut Pack) -> Result<()> {
-        let scene = self.scene;
-        let swatches = self.swatches();
-        let dye =
-            |material: u32, tint| swatches[&material].dyed(scene.materials[material.to_usize()].tint_factors(tint));
-        let mut sheets: BTreeMap<Key, SharedImage<'a>> = BTreeMap::new();
-        // Numbered by first use, because addresses differ from run to run and files must not.
-        let mut order: Vec<Key> = Vec::new();
+        let looks = self.looks();
+        let shared = self.shared(&looks);
+        // Masks are sampled without filtering, as in this renderer.
+        document.samplers = vec![sampler(NEAREST, NEAREST), sampler(LINEAR, LINEAR_MIPMAP_LINEAR)];
+        let textures = self.draw(&looks, &shared, &mut Textures { document, pack })?;
         for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
-            let (swatch, dye) = (&swatches[material], dye(*material, *tint));
-            let key = key(swatch, *mask, i);
-            let sheet = sheets.entry(key).or_insert_with(|| {
-                order.push(key);
-                let own = scene.materials[material.to_usize()].swatch();
-                // A plain colour shares no image, so the tinted colour itself is used.
-                let mean = || [dye.mean.reflectance, dye.mean.transmittance].map(|s| s.0.truncate());
-                let most = if own.size.is_some() { most(&own) } else { mean() };
-                let mask = mask.map(|m| &**m);
-                SharedImage {
-                    swatch: own,
-                    mask,
-                    tint: Vec3::ONE,
-                    tint_transmitted: Vec3::ONE,
-                    most,
-                    share: 0.0,
-                    raised: false,
-                }
-            });
-            sheet.raised |= swatch.relief > 0.0;
-            if swatch.size.is_some() {
-                sheet.tint = sheet.tint.max(dye.tint);
-                sheet.tint_transmitted = sheet.tint_transmitted.max(dye.tint_transmitted);
-            }
-        }
-        for sheet in sheets.values_mut() {
-            // Parts that transmit more light than their image need a larger factor. If the brightest texels of both
-            // colours exceed one for every factor, both are scaled down equally.
-            let [reflected, transmitted] = sheet.most;
-            let reflected = (reflected * sheet.tint).max_element();
-            let transmitted = (transmitted * sheet.tint_transmitted).max_element();
-            sheet.share = (transmitted / (reflected + transmitted).max(1.0)).min(0.9);
-        }
-        document.samplers = vec![
-            // Masks are sampled without filtering, as in this renderer.
-            sampler(NEAREST, NEAREST),
-            sampler(LINEAR, LINEAR_MIPMAP_LINEAR),
-        ];
-        let drawn: Vec<EncodedImages> = order.iter().map(|key| sheets[key].draw()).collect::<Result<_>>()?;
-        let mut textures: BTreeMap<Key, [Option<usize>; 3]> = BTreeMap::new();
-        for (key, EncodedImages { reflected, transmitted, normals }) in order.iter().zip(drawn) {
-            let cut = usize::from(sheets[key].mask.is_none());
-            let mut add = |bytes: Option<Vec<u8>>, what: &str, sampler: usize| {
-                bytes.map(|bytes| {
-                    let name = Some(format!("{what} {}", document.images.len()));
-                    let view = Some(pack.picture(bytes));
-                    document.images.push(Image {
-                        name,
-                        mime_type: Some("image/png".into()),
-                        buffer_view: view,
-                        uri: None,
-                    });
-                    document.textures.push(Texture {
-                        sampler: Some(sampler),
-                        source: Some(document.images.len() - 1),
-                        ..Texture::default()
-                    });
-                    document.textures.len() - 1
-                })
+            let (look, dye) = (&looks[material], self.dye(&looks, *material, *tint));
+            let key = color_key(&look.swatch, i);
+            let own = MaterialTextures {
+                reflected: textures.reflected.get(&reflected_key(&look.swatch, *mask)).copied(),
+                transmitted: textures.transmitted.get(&key).copied(),
+                relief: textures.relief.get(&look.relief().relief_key).copied().filter(|_| look.swatch.relief > 0.0),
             };
-            textures.insert(
-                *key,
-                [add(reflected, "reflected", cut), add(transmitted, "transmitted", 1), add(normals, "relief", 1)],
-            );
-        }
-        for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
-            let (swatch, dye) = (&swatches[material], dye(*material, *tint));
-            let key = key(swatch, *mask, i);
-            document.materials.push(sheets[&key].material(swatch, dye, textures[&key], i));
+            document.materials.push(shared[&key].material(&look.swatch, dye, own, mask.is_some(), i));
         }
         Ok(())
     }
+
+    fn dye(&self, looks: &BTreeMap<u32, Look<'a>>, material: u32, tint: Vec3) -> Dye {
+        looks[&material].swatch.dyed(self.scene.materials[material.to_usize()].tint_factors(tint))
+    }
+
+    /// Collects the images of colours with the tints of all their users.
+    fn shared<'b>(&self, looks: &'b BTreeMap<u32, Look<'a>>) -> BTreeMap<ColorKey, SharedColors<'b>> {
+        let mut shared: BTreeMap<ColorKey, SharedColors<'b>> = BTreeMap::new();
+        for (i, (material, tint, _)) in self.worn.iter().enumerate() {
+            let (look, dye) = (&looks[material], self.dye(looks, *material, *tint));
+            let key = color_key(&look.swatch, i);
+            shared.entry(key).or_insert_with(|| SharedColors::new(&look.swatch)).wear(dye);
+        }
+        shared
+    }
+
+    /// Computes all images and adds them to the document, in the order in which materials use them: addresses differ
+    /// from run to run, and files must not.
+    fn draw<'b>(
+        &self,
+        looks: &'b BTreeMap<u32, Look<'a>>,
+        shared: &BTreeMap<ColorKey, SharedColors<'b>>,
+        textures: &mut Textures<'_>,
+    ) -> Result<TextureIndices> {
+        let mut colors: Ordered<ColorKey, &SharedColors<'b>> = Ordered::default();
+        let mut reflected: Ordered<ReflectedKey, (ColorKey, Option<&AlphaMask>)> = Ordered::default();
+        let mut reliefs: Ordered<usize, &Swatch<'a>> = Ordered::default();
+        for (i, (material, _, mask)) in self.worn.iter().enumerate() {
+            let look = &looks[material];
+            let key = color_key(&look.swatch, i);
+            colors.add(key, || &shared[&key]);
+            reflected.add(reflected_key(&look.swatch, *mask), || (key, mask.map(|m| &**m)));
+            if look.swatch.relief > 0.0 {
+                reliefs.add(look.relief().relief_key, || look.relief());
+            }
+        }
+        let drawn: Vec<Option<Colors>> = colors.items.par_iter().map(|(_, of)| of.draw()).collect::<Result<_>>()?;
+        let encode = |(_, (key, mask)): &(ReflectedKey, (ColorKey, Option<&AlphaMask>))| {
+            pictures::reflected(drawn[colors.places[key]].as_ref(), *mask)
+        };
+        let encoded: Vec<Option<Vec<u8>>> = reflected.items.par_iter().map(encode).collect::<Result<_>>()?;
+        let normals: Vec<Option<Vec<u8>>> =
+            reliefs.items.par_iter().map(|(_, swatch)| pictures::relief(swatch)).collect::<Result<_>>()?;
+        let mut indices = TextureIndices::default();
+        for ((key, (_, mask)), bytes) in reflected.items.into_iter().zip(encoded) {
+            let sampler = if mask.is_some() { UNFILTERED } else { FILTERED };
+            indices.reflected.extend(bytes.map(|bytes| (key, textures.add(bytes, "reflected", sampler))));
+        }
+        for ((key, _), of) in colors.items.into_iter().zip(drawn) {
+            let bytes = of.and_then(|of| of.transmitted);
+            indices.transmitted.extend(bytes.map(|bytes| (key, textures.add(bytes, "transmitted", FILTERED))));
+        }
+        for ((key, _), bytes) in reliefs.items.into_iter().zip(normals) {
+            indices.relief.extend(bytes.map(|bytes| (key, textures.add(bytes, "relief", FILTERED))));
+        }
+        Ok(indices)
+    }
+}
+
+/// Distinct items in the order in which they were added.
+struct Ordered<K, V> {
+    items: Vec<(K, V)>,
+    places: BTreeMap<K, usize>,
+}
+
+impl<K, V> Default for Ordered<K, V> {
+    fn default() -> Self {
+        Self { items: Vec::new(), places: BTreeMap::new() }
+    }
+}
+
+impl<K: Copy + Ord, V> Ordered<K, V> {
+    /// Adds an item unless one with this key is there.
+    fn add(&mut self, key: K, item: impl FnOnce() -> V) {
+        let items = &mut self.items;
+        self.places.entry(key).or_insert_with(|| {
+            items.push((key, item()));
+            items.len() - 1
+        });
+    }
+}
+
+/// Textures of a document under construction.
+struct Textures<'a> {
+    document: &'a mut Document,
+    pack: &'a mut Pack,
+}
+
+impl Textures<'_> {
+    /// Adds a PNG file as a texture and returns the texture's index.
+    fn add(&mut self, bytes: Vec<u8>, what: &str, sampler: usize) -> usize {
+        let document = &mut *self.document;
+        document.images.push(Image {
+            name: Some(format!("{what} {}", document.images.len())),
+            mime_type: Some("image/png".into()),
+            buffer_view: Some(self.pack.picture(bytes)),
+            uri: None,
+        });
+        let source = Some(document.images.len() - 1);
+        document.textures.push(Texture { sampler: Some(sampler), source, ..Texture::default() });
+        document.textures.len() - 1
+    }
+}
+
+/// Index of the texture of each image.
+#[derive(Default)]
+struct TextureIndices {
+    reflected: BTreeMap<ReflectedKey, usize>,
+    transmitted: BTreeMap<ColorKey, usize>,
+    relief: BTreeMap<usize, usize>,
+}
+
+/// Indices of the textures of one material.
+struct MaterialTextures {
+    reflected: Option<usize>,
+    transmitted: Option<usize>,
+    relief: Option<usize>,
 }
 
 fn sampler(near: u32, far: u32) -> Sampler {
@@ -160,86 +218,28 @@ fn sampler(near: u32, far: u32) -> Sampler {
     Sampler { mag_filter: Some(near), min_filter: Some(far), wrap_s: edge, wrap_t: edge }
 }
 
-/// Returns the image key. Plain materials do not share images: their colour is a factor, and their image is at most a
-/// mask.
-fn key(swatch: &Swatch<'_>, mask: Option<&Arc<AlphaMask>>, number: usize) -> Key {
-    if swatch.size.is_some() { (swatch.key, address(mask)) } else { ([0, number], address(mask)) }
+/// Returns the key of a material's colours. Plain materials do not share them: their colour is a factor.
+fn color_key(swatch: &Swatch<'_>, number: usize) -> ColorKey {
+    if swatch.size.is_some() { swatch.key } else { [0, number] }
 }
 
-/// Returns the largest reflectance and transmittance of a swatch in R, G, B, over every fourth texel in both
-/// directions.
-fn most(swatch: &Swatch<'_>) -> [Vec3; 2] {
-    let (w, h) = swatch.size.unwrap_or((1, 1));
-    let some = (0..h).step_by(4).flat_map(|y| (0..w).step_by(4).map(move |x| (x, y)));
-    some.map(|(x, y)| swatch.texel(x, y)).fold([Vec3::ZERO; 2], |most, tone| {
-        let of = [tone.reflectance, tone.transmittance].map(|s| s.0.truncate());
-        [most[0].max(of[0]), most[1].max(of[1])]
-    })
+fn reflected_key(swatch: &Swatch<'_>, mask: Option<&Arc<AlphaMask>>) -> ReflectedKey {
+    (if swatch.size.is_some() { swatch.key } else { [0; 2] }, address(mask))
 }
 
-/// Encoded PNG files of an image.
-struct EncodedImages {
-    reflected: Option<Vec<u8>>,
-    transmitted: Option<Vec<u8>>,
-    normals: Option<Vec<u8>>,
-}
-
-impl SharedImage<'_> {
-    /// Returns the factor on reflected colours: the tint divided by 1 − f.
-    fn lift(&self) -> Vec3 {
-        self.tint / (1.0 - self.share)
-    }
-
-    /// Returns the factor on transmitted colours: the tint divided by f.
-    fn lift_transmitted(&self) -> Vec3 {
-        if self.share > 0.0 { self.tint_transmitted / self.share } else { Vec3::ZERO }
-    }
-
-    fn draw(&self) -> Result<EncodedImages> {
-        let pictured = self.swatch.size.is_some();
-        let Some((w, h)) = self.mask.map(AlphaMask::size).or(self.swatch.size) else {
-            return Ok(EncodedImages { reflected: None, transmitted: None, normals: None });
-        };
-        let (sw, sh) = self.swatch.size.unwrap_or((1, 1));
-        // The mask's size is used if it differs from the image's; the image is then sampled by its nearest texels.
-        let tone = |x: u32, y: u32| self.swatch.texel(scaled(x, w, sw), scaled(y, h, sh));
-        let opacity = |x: u32, y: u32| if self.mask.is_none_or(|m| m.texel(x.to_i32(), y.to_i32())) { 255 } else { 0 };
-        let places = || (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-        let code = |v: Vec3| v.to_array().map(|c| ColorSpace::Srgb.encode(c));
-        let reflected =
-            |x, y| if pictured { code(tone(x, y).reflectance.0.truncate() * self.lift()) } else { [255; 3] };
-        let reflected = if self.mask.is_some() {
-            let rgba = |(x, y)| {
-                let [r, g, b] = reflected(x, y);
-                [r, g, b, opacity(x, y)]
-            };
-            png::encode(w, h, &ImageData::Rgba(&places().map(rgba).collect::<Vec<_>>()), "")?
-        } else {
-            png::encode(w, h, &ImageData::Rgb(&places().map(|(x, y)| reflected(x, y)).collect::<Vec<_>>()), "")?
-        };
-        let transmitted = |(x, y): (u32, u32)| code(tone(x, y).transmittance.0.truncate() * self.lift_transmitted());
-        let transmitted = (pictured && self.share > 0.0)
-            .then(|| png::encode(w, h, &ImageData::Rgb(&places().map(transmitted).collect::<Vec<_>>()), ""))
-            .transpose()?;
-        let normal = |(x, y): (u32, u32)| {
-            let slope = self.swatch.slope(scaled(x, w, sw), scaled(y, h, sh));
-            let n = Vec3::new(-slope.x, -slope.y, 1.0).normalize();
-            n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5).trunc_to::<u8>())
-        };
-        let normals = (pictured && self.raised)
-            .then(|| png::encode(w, h, &ImageData::Linear(&places().map(normal).collect::<Vec<_>>()), ""))
-            .transpose()?;
-        Ok(EncodedImages { reflected: Some(reflected), transmitted, normals })
-    }
-
-    fn material(&self, swatch: &Swatch<'_>, dye: Dye, textures: [Option<usize>; 3], number: usize) -> Material {
-        let relief = textures[2].filter(|_| swatch.relief > 0.0);
-        let [reflected, transmitted, _] =
-            textures.map(|t| t.map(|index| TextureInfo { index, ..TextureInfo::default() }));
-        let pictured = swatch.size.is_some();
-        // With an image the factor is the tint divided by the largest tint; without one it is the colour.
-        let factor = if pictured { dye.tint / self.tint } else { dye.mean.reflectance.0.truncate() * self.lift() };
-        let [r, g, b] = factor.clamp(Vec3::ZERO, Vec3::ONE).to_array();
+impl SharedColors<'_> {
+    fn material(
+        &self,
+        swatch: &Swatch<'_>,
+        dye: Dye,
+        textures: MaterialTextures,
+        masked: bool,
+        number: usize,
+    ) -> Material {
+        let [reflected, transmitted] = [textures.reflected, textures.transmitted]
+            .map(|t| t.map(|index| TextureInfo { index, ..TextureInfo::default() }));
+        let factors = self.factors(dye);
+        let [r, g, b] = factors.reflected.to_array();
         let mean = dye.mean;
         let mut material = Material {
             name: Some(format!("material {number}")),
@@ -251,7 +251,7 @@ impl SharedImage<'_> {
                 roughness_factor: Some(swatch.roughness.sqrt()),
                 ..Pbr::default()
             },
-            normal_texture: relief.map(|index| NormalInfo {
+            normal_texture: textures.relief.map(|index| NormalInfo {
                 index,
                 scale: Some(swatch.relief),
                 ..NormalInfo::default()
@@ -260,28 +260,18 @@ impl SharedImage<'_> {
             extras: json!({ "nir_reflectance": mean.reflectance.0.w, "nir_transmittance": mean.transmittance.0.w }),
             ..Material::default()
         };
-        if self.mask.is_some() {
+        if masked {
             material.alpha_mode = Some("MASK".into());
             material.alpha_cutoff = Some(0.5);
         }
-        if self.share > 0.0 {
-            let factor = if pictured {
-                dye.tint_transmitted / self.tint_transmitted
-            } else {
-                mean.transmittance.0.truncate() * self.lift_transmitted()
-            };
+        if factors.share > 0.0 {
             let of = DiffuseTransmission {
-                diffuse_transmission_factor: self.share,
-                diffuse_transmission_color_factor: Some(factor.clamp(Vec3::ZERO, Vec3::ONE).to_array()),
+                diffuse_transmission_factor: factors.share,
+                diffuse_transmission_color_factor: Some(factors.transmitted.to_array()),
                 diffuse_transmission_color_texture: transmitted,
             };
             material.extensions.insert(DIFFUSE_TRANSMISSION.into(), json!(of));
         }
         material
     }
-}
-
-/// Returns the texel of a row of `to` texels at the position of texel `i` of `from`.
-fn scaled(i: u32, from: u32, to: u32) -> u32 {
-    if from == to { i } else { ((u64::from(i) * 2 + 1) * u64::from(to) / (u64::from(from) * 2)).to_u32() }
 }

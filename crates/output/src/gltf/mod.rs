@@ -17,8 +17,10 @@
 //! The document is built here, because the crate `gltf` reads documents but does not write them (tests read these with
 //! it).
 
+mod look;
 mod materials;
 mod pack;
+mod pictures;
 mod skins;
 
 use super::{Export, unheld, write_atomically};

@@ -2,9 +2,11 @@
 
 use super::xml::Element;
 use crate::{FileSet, exr};
-use furrow_base::Result;
 use furrow_base::math::{Spectrum, Vec3};
-use std::path::Path;
+use furrow_base::{Error, Result};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 /// Mitsuba length units per metre.
 pub(super) const SCALE: f32 = 100.0;
@@ -47,27 +49,114 @@ pub(super) enum Plugins {
     Own,
 }
 
-/// Files of the export: written to temporary names first, and renamed when all are complete.
+/// Number of values of images that are collected before they are encoded on all threads.
+const COLLECTED: usize = 1 << 22;
+
+/// Files of the export: written to temporary names first, and renamed when all are complete. Images with equal content
+/// become one file.
 pub(super) struct Files<'a> {
-    pub(super) folder: &'a Path,
-    pub(super) together: FileSet,
+    folder: &'a Path,
+    together: FileSet,
+    /// Path or stem of each image.
+    known: HashMap<Content, String>,
+    /// Images to be encoded.
+    collected: Vec<Collected>,
+    /// Number of their values.
+    values: usize,
 }
 
-impl Files<'_> {
+/// Content of an image, by which equal ones are found.
+#[derive(PartialEq, Eq, Hash)]
+struct Content {
+    width: u32,
+    height: u32,
+    /// Names of the channels.
+    channels: &'static [&'static str],
+    /// Bits of the values, channel by channel.
+    bits: Vec<u32>,
+}
+
+/// Image to be encoded.
+struct Collected {
+    path: String,
+    width: u32,
+    height: u32,
+    channels: Vec<(&'static str, Vec<f32>)>,
+}
+
+impl<'a> Files<'a> {
+    pub(super) fn new(folder: &'a Path) -> Self {
+        Self { folder, together: FileSet::default(), known: HashMap::new(), collected: Vec::new(), values: 0 }
+    }
+
     pub(super) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        self.together.add(&self.folder.join(name), bytes)
+        self.together.add_unflushed(&self.folder.join(name), bytes)
     }
 
-    /// Writes raw numbers, one vector per channel.
-    pub(super) fn numbers(&mut self, name: &str, width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> Result<()> {
-        self.write(name, &exr::encode_map(width, height, channels)?)
+    /// Writes an image of raw numbers and returns its path, which is that of an equal image if there is one. `values`
+    /// holds the channels one after the other.
+    pub(super) fn numbers(
+        &mut self,
+        path: &str,
+        (width, height): (u32, u32),
+        names: &'static [&'static str],
+        values: &[f32],
+    ) -> Result<String> {
+        let content = Content { width, height, channels: names, bits: values.iter().map(|v| v.to_bits()).collect() };
+        if let Some(known) = self.known.get(&content) {
+            return Ok(known.clone());
+        }
+        self.known.insert(content, path.to_owned());
+        self.collect(path.to_owned(), (width, height), names, values)?;
+        Ok(path.to_owned())
     }
 
-    /// Writes `STEM.exr` with R, G, B and `STEM-nir.exr`.
-    pub(super) fn spectra(&mut self, stem: &str, width: u32, height: u32, pixels: &[Spectrum]) -> Result<()> {
-        let band = |i: usize| pixels.iter().map(|p| p.to_array()[i]).collect::<Vec<f32>>();
-        self.numbers(&Band::Color.path(stem), width, height, &[("R", band(0)), ("G", band(1)), ("B", band(2))])?;
-        self.numbers(&Band::Nir.path(stem), width, height, &[("Y", band(3))])
+    /// Writes `STEM.exr` with R, G, B and `STEM-nir.exr`. Returns the stem, which is that of equal images if there are
+    /// any.
+    pub(super) fn spectra(&mut self, stem: &str, (width, height): (u32, u32), pixels: &[Spectrum]) -> Result<String> {
+        let bands: Vec<f32> = (0..4).flat_map(|i| pixels.iter().map(move |p| p.to_array()[i])).collect();
+        let bits = bands.iter().map(|v| v.to_bits()).collect();
+        let content = Content { width, height, channels: &["R", "G", "B", "NIR"], bits };
+        if let Some(known) = self.known.get(&content) {
+            return Ok(known.clone());
+        }
+        self.known.insert(content, stem.to_owned());
+        let (color, nir) = bands.split_at(3 * pixels.len());
+        self.collect(Band::Color.path(stem), (width, height), &["R", "G", "B"], color)?;
+        self.collect(Band::Nir.path(stem), (width, height), &["Y"], nir)?;
+        Ok(stem.to_owned())
+    }
+
+    fn collect(
+        &mut self,
+        path: String,
+        (width, height): (u32, u32),
+        names: &[&'static str],
+        values: &[f32],
+    ) -> Result<()> {
+        let planes = values.chunks(values.len() / names.len()).map(<[f32]>::to_vec);
+        self.collected.push(Collected { path, width, height, channels: names.iter().copied().zip(planes).collect() });
+        self.values += values.len();
+        if self.values < COLLECTED { Ok(()) } else { self.flush() }
+    }
+
+    /// Encodes and writes the collected images.
+    fn flush(&mut self) -> Result<()> {
+        self.values = 0;
+        let collected = std::mem::take(&mut self.collected);
+        let encode = |image: &Collected| exr::encode_map(image.width, image.height, &image.channels);
+        let encoded: Vec<Vec<u8>> = collected.par_iter().map(encode).collect::<Result<_>>()?;
+        collected.iter().zip(encoded).try_for_each(|(image, bytes)| self.write(&image.path, &bytes))
+    }
+
+    /// Renames all files and returns their paths.
+    pub(super) fn finish(mut self, last: &[(&str, String)]) -> Result<Vec<PathBuf>> {
+        self.flush()?;
+        for (name, document) in last {
+            self.write(name, document.as_bytes())?;
+        }
+        let lost = "its temporary files were removed while it was written";
+        self.together.finish()?.ok_or_else(|| Error::failed(lost).in_file(self.folder))
     }
 }
 

@@ -50,7 +50,7 @@ impl Lights {
             match light.form() {
                 Form::Distant { towards, normal_irradiance } => {
                     let stem = format!("textures/sun-{}", of.suns.len());
-                    let half = sun_picture(light, towards, normal_irradiance, &stem, files)?;
+                    let (half, stem) = sun_picture(light, towards, normal_irradiance, &stem, files)?;
                     of.suns.push((Frame::about(-towards), half, stem));
                 }
                 Form::Area { outline, centre, frame, radiance, .. } => {
@@ -73,8 +73,7 @@ impl Lights {
                 radiance(direction(zenith, TAU * (column.to_f32() + 0.5) / w.to_f32()))
             };
             let pixels: Vec<Spectrum> = (0..w * h).map(at).collect();
-            files.spectra("textures/sky", w, h, &pixels)?;
-            Some(Dome::Texture("textures/sky".into()))
+            Some(Dome::Texture(files.spectra("textures/sky", (w, h), &pixels)?))
         };
         Ok(of)
     }
@@ -134,14 +133,14 @@ fn area(shape: &str, frame: &Frame, half: [f32; 2], centre: Vec3, emitter: Eleme
 }
 
 /// Writes the image of the square around the sun's disc, normalised to give exactly the sun's irradiance. Returns half
-/// the square's side, metres.
+/// the square's side, metres, and the stem of the image.
 fn sun_picture(
     light: &Light,
     towards: Vec3,
     normal_irradiance: Spectrum,
     stem: &str,
     files: &mut Files<'_>,
-) -> Result<f32> {
+) -> Result<(f32, String)> {
     const SUB: u32 = 4;
     let half = SUN_M * furrow_optics::light::HALF_ANGLE_DEG.to_radians().tan();
     let frame = Frame::about(-towards);
@@ -169,6 +168,5 @@ fn sun_picture(
     for pixel in &mut pixels {
         *pixel *= scale;
     }
-    files.spectra(stem, SUN_SIDE, SUN_SIDE, &pixels)?;
-    Ok(half)
+    Ok((half, files.spectra(stem, (SUN_SIDE, SUN_SIDE), &pixels)?))
 }

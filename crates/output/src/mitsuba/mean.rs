@@ -63,6 +63,44 @@ pub(super) struct Cover {
     pub(super) across: Spectrum,
 }
 
+/// Averages over the directions of a scene, each computed once: thousands of leaves have the same coats and layers.
+pub(super) struct Averages<'a> {
+    pub(super) directions: &'a Directions,
+    /// By the refractive indices of the coats, and whether light crosses the leaf.
+    coats: Vec<(CoatKey, f32)>,
+    covers: Vec<([Option<SurfaceLayer>; 2], Cover)>,
+}
+
+/// Refractive indices of two coats, and whether light crosses the leaf.
+type CoatKey = ([Option<f32>; 2], bool);
+
+impl<'a> Averages<'a> {
+    pub(super) fn new(directions: &'a Directions) -> Self {
+        Self { directions, coats: Vec::new(), covers: Vec::new() }
+    }
+
+    /// Returns [`Directions::coats`].
+    pub(super) fn coats(&mut self, coats: [Option<Ggx>; 2], across: bool) -> f32 {
+        let key = (coats.map(|coat| coat.map(|coat| coat.ior)), across);
+        if let Some((_, known)) = self.coats.iter().find(|(known, _)| *known == key) {
+            return *known;
+        }
+        let mean = self.directions.coats(coats, across);
+        self.coats.push((key, mean));
+        mean
+    }
+
+    /// Returns [`Directions::cover`].
+    pub(super) fn cover(&mut self, layers: [Option<SurfaceLayer>; 2]) -> Cover {
+        if let Some((_, known)) = self.covers.iter().find(|(known, _)| *known == layers) {
+            return *known;
+        }
+        let cover = self.directions.cover(layers);
+        self.covers.push((layers, cover));
+        cover
+    }
+}
+
 impl Directions {
     /// Collects the pairs on the ground and on leaves; weights are relative.
     pub fn new(mut ground: Vec<Pair>, leaves: Vec<Crossing>) -> Self {
@@ -103,7 +141,7 @@ impl Directions {
 
     /// Returns the mean transmission of the coats that the eye and the light see, c(θ_eye) c(θ_light) of `Leaf`, over
     /// the leaves in view: for transmitted light if `across`, otherwise for reflected light. 1 if there are no leaves.
-    pub(super) fn coats(&self, coats: [Option<Ggx>; 2], across: bool) -> f32 {
+    fn coats(&self, coats: [Option<Ggx>; 2], across: bool) -> f32 {
         let norms = coats.map(|coat| coat.map_or(1.0, |coat| norm(coat.ior)));
         let through =
             |k: usize, cos: f32| coats[k].map_or(1.0, |coat| (1.0 - fresnel::dielectric(cos, coat.ior)) / norms[k]);
@@ -117,7 +155,7 @@ impl Directions {
     }
 
     /// Returns the effect of the layers on the upper and the lower side of a leaf.
-    pub(super) fn cover(&self, layers: [Option<SurfaceLayer>; 2]) -> Cover {
+    fn cover(&self, layers: [Option<SurfaceLayer>; 2]) -> Cover {
         let side = |layer: Option<SurfaceLayer>| layer.map_or((Spectrum::ONE, Spectrum::ZERO), |l| self.layer(l));
         Cover { sides: layers.map(side), across: self.across(layers) }
     }

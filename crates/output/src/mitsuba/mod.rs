@@ -34,18 +34,20 @@ mod surface;
 mod xml;
 
 use super::png::{self, ImageData};
-use super::{Export, FileSet, unheld};
+use super::{Export, unheld};
 use files::{Band, Files, Plugins, SCALE, matrix};
+use furrow_base::Result;
 use furrow_base::geometry::{AlphaMask, Mesh};
 use furrow_base::math::{Spectrum, ToInt};
-use furrow_base::{Error, Result};
 use furrow_render::film::Filter;
 use furrow_render::integrator::PathTracer;
 use furrow_render::material::Varies;
 use furrow_render::scene::{Part, Scene};
 pub use level::{Leveled, fix_levels};
 use light::Lights;
+use mean::Averages;
 pub use mean::{Crossing, Directions, Pair};
+use rayon::prelude::*;
 use scattering::ScatteringMap;
 pub use scattering::relief;
 use std::collections::hash_map::Entry;
@@ -54,6 +56,9 @@ use std::path::Path;
 use std::sync::Arc;
 use surface::Surface;
 use xml::Element;
+
+/// Number of shapes whose materials are sampled at once, on all threads; more would need more memory.
+const SAMPLED: usize = 64;
 
 /// Parts with the same material, mask and plant, which become one shape.
 struct Group {
@@ -80,7 +85,7 @@ struct Key {
 /// `directions`; `text` is stored in the files as their provenance. `scene.xml` is written last, so its presence means
 /// that the export is complete.
 pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Directions, text: &str) -> Result<Export> {
-    let mut files = Files { folder, together: FileSet::default() };
+    let mut files = Files::new(folder);
     let mut warnings = camera_warnings(scene);
     let groups = groups(scene, leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
@@ -91,29 +96,33 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     let mut masks: HashMap<usize, String> = HashMap::new();
     let mut lost = BTreeSet::new();
     let mut surfaces = Vec::with_capacity(groups.len());
-    for group in &groups {
-        let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
-        let look = ScatteringMap::of(&leveled.materials[group.material.to_usize()]);
-        let factor = Surface::corner_factor(&look, directions);
-        let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
-        let surface = match colors {
-            Some(_) => Surface::of_corners(&look, &group.name, directions, &mut files)?,
-            None => Surface::write(&look, &group.name, mask, directions, &mut files)?,
-        };
-        surface.warnings(&group.name, &mut lost);
-        files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;
-        surfaces.push(surface);
+    let mut averages = Averages::new(directions);
+    for groups in groups.chunks(SAMPLED) {
+        let look = |group: &Group| ScatteringMap::of(&leveled.materials[group.material.to_usize()]);
+        let looks: Vec<ScatteringMap> = groups.par_iter().map(look).collect();
+        for (group, look) in groups.iter().zip(&looks) {
+            let mask = group.mask.as_ref().map(|m| mask_file(m, text, &mut masks, &mut files)).transpose()?;
+            let factor = Surface::corner_factor(look, directions);
+            let colors: Option<Vec<Spectrum>> = group.colors.as_ref().map(|c| c.iter().map(|s| *s * factor).collect());
+            let surface = match colors {
+                Some(_) => Surface::of_corners(look, &group.name, directions, &mut files)?,
+                None => Surface::write(look, &group.name, mask, &mut averages, &mut files)?,
+            };
+            surface.warnings(&group.name, &mut lost);
+            files.write(&mesh_file(&group.name), &ply::encode(&group.mesh, colors.as_deref()))?;
+            surfaces.push(surface);
+        }
     }
     warnings.extend(summary(&lost));
     let notes = if warnings.is_empty() { String::new() } else { format!("\n\n{}", warnings.join("\n")) };
     let whole =
         ExportContext { scene, groups: &groups, surfaces: &surfaces, lights: &lights, notes: format!("{text}{notes}") };
-    files.write("scene-exact.xml", whole.document(Band::Color, Plugins::Own).as_bytes())?;
-    files.write("scene-nir.xml", whole.document(Band::Nir, Plugins::BuiltIn).as_bytes())?;
-    files.write("scene.xml", whole.document(Band::Color, Plugins::BuiltIn).as_bytes())?;
-    let paths = files.together.finish()?;
-    let paths =
-        paths.ok_or_else(|| Error::failed("its temporary files were removed while it was written").in_file(folder))?;
+    let documents = [
+        ("scene-exact.xml", Band::Color, Plugins::Own),
+        ("scene-nir.xml", Band::Nir, Plugins::BuiltIn),
+        ("scene.xml", Band::Color, Plugins::BuiltIn),
+    ];
+    let paths = files.finish(&documents.map(|(name, band, plugins)| (name, whole.document(band, plugins))))?;
     Ok(Export { paths, warnings, amount: None })
 }
 

@@ -21,7 +21,7 @@
 //! parameters.
 
 use super::files::{Band, Files, Plugins};
-use super::mean::{Cover, Directions};
+use super::mean::{Averages, Cover, Directions};
 use super::scattering::{Kind, ScatteringMap, Texel};
 use super::xml::Element;
 use furrow_base::math::{Spectrum, Vec3};
@@ -68,9 +68,9 @@ pub(super) struct Surface {
     through: f32,
     /// The same with hairs and bloom included, for Mitsuba's own plugins.
     covered: Option<Reflectances>,
-    /// Fraction under water divided by its weight, as an image's stem.
+    /// Fraction under water divided by its weight, as an image's path.
     film: Option<String>,
-    /// Shading normals, as an image's stem.
+    /// Shading normals, as an image's path.
     normal: Option<String>,
     /// Opacity, as an image's path.
     mask: Option<String>,
@@ -86,8 +86,7 @@ impl Reflectances {
                 Some(first) if first.max() <= 1.0 && all.iter().all(|s| s == first) => Ok(Paint::Plain(*first)),
                 _ => {
                     let stem = format!("textures/{stem}-{what}");
-                    files.spectra(&stem, look.width, look.height, &all)?;
-                    Ok(Paint::Texture(stem))
+                    Ok(Paint::Texture(files.spectra(&stem, (look.width, look.height), &all)?))
                 }
             }
         };
@@ -108,15 +107,15 @@ impl Surface {
         look: &ScatteringMap,
         stem: &str,
         mask: Option<String>,
-        mean: &Directions,
+        mean: &mut Averages<'_>,
         files: &mut Files<'_>,
     ) -> Result<Self> {
         let (factor, through) = match look.kind {
-            Kind::Soil { .. } => ([Self::corner_factor(look, mean); 2], 0.0),
+            Kind::Soil { .. } => ([Self::corner_factor(look, mean.directions); 2], 0.0),
             Kind::Sheet { coats, .. } => {
-                let side =
+                let mut side =
                     |c: Option<Ggx>| mean.coats([c; 2], false) / ((1.0 - THROUGH) * c.map_or(1.0, |_| 1.0 - COAT));
-                (coats.map(side), mean.coats(coats, true) / THROUGH)
+                (coats.map(&mut side), mean.coats(coats, true) / THROUGH)
             }
         };
         let bare = Reflectances::write(look, factor, through, stem, files)?;
@@ -133,22 +132,23 @@ impl Surface {
             }
             _ => None,
         };
+        let size = (look.width, look.height);
         let film = match look.constant(|t| t.film) {
             Some(0.0) => None,
-            _ => Some(format!("textures/{stem}-film")),
+            _ => {
+                let values: Vec<f32> = look.texels.iter().map(|t| t.film / FILM).collect();
+                Some(files.numbers(&format!("textures/{stem}-film.exr"), size, &["Y"], &values)?)
+            }
         };
-        if let Some(film) = &film {
-            let values = look.texels.iter().map(|t| t.film / FILM).collect();
-            files.numbers(&format!("{film}.exr"), look.width, look.height, &[("Y", values)])?;
-        }
-        let normal = look.has_relief().then(|| format!("textures/{stem}-normal"));
-        if let Some(normal) = &normal {
+        let normal = if look.has_relief() {
             // The vectors are not normalised, so that slopes, not directions, are interpolated linearly between texels.
             let slope = |n: Vec3, k: usize| 0.5 * n[k] / n.z.max(0.02) + 0.5;
-            let axis = |k: usize| look.texels.iter().map(|t| slope(t.normal, k)).collect::<Vec<f32>>();
-            let channels = [("R", axis(0)), ("G", axis(1)), ("B", axis(2))];
-            files.numbers(&format!("{normal}.exr"), look.width, look.height, &channels)?;
-        }
+            let axes = (0..3).flat_map(|k| look.texels.iter().map(move |t| slope(t.normal, k)));
+            let values: Vec<f32> = axes.collect();
+            Some(files.numbers(&format!("textures/{stem}-normal.exr"), size, &["R", "G", "B"], &values)?)
+        } else {
+            None
+        };
         Ok(Self { kind: look.kind, held: look.held, bare, factor, through, covered, film, normal, mask })
     }
 
@@ -162,10 +162,8 @@ impl Surface {
     ) -> Result<Self> {
         let kind = look.kind;
         let share = look.texels.first().map_or(0.0, |t| t.film);
-        let film = (share > 0.0).then(|| format!("textures/{stem}-film"));
-        if let Some(film) = &film {
-            files.numbers(&format!("{film}.exr"), 1, 1, &[("Y", vec![share / FILM])])?;
-        }
+        let write = || files.numbers(&format!("textures/{stem}-film.exr"), (1, 1), &["Y"], &[share / FILM]);
+        let film = (share > 0.0).then(write).transpose()?;
         Ok(Self {
             kind,
             held: look.held,
@@ -243,7 +241,7 @@ impl Surface {
                     // et al. 2019.
                     Some(normal) => Element::plugin("bsdf", "normalmap")
                         .boolean("use_shadowing_function", false)
-                        .inside([picture("normalmap", &format!("{normal}.exr"), "bilinear"), inner]),
+                        .inside([picture("normalmap", normal, "bilinear"), inner]),
                     None => inner,
                 }
             }
@@ -261,7 +259,7 @@ impl Surface {
         let inner = match (&self.film, film) {
             (Some(share), Some(coat)) => Element::plugin("bsdf", "blendbsdf")
                 .float("weight", FILM)
-                .inside([diffuse, gloss(coat, picture("specular_reflectance", &format!("{share}.exr"), "bilinear"))]),
+                .inside([diffuse, gloss(coat, picture("specular_reflectance", share, "bilinear"))]),
             _ => diffuse,
         };
         Element::plugin("bsdf", "twosided").inside([inner])
@@ -299,7 +297,7 @@ impl Surface {
                         .float("film_alpha", coat.alpha[0])
                         .float("film_ior", coat.ior)
                         .float("film_scale", FILM)
-                        .inside([picture("film", &format!("{share}.exr"), "bilinear")]),
+                        .inside([picture("film", share, "bilinear")]),
                     _ => soil,
                 }
             }
@@ -327,7 +325,7 @@ impl Surface {
             }
         };
         if let Some(normal) = &self.normal {
-            own = own.inside([picture("normal", &format!("{normal}.exr"), "bilinear")]);
+            own = own.inside([picture("normal", normal, "bilinear")]);
         }
         own
     }

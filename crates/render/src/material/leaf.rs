@@ -315,16 +315,33 @@ impl LeafMaterial {
     }
 
     pub(super) fn swatch(&self) -> Swatch<'_> {
-        let read = |color: Vec3| self.tone(self.optics.at(color.to_array()), true);
-        let roughness = self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt());
+        let roughness = self.roughness();
         let Some(picture) = self.picture.as_ref().filter(|_| self.pictured) else {
             let leaf = self.optics.at((self.plain() * self.tint).to_array());
             let DamagedTissue { upper, waxy, .. } = self.worn_at(leaf, Vec2::splat(0.5));
             return Swatch::plain(self.tone(upper, waxy), roughness).paler_below(self.back_paleness);
         };
-        if let Some(condition) = &self.condition {
-            return self.condition_swatch(picture, condition, roughness);
+        match &self.condition {
+            Some(condition) => self.condition_swatch(picture, condition, roughness),
+            None => self.shared_swatch(picture, roughness),
         }
+    }
+
+    /// Returns the swatch that the leaf would have without its condition, which shares the image of its species. `None`
+    /// for a leaf without a condition or without an image.
+    pub(super) fn healthy_swatch(&self) -> Option<Swatch<'_>> {
+        let picture = self.picture.as_ref().filter(|_| self.pictured && self.condition.is_some())?;
+        Some(self.shared_swatch(picture, self.roughness()))
+    }
+
+    /// GGX roughness α of the upper side's coat; 1 without a coat.
+    fn roughness(&self) -> f32 {
+        self.upper.coat().map_or(1.0, |coat| (coat.alpha[0] * coat.alpha[1]).sqrt())
+    }
+
+    /// Swatch of a healthy leaf: the image of its species, and the tint.
+    fn shared_swatch<'a>(&'a self, picture: &'a Arc<LeafTexture>, roughness: f32) -> Swatch<'a> {
+        let read = |color: Vec3| self.tone(self.optics.at(color.to_array()), true);
         let color = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b) * self.exposure;
         let texel = move |x, y| read(color(picture.color.texel(x, y)));
         let middle = self.middle();

@@ -116,6 +116,15 @@ impl Material {
         }
     }
 
+    /// Returns the swatch of a leaf with a condition as it would be without it; `None` for other materials. Its image is
+    /// that of the species.
+    pub fn healthy_swatch(&self) -> Option<Swatch<'_>> {
+        match self {
+            Self::Leaf(m) => m.healthy_swatch(),
+            Self::Ground(_) | Self::Solid(_) | Self::ModelSurface(_) | Self::Plain(_) => None,
+        }
+    }
+
     /// Returns the material in a form that other file formats can represent.
     pub fn swatch(&self) -> Swatch<'_> {
         match self {

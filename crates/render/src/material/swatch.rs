@@ -42,9 +42,11 @@ pub struct Swatch<'a> {
     pub key: [usize; 2],
     /// Width and height of the image; `None` for a uniform material.
     pub size: Option<(u32, u32)>,
-    texel: Box<dyn Fn(u32, u32) -> Tone + 'a>,
-    slope: Box<dyn Fn(u32, u32) -> Vec2 + 'a>,
-    grain: Box<dyn Fn(u32, u32) -> Grain + 'a>,
+    /// Identifies the relief: equal for materials that share it.
+    pub relief_key: usize,
+    texel: Box<dyn Fn(u32, u32) -> Tone + Send + Sync + 'a>,
+    slope: Box<dyn Fn(u32, u32) -> Vec2 + Send + Sync + 'a>,
+    grain: Box<dyn Fn(u32, u32) -> Grain + Send + Sync + 'a>,
     /// Strength of the relief: a factor on [`Swatch::slope`]; 0 for none.
     pub relief: f32,
     /// Factor on reflected R, G, B.
@@ -65,6 +67,7 @@ impl<'a> Swatch<'a> {
         Self {
             key: [0; 2],
             size: None,
+            relief_key: 0,
             texel: Box::new(move |_, _| tone),
             slope: Box::new(|_, _| Vec2::ZERO),
             grain: Box::new(|_, _| Grain { open: 1.0, film: 0.0 }),
@@ -81,12 +84,12 @@ impl<'a> Swatch<'a> {
     pub(super) fn pictured(
         key: [usize; 2],
         size: (u32, u32),
-        texel: impl Fn(u32, u32) -> Tone + 'a,
+        texel: impl Fn(u32, u32) -> Tone + Send + Sync + 'a,
         mean: Tone,
         roughness: f32,
     ) -> Self {
         let plain = Self::plain(mean, roughness);
-        Self { key, size: Some(size), texel: Box::new(texel), ..plain }
+        Self { key, size: Some(size), relief_key: key[0], texel: Box::new(texel), ..plain }
     }
 
     /// Sets the tint.
@@ -95,12 +98,12 @@ impl<'a> Swatch<'a> {
     }
 
     /// Adds a relief of `strength`.
-    pub(super) fn raised(self, slope: impl Fn(u32, u32) -> Vec2 + 'a, strength: f32) -> Self {
+    pub(super) fn raised(self, slope: impl Fn(u32, u32) -> Vec2 + Send + Sync + 'a, strength: f32) -> Self {
         Self { slope: Box::new(slope), relief: strength, ..self }
     }
 
     /// Adds sub-texel properties.
-    pub(super) fn grained(self, grain: impl Fn(u32, u32) -> Grain + 'a) -> Self {
+    pub(super) fn grained(self, grain: impl Fn(u32, u32) -> Grain + Send + Sync + 'a) -> Self {
         Self { grain: Box::new(grain), ..self }
     }
 

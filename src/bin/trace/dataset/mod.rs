@@ -10,6 +10,7 @@ pub(crate) mod render;
 mod status;
 mod verify;
 
+use crate::quality::threads;
 use clap::{Parser, Subcommand};
 use furrow_base::Result;
 use furrow_cli::cli::signal::Signals;
@@ -71,6 +72,9 @@ struct PlanArgs {
     estimate: bool,
     #[command(flatten)]
     price: cost_estimate::PriceArgs,
+    /// Number of threads; 0 for one per core. The files do not depend on it.
+    #[arg(long, default_value_t = 0, value_parser = threads)]
+    threads: usize,
 }
 
 #[derive(clap::Args)]
@@ -88,11 +92,11 @@ struct MakeArgs {
 /// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(PlanArgs { order, estimate: true, price })) => {
-            cost_estimate::run(order.images.folder(), order.order()?, 0, false, *price, signals)
+        Some(Verb::Plan(PlanArgs { order, estimate: true, price, threads })) => {
+            cost_estimate::run(order.images.folder(), order.order()?, *threads, false, *price, signals)
         }
-        Some(Verb::Plan(PlanArgs { order, estimate: false, .. })) => {
-            let set = order::run(order, false, signals)?;
+        Some(Verb::Plan(PlanArgs { order, estimate: false, threads, .. })) => {
+            let set = furrow_job::Threads::new(*threads)?.install(|| order::run(order, false, signals))?;
             order::print_plants(&set, false)?;
             Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
         }
