@@ -405,7 +405,9 @@ mod tests {
         let paths: Vec<PathBuf> = (0..50).map(|k| folder.path().join(format!("{k:02}"))).collect();
         let add = || {
             let mut files = FileSet::default();
-            paths.iter().for_each(|path| files.add_unflushed(path, path.as_os_str().as_encoded_bytes()).unwrap());
+            for path in &paths {
+                files.add_unflushed(path, path.as_os_str().as_encoded_bytes()).unwrap();
+            }
             files
         };
         let files = add();

@@ -61,7 +61,7 @@ impl<'a> Look<'a> {
 /// the images differ in more than these factors.
 fn factors(own: &Swatch<'_>, species: &Swatch<'_>, mask: Option<&AlphaMask>) -> Option<[Vec3; 2]> {
     let (size, species_size) = (own.size?, species.size?);
-    let mask_size = mask.map(AlphaMask::size).unwrap_or(species_size);
+    let mask_size = mask.map_or(species_size, AlphaMask::size);
     let texel = |(w, h): (u32, u32), i: u32, j: u32| [(i, w), (j, h)].map(|(k, n)| (2 * k + 1) * n / (2 * GRID));
     let places = (0..GRID * GRID).map(|k| (k % GRID, k / GRID)).filter(|&(i, j)| {
         let [x, y] = texel(mask_size, i, j);

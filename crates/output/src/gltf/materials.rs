@@ -207,6 +207,7 @@ struct TextureIndices {
 }
 
 /// Indices of the textures of one material.
+#[derive(Clone, Copy)]
 struct MaterialTextures {
     reflected: Option<usize>,
     transmitted: Option<usize>,

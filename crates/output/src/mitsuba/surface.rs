@@ -133,12 +133,11 @@ impl Surface {
             _ => None,
         };
         let size = (look.width, look.height);
-        let film = match look.constant(|t| t.film) {
-            Some(0.0) => None,
-            _ => {
-                let values: Vec<f32> = look.texels.iter().map(|t| t.film / FILM).collect();
-                Some(files.numbers(&format!("textures/{stem}-film.exr"), size, &["Y"], &values)?)
-            }
+        let film = if let Some(0.0) = look.constant(|t| t.film) {
+            None
+        } else {
+            let values: Vec<f32> = look.texels.iter().map(|t| t.film / FILM).collect();
+            Some(files.numbers(&format!("textures/{stem}-film.exr"), size, &["Y"], &values)?)
         };
         let normal = if look.has_relief() {
             // The vectors are not normalised, so that slopes, not directions, are interpolated linearly between texels.
