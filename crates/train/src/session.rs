@@ -62,7 +62,7 @@ pub fn fit(
     train(plan, &[], begin, None, machine, folder, callbacks)
 }
 
-/// Like [`fit`], from random or pretrained weights, for a network of the named crops: its model card lists them.
+/// Like [`fit()`], from random or pretrained weights, for a network of the named crops: its model card lists them.
 pub fn fit_crops(
     plan: &Plan,
     crops: &[String],

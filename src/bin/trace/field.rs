@@ -34,7 +34,7 @@ pub(crate) struct SceneArgs {
 /// Values that replace those of the scene file.
 #[derive(clap::Args)]
 pub(crate) struct SetArgs {
-    /// Replace or add a value of the scene file, by its path: camera.height_m=1.2, crops[0].species=maize. May be
+    /// Replace or add a value of the scene file, by its path: `camera.height_m=1.2`, `crops[0].species=maize`. May be
     /// repeated. Values are written as in the file; a text needs no quotes.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = Assignment::parse)]
     pub(crate) values: Vec<Assignment>,
