@@ -470,14 +470,14 @@ fn coco_of_others_comes_in_with_polygons_runs_and_crowds() {
         assert_eq!(sample.leaves[at(x, y)], u16::from(crop(x, y) && x >= 4), "leaf at {x},{y}");
     }
     let warned = &sample.record.warnings;
-    assert!(warned.len() == 2 && warned[0].starts_with("1 crowds") && warned[1].contains("of leaves"), "{warned:?}");
+    assert!(warned.len() == 2 && warned[0].starts_with("1 crowd ") && warned[1].contains("of leaves"), "{warned:?}");
     let manifest: Value = serde_json::from_slice(&std::fs::read(out.join("manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["warnings"].as_array().unwrap().len(), 2);
-    assert!(manifest["warnings"][0].as_str().unwrap().starts_with("1 image: 1 crowds"), "{}", manifest["warnings"]);
+    assert!(manifest["warnings"][0].as_str().unwrap().starts_with("1 image: 1 crowd "), "{}", manifest["warnings"]);
     let plants = root.join("plants");
     let (_, as_plants) = imported(&plants, &[&arguments[..], &["--crowds", "instances"]].concat());
     assert_eq!(as_plants[0].plants[at(9, 0)], 2);
-    assert!(as_plants[0].record.warnings.iter().all(|words| !words.contains("crowds")));
+    assert!(as_plants[0].record.warnings.iter().all(|words| !words.contains("crowd ")));
     let another = root.join("another");
     let words = refused(&another, &["--format", "coco", "--from", text(&file)]);
     assert!(words.contains("`maize`") && words.contains("--classes"), "{words}");

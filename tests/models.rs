@@ -140,11 +140,8 @@ fn leaves_with_conditions_share_images() {
     let file = gltf::Gltf::from_slice(&bytes).unwrap();
     let named = |what: &str| file.images().filter(|image| image.name().unwrap().starts_with(what)).count();
     let [reflected, transmitted, relief] = ["reflected", "transmitted", "relief"].map(named);
-    eprintln!(
-        "{} materials, {reflected} reflected, {transmitted} transmitted, {relief} relief",
-        file.materials().len()
-    );
-    assert!(relief <= 2, "{relief}");
+    // Of blades and stalks, in the two textures between which the plants choose.
+    assert!(relief <= 4, "{relief}");
     assert!(2 * reflected < file.materials().len() && reflected > 2, "{reflected} of {}", file.materials().len());
     assert!(transmitted <= reflected, "{transmitted}");
 
