@@ -216,7 +216,7 @@ fn the_caret_is_under_the_right_characters() {
         ("missing_comma", 3, 5, "lights"),
         ("long_line", 1, 577, "groth"),
         ("text_for_number", 2, 32, "\"0.85\""),
-        ("too_many_plants", 6, 84, "(per_m2: 1e8)"),
+        ("too_many_plants", 6, 85, "(per_m2: 1e8)"),
     ] {
         let words = message_of(Path::new(&format!("tests/bad/{name}.ron")));
         assert_eq!(pointed_at(&words), (line, column, under.to_owned()), "{words}");
