@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
 # Fuzzes one target after the other for as long as the machine has nothing else to do: bash fuzz/rotate.sh [SECONDS]
 # Each turn runs the target with the fewest CPU seconds in fuzz/hours.tsv for SECONDS (default 3600) and adds to its line. The programs
-# run in the scheduling class `idle`: they get only time that no other program wants. Ctrl-C ends it; the line of the turn is then not written.
+# run in the scheduling class `idle`, and their group of processes has the lowest priority: they get little time that another program
+# wants. Ctrl-C ends it; the line of the turn is then not written.
 set -euo pipefail
 cd "$(dirname "$0")"
 seconds=${1:-3600}
+# Without this, Linux shares the cores equally between terminals, whatever the class of their programs.
+[ ! -w /proc/self/autogroup ] || echo 19 >/proc/self/autogroup
 table=hours.tsv
 TIMEFORMAT='%U %S'
 names=$(sed -n 's/^    ("\([a-z]*\)", [a-z_]*),$/\1/p' src/targets.rs)

@@ -325,7 +325,7 @@ fn pictures_are_written_on_the_level_of_each_organ() {
 }
 
 /// Rationale: thousands of leaves of a few species would each have files of their own. Expected: images with equal
-/// content are one file, to which all materials refer.
+/// content are one file for all materials.
 #[test]
 fn equal_images_are_one_file() {
     let mut scene = large_and_small();

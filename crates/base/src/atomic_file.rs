@@ -397,8 +397,8 @@ mod tests {
         assert_eq!(names(folder.path()), ["a"]);
     }
 
-    /// Expected: files that are flushed together appear in the order in which they were added; if one of them was
-    /// cleared away, none appears.
+    /// Expected: files that are flushed together appear in the order of their addition; if one of them was cleared away,
+    /// none appears.
     #[test]
     fn files_that_are_flushed_together_appear_together() {
         let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,7 @@ pub enum ImageData<'a> {
     Linear(&'a [[u8; 3]]),
     /// 8-bit sRGB with opacity.
     Rgba(&'a [[u8; 4]]),
-    /// The same for an enlarged image, in which most rows repeat the row above. It is compressed in a third of the time.
+    /// The same for an enlarged image. Most of its rows repeat the row above, which compresses in a third of the time.
     EnlargedRgba(&'a [[u8; 4]]),
     /// 16-bit sRGB.
     Rgb16(&'a [[u16; 3]]),

@@ -68,7 +68,7 @@ fn views() -> impl TypedValueParser<Value = View> {
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
     args.field.check()?;
-    let edit = args.edit.as_deref().map_or(Ok(&FULL), Edit::named)?;
+    let edit = args.edit()?;
     let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
     if args.pixel.is_some() && options.engine == Engine::Raster {
         return Err(Error::misuse("--pixel has no effect with --engine raster, which has no rays")
@@ -139,11 +139,6 @@ pub(crate) struct Made<'a> {
 
 #[cfg(feature = "datasets")]
 impl Args {
-    /// Edit of the field.
-    pub(crate) fn edit(&self) -> Result<&'static Edit> {
-        self.edit.as_deref().map_or(Ok(&FULL), Edit::named)
-    }
-
     /// Renders the image of a scene file without writing it, and returns what `then` makes of it. `progress` gets the fraction
     /// of the samples that is done, `warn` the warnings.
     pub(crate) fn image<T>(
@@ -182,6 +177,11 @@ fn samples(quality: &Quality, window: Window) -> u64 {
 }
 
 impl Args {
+    /// Edit of the field.
+    pub(crate) fn edit(&self) -> Result<&'static Edit> {
+        self.edit.as_deref().map_or(Ok(&FULL), Edit::named)
+    }
+
     fn say(&self, text: &str) {
         if !self.quiet {
             furrow_cli::message!("{text}");

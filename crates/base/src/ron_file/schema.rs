@@ -57,8 +57,7 @@ pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
     }
 }
 
-/// Returns the schema at the end of a path, or that of the number in which it ends; else the number of names on the path
-/// that exist.
+/// Returns the schema at the end of a path, or of the number there; otherwise the number of names on the path that exist.
 fn at_end<'a>(root: &'a Value, path: &[&str]) -> Result<&'a Value, usize> {
     let mut at = resolved(root, root);
     for (k, step) in path.iter().enumerate() {

@@ -21,6 +21,7 @@ use furrow_base::error::Kind;
 use furrow_base::math::ToInt;
 use furrow_base::ron_file::Assignment;
 use furrow_base::{Error, Result};
+use furrow_field::Field;
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::BuildProgress;
 use furrow_job::{Renderer, SceneFile};
@@ -182,25 +183,13 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
         made: ImageOrigin::Rendered(Box::new(Rendering {
             scene,
             scene_sha256,
-            seed: field.seed,
-            captures: source.captures(),
-            days: source.seen_days().to_vec(),
-            width: camera.width(),
-            height: camera.height(),
-            engine: options.engine,
-            spp: options.quality.spp,
-            denoise: options.quality.denoise,
-            without: options.techniques.left_out().to_vec(),
-            max_depth: options.techniques.max_depth,
-            clamp: options.techniques.clamp,
             parts: order.labelling.classes.as_ref().is_some_and(Classes::needs_parts),
-            models: field.models.clone(),
             keep,
             omit: optional_maps::in_order(order.omit.clone().unwrap_or_default()),
             labels_only: order.labels_only,
             photo: Some(order.photo),
-            kernels,
             edit: order.edit.label(),
+            ..rendering(&source, field, &options, &kernels)
         })),
         count: order.count,
         split: order.split,
@@ -218,6 +207,33 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     all_warnings.extend(rolling(&recipe, camera)?);
     let scene_sha256 = field.hash.clone();
     Ok(Draft { recipe, files, warnings: all_warnings, scene: source, scene_sha256 })
+}
+
+/// Returns the parameters of images of a scene file: PNG files with the usual maps. `field` is any of its fields.
+pub(crate) fn rendering(source: &SceneFile, field: &Field, options: &RenderOptions, kernels: &str) -> Rendering {
+    Rendering {
+        scene: String::new(),
+        scene_sha256: field.hash.clone(),
+        seed: field.seed,
+        captures: source.captures(),
+        days: source.seen_days().to_vec(),
+        width: field.scene.camera.width(),
+        height: field.scene.camera.height(),
+        engine: options.engine,
+        spp: options.quality.spp,
+        denoise: options.quality.denoise,
+        without: options.techniques.left_out().to_vec(),
+        max_depth: options.techniques.max_depth,
+        clamp: options.techniques.clamp,
+        parts: false,
+        models: field.models.clone(),
+        keep: OptionalMap::USUAL.to_vec(),
+        omit: Vec::new(),
+        labels_only: false,
+        photo: Some(Photo::Png),
+        kernels: kernels.to_owned(),
+        edit: None,
+    }
 }
 
 /// Returns the maps to store for images without rendering (`labels_only`). Returns an error for options that need

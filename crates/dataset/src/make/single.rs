@@ -1,8 +1,7 @@
 //! Describes an image that was rendered on its own, as the dataset of its scene file would.
 
+use crate::make::plan::rendering;
 use crate::make::render::describe;
-use crate::model::optional_maps::OptionalMap;
-use crate::model::photo::Photo;
 use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::sample::Sample;
 use crate::model::split::Shares;
@@ -15,34 +14,13 @@ use furrow_job::{Image, Renderer, SceneFile};
 pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Result<Sample> {
     let field = image.field().grown();
     let options = renderer.options();
-    let days = scene.seen_days().to_vec();
+    let days = scene.seen_days();
     let captures = scene.captures();
     let day = field.day.and_then(|day| days.iter().position(|other| *other == day)).unwrap_or_default();
     let a_day = captures / days.len().max(1).to_u64();
     let index = field.index * captures + day.to_u64() * a_day + field.capture.to_u64();
-    let rendering = Rendering {
-        scene: String::new(),
-        scene_sha256: field.hash.clone(),
-        seed: field.seed,
-        captures,
-        days,
-        width: field.scene.camera.width(),
-        height: field.scene.camera.height(),
-        engine: options.engine,
-        spp: options.quality.spp,
-        denoise: options.quality.denoise,
-        without: options.techniques.left_out().to_vec(),
-        max_depth: options.techniques.max_depth,
-        clamp: options.techniques.clamp,
-        parts: false,
-        models: field.models.clone(),
-        keep: OptionalMap::USUAL.to_vec(),
-        omit: Vec::new(),
-        labels_only: false,
-        photo: Some(Photo::Png),
-        kernels: renderer.kernels().to_owned(),
-        edit: image.field().edit().label(),
-    };
+    let rendering =
+        Rendering { edit: image.field().edit().label(), ..rendering(scene, field, options, renderer.kernels()) };
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: ImageOrigin::Rendered(Box::new(rendering)),

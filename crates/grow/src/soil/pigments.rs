@@ -1,7 +1,8 @@
 //! Variation of the soil's colour over a ground: iron oxides, humus, lime and algae.
 //!
 //! Iron and humus vary from the largest patches down to a centimetre, and from aggregate to aggregate. Their amounts are
-//! log-normal, as most contents of soil are (Ahrens 1954, Geochim. Cosmochim. Acta 5:49): rich places are rare and strong. Lime and salts are left where water evaporates, at the rims of moist patches. Algae grow in moist ones.
+//! log-normal, as most contents of soil are (Ahrens 1954, Geochim. Cosmochim. Acta 5:49): rich places are rare and
+//! strong. Lime and salts are left where water evaporates, at the rims of moist patches. Algae grow in moist ones.
 
 use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec2, smoothstep};
 use furrow_base::ron_file::{Fraction, NonNegative, Num, Positive, Vary};
@@ -20,7 +21,7 @@ const FINEST_M: f32 = 0.008;
 const LOG_SD: f32 = 0.35;
 /// Limit of the noise, standard deviations.
 const MOST: f32 = 2.5;
-/// Moisture at which lime is deposited, in standard deviations of the moisture below its mean, and the width of the rim.
+/// Distance of the lime's maximum below the mean moisture, and width of its rim, in standard deviations of the moisture.
 const RIM: (f32, f32) = (0.6, 0.5);
 /// Noise of the algae's patches where they start and where they are complete, standard deviations.
 const GROWN: (f32, f32) = (0.3, 1.6);
@@ -76,6 +77,8 @@ pub(super) struct Pigments {
     mixing: f32,
     patch_m: f32,
     octaves: u32,
+    /// Standard deviation of the sum of all octaves.
+    sd: f32,
     noise: [Perlin; 3],
 }
 
@@ -83,6 +86,9 @@ impl Pigments {
     pub(super) fn new(desc: &PigmentsDesc, stream: &Stream) -> Self {
         let child = |k: u64| stream.child(Purpose::Soil, 50 + k);
         let patch_m = desc.patch_m.draw32(&mut child(4));
+        let octaves = 1 + (patch_m / FINEST_M).log2().clamp(0.0, 12.0).trunc_to::<u32>();
+        let squares = (1.0 - GAIN.powi(2).powf(octaves.to_f32())) / (1.0 - GAIN.powi(2));
+        let sum = (1.0 - GAIN.powf(octaves.to_f32())) / (1.0 - GAIN);
         Self {
             amounts: SoilTint {
                 iron: desc.iron.draw32(&mut child(0)),
@@ -93,19 +99,21 @@ impl Pigments {
             aggregates: desc.aggregates.f32(),
             mixing: desc.mixing.f32(),
             patch_m,
-            octaves: 1 + (patch_m / FINEST_M).log2().clamp(0.0, 12.0).trunc_to::<u32>(),
+            octaves,
+            sd: OCTAVE_SD * squares.sqrt() / sum,
             noise: [5, 6, 7].map(|k| Perlin::new(child(k).seed32())),
         }
     }
 
-    /// Returns noise with mean 0 and standard deviation 1 at a point: of iron, humus or algae, for `k` 0 to 2.
+    /// Returns noise with mean 0 and standard deviation 1 at a point: of iron, humus or algae, for `k` 0 to 2. Ground
+    /// without algae has none for them.
     pub(super) fn noise(&self, k: usize, p: Vec2) -> f32 {
+        if k == 2 && self.amounts.algae == 0.0 {
+            return 0.0;
+        }
         let q = p / self.patch_m + 0.5;
-        let squares = (1.0 - GAIN.powi(2).powf(self.octaves.to_f32())) / (1.0 - GAIN.powi(2));
-        let sum = (1.0 - GAIN.powf(self.octaves.to_f32())) / (1.0 - GAIN);
-        let sd = OCTAVE_SD * squares.sqrt() / sum;
         let noise = self.noise[k].fbm2(f64::from(q.x), f64::from(q.y), self.octaves, f64::from(GAIN));
-        (noise.to_f32() / sd).clamp(-MOST, MOST)
+        (noise.to_f32() / self.sd).clamp(-MOST, MOST)
     }
 
     /// Returns the factors on the reflectance of a place, from its noise of iron, humus and algae and from its moisture, in

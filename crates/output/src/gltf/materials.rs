@@ -1,8 +1,8 @@
 //! Conversion of materials and masks to glTF materials, textures and images; each image is written once.
 
-use super::look::Look;
+use super::image_choice::ImageChoice;
+use super::images::{self, Colors, SharedColors};
 use super::pack::Pack;
-use super::pictures::{self, Colors, SharedColors};
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::{ToInt, Vec3};
@@ -32,7 +32,7 @@ const FILTERED: usize = 1;
 pub(super) struct Materials<'a> {
     scene: &'a Scene,
     /// Material, tint and mask of each glTF material.
-    worn: Vec<MaterialVariant<'a>>,
+    used: Vec<MaterialVariant<'a>>,
     known: BTreeMap<(u32, [u32; 3], usize), usize>,
 }
 
@@ -45,98 +45,106 @@ fn address(mask: Option<&Arc<AlphaMask>>) -> usize {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
-        Self { scene, worn: Vec::new(), known: BTreeMap::new() }
+        Self { scene, used: Vec::new(), known: BTreeMap::new() }
     }
 
     /// Returns the index of a part's glTF material.
-    pub(super) fn wear(&mut self, part: &'a Part) -> usize {
-        let (worn, tint, mask) = (&mut self.worn, part.tint(), part.mask.as_ref());
+    pub(super) fn add(&mut self, part: &'a Part) -> usize {
+        let (used, tint, mask) = (&mut self.used, part.tint(), part.mask.as_ref());
         let key = (part.material, tint.to_array().map(f32::to_bits), address(mask));
         *self.known.entry(key).or_insert_with(|| {
-            worn.push((part.material, tint, mask));
-            worn.len() - 1
+            used.push((part.material, tint, mask));
+            used.len() - 1
         })
     }
 
     /// Returns the images of all materials in use.
-    fn looks(&self) -> BTreeMap<u32, Look<'a>> {
+    fn choices(&self) -> BTreeMap<u32, ImageChoice<'a>> {
         let mut masks: BTreeMap<u32, Option<&'a Arc<AlphaMask>>> = BTreeMap::new();
         let mut users: BTreeMap<usize, BTreeSet<u32>> = BTreeMap::new();
-        for (material, _, mask) in &self.worn {
+        for (material, _, mask) in &self.used {
             masks.entry(*material).or_insert(*mask);
             users.entry(address(*mask)).or_default().insert(*material);
         }
-        let look = |(material, mask): (u32, Option<&'a Arc<AlphaMask>>)| {
+        let choice = |(material, mask): (u32, Option<&'a Arc<AlphaMask>>)| {
             let of = &self.scene.materials[material.to_usize()];
             // Opacity and colour are one image, so a leaf with a mask of its own has no image to share.
-            let look = if users[&address(mask)].len() > 1 { Look::of(of, mask.map(|m| &**m)) } else { Look::own(of) };
-            (material, look)
+            let choice = if users[&address(mask)].len() > 1 {
+                ImageChoice::of(of, mask.map(|m| &**m))
+            } else {
+                ImageChoice::own(of)
+            };
+            (material, choice)
         };
-        masks.into_par_iter().map(look).collect()
+        masks.into_par_iter().map(choice).collect()
     }
 
     /// Writes materials, textures, samplers and images.
     pub(super) fn write(&self, document: &mut Document, pack: &mut Pack) -> Result<()> {
-        let looks = self.looks();
-        let shared = self.shared(&looks);
+        let choices = self.choices();
+        let shared = self.shared(&choices);
         // Masks are sampled without filtering, as in this renderer.
         document.samplers = vec![sampler(NEAREST, NEAREST), sampler(LINEAR, LINEAR_MIPMAP_LINEAR)];
-        let textures = self.draw(&looks, &shared, &mut Textures { document, pack })?;
-        for (i, (material, tint, mask)) in self.worn.iter().enumerate() {
-            let (look, dye) = (&looks[material], self.dye(&looks, *material, *tint));
-            let key = color_key(&look.swatch, i);
+        let textures = self.draw(&choices, &shared, &mut Textures { document, pack })?;
+        for (i, (material, tint, mask)) in self.used.iter().enumerate() {
+            let (choice, dye) = (&choices[material], self.dye(&choices, *material, *tint));
+            let key = color_key(&choice.swatch, i);
             let own = MaterialTextures {
-                reflected: textures.reflected.get(&reflected_key(&look.swatch, *mask)).copied(),
+                reflected: textures.reflected.get(&reflected_key(&choice.swatch, *mask)).copied(),
                 transmitted: textures.transmitted.get(&key).copied(),
-                relief: textures.relief.get(&look.relief().relief_key).copied().filter(|_| look.swatch.relief > 0.0),
+                relief: textures
+                    .relief
+                    .get(&choice.relief().relief_key)
+                    .copied()
+                    .filter(|_| choice.swatch.relief > 0.0),
             };
-            document.materials.push(shared[&key].material(&look.swatch, dye, own, mask.is_some(), i));
+            document.materials.push(shared[&key].material(&choice.swatch, dye, own, mask.is_some(), i));
         }
         Ok(())
     }
 
-    fn dye(&self, looks: &BTreeMap<u32, Look<'a>>, material: u32, tint: Vec3) -> Dye {
-        looks[&material].swatch.dyed(self.scene.materials[material.to_usize()].tint_factors(tint))
+    fn dye(&self, choices: &BTreeMap<u32, ImageChoice<'a>>, material: u32, tint: Vec3) -> Dye {
+        choices[&material].swatch.dyed(self.scene.materials[material.to_usize()].tint_factors(tint))
     }
 
     /// Collects the images of colours with the tints of all their users.
-    fn shared<'b>(&self, looks: &'b BTreeMap<u32, Look<'a>>) -> BTreeMap<ColorKey, SharedColors<'b>> {
+    fn shared<'b>(&self, choices: &'b BTreeMap<u32, ImageChoice<'a>>) -> BTreeMap<ColorKey, SharedColors<'b>> {
         let mut shared: BTreeMap<ColorKey, SharedColors<'b>> = BTreeMap::new();
-        for (i, (material, tint, _)) in self.worn.iter().enumerate() {
-            let (look, dye) = (&looks[material], self.dye(looks, *material, *tint));
-            let key = color_key(&look.swatch, i);
-            shared.entry(key).or_insert_with(|| SharedColors::new(&look.swatch)).wear(dye);
+        for (i, (material, tint, _)) in self.used.iter().enumerate() {
+            let (choice, dye) = (&choices[material], self.dye(choices, *material, *tint));
+            let key = color_key(&choice.swatch, i);
+            shared.entry(key).or_insert_with(|| SharedColors::new(&choice.swatch)).add_user(dye);
         }
         shared
     }
 
-    /// Computes all images and adds them to the document, in the order in which materials use them: addresses differ
-    /// from run to run, and files must not.
+    /// Computes all images and adds them to the document in the order of the materials, not of addresses, which differ
+    /// from run to run.
     fn draw<'b>(
         &self,
-        looks: &'b BTreeMap<u32, Look<'a>>,
+        choices: &'b BTreeMap<u32, ImageChoice<'a>>,
         shared: &BTreeMap<ColorKey, SharedColors<'b>>,
         textures: &mut Textures<'_>,
     ) -> Result<TextureIndices> {
         let mut colors: Ordered<ColorKey, &SharedColors<'b>> = Ordered::default();
         let mut reflected: Ordered<ReflectedKey, (ColorKey, Option<&AlphaMask>)> = Ordered::default();
         let mut reliefs: Ordered<usize, &Swatch<'a>> = Ordered::default();
-        for (i, (material, _, mask)) in self.worn.iter().enumerate() {
-            let look = &looks[material];
-            let key = color_key(&look.swatch, i);
+        for (i, (material, _, mask)) in self.used.iter().enumerate() {
+            let choice = &choices[material];
+            let key = color_key(&choice.swatch, i);
             colors.add(key, || &shared[&key]);
-            reflected.add(reflected_key(&look.swatch, *mask), || (key, mask.map(|m| &**m)));
-            if look.swatch.relief > 0.0 {
-                reliefs.add(look.relief().relief_key, || look.relief());
+            reflected.add(reflected_key(&choice.swatch, *mask), || (key, mask.map(|m| &**m)));
+            if choice.swatch.relief > 0.0 {
+                reliefs.add(choice.relief().relief_key, || choice.relief());
             }
         }
         let drawn: Vec<Option<Colors>> = colors.items.par_iter().map(|(_, of)| of.draw()).collect::<Result<_>>()?;
         let encode = |(_, (key, mask)): &(ReflectedKey, (ColorKey, Option<&AlphaMask>))| {
-            pictures::reflected(drawn[colors.places[key]].as_ref(), *mask)
+            images::reflected(drawn[colors.places[key]].as_ref(), *mask)
         };
         let encoded: Vec<Option<Vec<u8>>> = reflected.items.par_iter().map(encode).collect::<Result<_>>()?;
         let normals: Vec<Option<Vec<u8>>> =
-            reliefs.items.par_iter().map(|(_, swatch)| pictures::relief(swatch)).collect::<Result<_>>()?;
+            reliefs.items.par_iter().map(|(_, swatch)| images::relief(swatch)).collect::<Result<_>>()?;
         let mut indices = TextureIndices::default();
         for ((key, (_, mask)), bytes) in reflected.items.into_iter().zip(encoded) {
             let sampler = if mask.is_some() { UNFILTERED } else { FILTERED };
@@ -153,7 +161,7 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Distinct items in the order in which they were added.
+/// Distinct items in the order of their addition.
 struct Ordered<K, V> {
     items: Vec<(K, V)>,
     places: BTreeMap<K, usize>,

@@ -17,10 +17,10 @@
 //! The document is built here, because the crate `gltf` reads documents but does not write them (tests read these with
 //! it).
 
-mod look;
+mod image_choice;
+mod images;
 mod materials;
 mod pack;
-mod pictures;
 mod skins;
 
 use super::{Export, unheld, write_atomically};
@@ -65,7 +65,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     let mut skins = Skins::new(plants);
     // Children of the root node.
     let mut top = Vec::new();
-    let mut looks = Materials::new(scene);
+    let mut materials = Materials::new(scene);
     let mut document = Document {
         asset: Asset {
             version: "2.0".into(),
@@ -80,7 +80,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     };
     // Parts without triangles are omitted.
     for part in scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
-        let material = looks.wear(part);
+        let material = materials.add(part);
         document.meshes.push(mesh(part, material, &mut pack));
         let mesh = document.meshes.len() - 1;
         let extras = document.meshes[mesh].extras.clone();
@@ -95,7 +95,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     let lights = lights(scene, &mut document.nodes);
     top.extend(others..document.nodes.len());
     document.nodes[0].children = top;
-    looks.write(&mut document, &mut pack)?;
+    materials.write(&mut document, &mut pack)?;
     if !lights.is_empty() {
         document.extensions.insert(LIGHTS.into(), json!({ "lights": lights }));
         document.extensions_used.push(LIGHTS.into());

@@ -20,7 +20,7 @@ pub(super) struct Pack {
     weights: Vec<u8>,
     /// Inverse bind matrices, 64 bytes each.
     matrices: Vec<u8>,
-    pictures: Vec<Vec<u8>>,
+    images: Vec<Vec<u8>>,
     accessors: Vec<Accessor>,
 }
 
@@ -114,9 +114,9 @@ impl Pack {
 
     /// Adds an image and returns the index of its buffer view. After the first image, only images may be added.
     pub(super) fn picture(&mut self, bytes: Vec<u8>) -> usize {
-        self.pictures.push(bytes);
+        self.images.push(bytes);
         let first = if self.matrices.is_empty() { JOINTS } else { MATRICES + 1 };
-        first + self.pictures.len() - 1
+        first + self.images.len() - 1
     }
 
     /// Adds the buffer views and accessors to the document, and returns the buffer.
@@ -131,8 +131,8 @@ impl Pack {
         let skinned = !self.matrices.is_empty();
         let skins = [(self.joints, vertices(8)), (self.weights, vertices(16)), (self.matrices, (None, None))];
         let skins = skins.into_iter().filter(|_| skinned);
-        let pictures = self.pictures.into_iter().map(|p| (p, (None, None)));
-        for (bytes, (byte_stride, target)) in spans.into_iter().chain(skins).chain(pictures) {
+        let images = self.images.into_iter().map(|p| (p, (None, None)));
+        for (bytes, (byte_stride, target)) in spans.into_iter().chain(skins).chain(images) {
             document.buffer_views.push(BufferView {
                 buffer: 0,
                 byte_offset: buffer.len(),

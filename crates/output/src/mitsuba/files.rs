@@ -65,7 +65,7 @@ pub(super) struct Files<'a> {
     values: usize,
 }
 
-/// Content of an image, by which equal ones are found.
+/// Content of an image; equal images are written once.
 #[derive(PartialEq, Eq, Hash)]
 struct Content {
     width: u32,

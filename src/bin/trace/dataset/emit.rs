@@ -24,7 +24,7 @@ pub(crate) struct Args {
     /// kubernetes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     max_running: Option<u64>,
-    /// Address to which Slurm sends mail when a shard fails and when the last job ends; for slurm.
+    /// Recipient of Slurm's mail about failed shards and the end of the last job; for slurm.
     #[arg(long, value_name = "ADDRESS")]
     mail: Option<String>,
     /// Run this shell command if images are missing or faulty at the end, with the dataset's folder in FURROW_DATASET

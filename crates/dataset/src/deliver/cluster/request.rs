@@ -49,10 +49,10 @@ impl Pod {
     }
 }
 
-/// Whom a job tells that it has failed or ended.
+/// Notifications about failures and the end of a job.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Alerts {
-    /// Address to which Slurm sends mail when a shard fails and when the finishing job ends.
+    /// Recipient of Slurm's mail about failed shards and the end of the finishing job.
     pub mail: Option<String>,
     /// Shell command that the finishing job runs if images are missing or faulty, with the dataset's folder in
     /// `FURROW_DATASET` and the exit code in `FURROW_CODE`.

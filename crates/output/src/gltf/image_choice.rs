@@ -25,14 +25,14 @@ const LARGEST_FACTOR: f32 = 2.0;
 const BLACK: f32 = 1e-3;
 
 /// Images of a material.
-pub(super) struct Look<'a> {
+pub(super) struct ImageChoice<'a> {
     /// Colours: the swatch of the material, or that of its species with the factor of this leaf as tint.
     pub(super) swatch: Swatch<'a>,
     /// Relief, if it is not that of `swatch`: a leaf with colours of its own shares the relief of its species.
     relief: Option<Swatch<'a>>,
 }
 
-impl<'a> Look<'a> {
+impl<'a> ImageChoice<'a> {
     /// Returns the images of a material, shared with other leaves of its species if they are similar enough; texels
     /// outside `mask` do not count.
     pub(super) fn of(material: &'a Material, mask: Option<&AlphaMask>) -> Self {

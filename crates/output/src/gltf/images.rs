@@ -1,6 +1,6 @@
 //! Images of a glTF document: each is computed and encoded once, on all threads, however many materials share it.
 
-use super::look::transmission_share;
+use super::image_choice::transmission_share;
 use crate::png::{self, ImageData};
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
@@ -43,7 +43,7 @@ impl<'a> SharedColors<'a> {
     }
 
     /// Adds a user.
-    pub(super) fn wear(&mut self, dye: Dye) {
+    pub(super) fn add_user(&mut self, dye: Dye) {
         let Factors { reflected, transmitted, .. } = self.unlifted(dye);
         self.lift = self.lift.max(reflected);
         self.lift_transmitted = self.lift_transmitted.max(transmitted);
