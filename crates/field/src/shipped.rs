@@ -22,9 +22,9 @@ impl Shipped {
         self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// Returns the names that identify the species: file name without `.ron`, EPPO code, English name, scientific name, and its names
-    /// in other languages.
-    fn names(&self) -> Vec<String> {
+    /// Returns the names that identify the species: file name without `.ron`, EPPO code, English name, scientific name,
+    /// and its names in other languages.
+    pub fn names(&self) -> Vec<String> {
         let SpeciesDesc { name, scientific, eppo, .. } = &self.desc;
         let own = [self.stem(), eppo.clone(), name.clone(), scientific.clone()];
         own.into_iter().chain(aliases::of(&self.stem()).iter().map(|name| (*name).to_owned())).collect()
@@ -53,8 +53,9 @@ pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
 }
 
 /// Finds the file of the species with this name: `cirsium`, `cirsium.ron`, `CIRAR`, `creeping thistle`, `Cirsium arvense`, or a
-/// word that occurs in the English name of no other species, `thistle`; or by a name in another language, `Ackerkratzdistel`. Returns `None` if `name` is the name of some other file,
-/// and an error if it is not a file name and no species has that name.
+/// word that occurs in the English name of no other species, `thistle`; or by a name in another language,
+/// `Ackerkratzdistel`. Returns `None` if `name` is the name of some other file, and an error if it is not a file name and
+/// no species has that name.
 pub fn species(name: &str) -> Result<Option<PathBuf>> {
     let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
     let called = |file: &&PathBuf| {

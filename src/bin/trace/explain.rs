@@ -1,10 +1,13 @@
 //! `trace explain`: reference of the fields of scene files, species files and texture recipes.
 
 use furrow_base::input::shipped;
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::RonFile;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
-use furrow_cli::reference::{answer, distribution, scene, search, species, texture};
+use furrow_cli::reference::{Reference, answer, distribution, scene, search, species, texture};
+use furrow_field::shipped::all_species;
+use furrow_report::count;
 use std::path::PathBuf;
 
 /// The path to explain.
@@ -14,8 +17,8 @@ pub(crate) struct Args {
     /// distribution. Default: the tree of all paths.
     #[arg(value_name = "PATH", conflicts_with = "search")]
     path: Option<String>,
-    /// List the fields, shipped scene files and soil textures whose name or description contains this word, or a word
-    /// for the same: cracks, tilt, insects.
+    /// List the fields, species, shipped scene files and soil textures whose name or description contains this word, or a
+    /// word for the same: cracks, tilt, corn.
     #[arg(long, value_name = "WORD")]
     search: Option<String>,
 }
@@ -30,18 +33,30 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         }
         cli::print_rows(&found.into_iter().map(<[String; 2]>::from).collect::<Vec<_>>())?;
     } else {
-        cli::print(&answer(args.path.as_deref().unwrap_or_default(), &references, "trace")?)?;
+        let path = args.path.as_deref().unwrap_or_default();
+        cli::print(&answer(path, &references, "trace").or_else(|error| Err(advised(error, path, &references)?))?)?;
     }
     Ok(Vec::new())
 }
 
-/// Returns the shipped scene files with their first comments, and the soil textures.
+/// Adds to the error about a word that is not a path the entries that the word finds.
+fn advised(error: Error, word: &str, references: &[Reference]) -> Result<Error> {
+    let found = search(word, references, &shipped_files()?);
+    let Some((first, _)) = found.first() else { return Ok(error) };
+    let entries = count(found.len().to_u64(), "entry", "entries");
+    Ok(error.help(format!("`trace explain --search {word}` finds {entries}, first: {first}")))
+}
+
+/// Returns the shipped scene files with their first comments, the species with all their names, and the soil textures.
 fn shipped_files() -> Result<Vec<(String, String)>> {
     let mut all = Vec::new();
     for name in shipped::scene_names()? {
         let text = RonFile::read(&shipped::scene_file(name.clone().into())).map(|page| page.text).unwrap_or_default();
         let comment = text.lines().map_while(|line| line.strip_prefix("//")).collect::<String>();
         all.push((format!("trace --scene {name}"), comment.trim().to_owned()));
+    }
+    for species in all_species()?.0 {
+        all.push((format!("species: {:?}", species.stem()), species.names().join(", ")));
     }
     let soils = shipped::soil_textures()?;
     all.extend(soils.iter().map(|file| (file.display().to_string(), "soil texture".to_owned())));

@@ -47,10 +47,15 @@ pub fn search(word: &str, references: &[Reference], others: &[(String, String)])
     for (name, about) in entries.chain(others.iter().cloned()) {
         let last = name.rsplit('.').next().unwrap_or(&name).to_lowercase();
         let (low, text) = (name.to_lowercase(), about.to_lowercase());
+        // Whole words come before parts of others: `corn` before `corner`.
+        let is_typed = |of: &str| of == wanted || of == stem || of.strip_suffix('s') == Some(stem);
+        let typed = |of: &str| of.split(|c: char| !c.is_alphanumeric()).any(is_typed);
         let rank = words.iter().enumerate().filter_map(|(k, word)| match () {
-            () if last.contains(word) => Some(k.min(1)),
-            () if low.contains(word) => Some(3),
-            () if text.contains(word) => Some(2),
+            () if k == 0 && typed(&last) => Some(0),
+            () if k == 0 && typed(&text) => Some(1),
+            () if last.contains(word) => Some(2 + k.min(1)),
+            () if text.contains(word) => Some(4),
+            () if low.contains(word) => Some(5),
             () => None,
         });
         if let Some(rank) = rank.min() {
@@ -75,7 +80,10 @@ mod tests {
     #[test]
     fn words_that_people_use_lead_to_fields() {
         let of = [scene(), species()];
-        let others = [("textures/soil/cracked.png".to_owned(), "a crust with cracks".to_owned())];
+        let others = [
+            ("textures/soil/cracked.png".to_owned(), "a crust with cracks".to_owned()),
+            ("species: \"maize\"".to_owned(), "maize, corn, Mais".to_owned()),
+        ];
         for (word, path) in [
             ("moisture", "soil.moisture"),
             ("Cracks", "textures/soil/cracked.png"),
@@ -87,6 +95,7 @@ mod tests {
             assert!(found.iter().any(|(name, _)| name == path), "{word}: {found:?}");
         }
         assert_eq!(search("moisture", &of, &[])[0].0, "soil.moisture");
+        assert_eq!(search("corn", &of, &others)[0].0, "species: \"maize\"");
         assert!(search("xyzzy", &of, &others).is_empty());
     }
 }
