@@ -83,7 +83,8 @@ fn an_installed_wheel_needs_nothing_else() {
     let soils = done(&mut run(&["soils"]));
     let albedo = soils.lines().find(|line| line.contains("dirt.png")).expect("a soil");
     assert!(albedo.contains(venv.to_str().expect("a path")), "{soils}");
-    let site = done(Command::new(venv.join("bin/python")).args(["-c", "import furrow; print(furrow.__path__[0])"]));
+    let place = ["-c", "import furrow; print(furrow.__path__[0])"];
+    let site = done(Command::new(venv.join("bin/python")).args(place).env_remove("PYTHONPATH"));
     let site = Path::new(site.trim()).parent().expect("a folder");
     let libraries = done(Command::new("ldd").arg(site.join("furrow.scripts/trace")));
     for library in ["libembree", "libtbb"] {
