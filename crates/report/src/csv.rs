@@ -26,7 +26,8 @@ pub fn csv<S: AsRef<str>>(heads: &[S], rows: impl IntoIterator<Item = Vec<String
     for row in rows {
         out.write_record(&row).expect("a row has one field per header");
     }
-    String::from_utf8(out.into_inner().expect("writing to memory cannot fail")).expect("fields are text")
+    String::from_utf8(out.into_inner().expect("writing to memory cannot fail"))
+        .expect("fields are strings, so their bytes are UTF-8")
 }
 
 #[cfg(test)]

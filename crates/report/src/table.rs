@@ -161,7 +161,7 @@ impl Table {
 
     /// `{"title": …, "columns": […], "rows": [[…], …]}`.
     pub fn json(&self) -> String {
-        serde_json::to_string_pretty(self).expect("words and numbers") + "\n"
+        serde_json::to_string_pretty(self).expect("cells are text and numbers, which JSON can represent") + "\n"
     }
 }
 

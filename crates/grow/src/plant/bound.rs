@@ -2,9 +2,9 @@
 //! single plants before a scene is built, such as the cost estimate, from huge species files.
 
 use super::PlantDesc;
-use super::flower::desc::FlowerDesc;
-use super::inflorescence::check::axes;
-use super::inflorescence::desc::InflorescenceDesc;
+use super::flower_desc::FlowerDesc;
+use super::inflorescence_check::axes;
+use super::inflorescence_desc::InflorescenceDesc;
 use super::kind::{LeafKind, Shape};
 use super::stage::StageDesc;
 

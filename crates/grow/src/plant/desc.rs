@@ -1,7 +1,7 @@
 //! Description of a species' plant in the species file, and the stage of one plant.
 
-use super::flower::desc::FlowerDesc;
-use super::inflorescence::check;
+use super::flower_desc::FlowerDesc;
+use super::inflorescence_check;
 use super::kind::LeafKind;
 use super::stage::{MOST_SHOOTS, StageDesc, Tilt};
 use super::twine::TwineDesc;
@@ -267,7 +267,8 @@ impl PlantDesc {
                 .check()
                 .map_err(|(message, help)| (vec![Field("flowers")], format!("\"{name}\": {message}"), help))?;
         }
-        (0..self.stages.len()).try_for_each(|i| check::stage((&self.flowers, &self.kinds), &self.stages, i))?;
+        (0..self.stages.len())
+            .try_for_each(|i| inflorescence_check::stage((&self.flowers, &self.kinds), &self.stages, i))?;
         let days: Vec<f64> = self.cover_days.values().map(|d| d.get()).collect();
         if days.windows(2).any(|pair| pair[1] <= pair[0]) {
             let message = "a higher BBCH code must have a later day of ground cover".into();

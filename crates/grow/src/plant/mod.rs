@@ -19,6 +19,8 @@
 //! | `leaflets`, `ribbons`, `fern` | compound and divided blades |
 //! | `flower` | flowers, heads, ears, tassels, pods, berries |
 //! | `inflorescence` | flowering axes and the seats that they grow from |
+//! | `flower_desc`, `inflorescence_desc` | flowers and flowering axes, as written in a species file |
+//! | `inflorescence_check` | consistency checks of flowering axes; maximum numbers of axes |
 //! | `stipules` | stipules at the base of a petiole |
 //! | `spines` | spines on a blade's margin |
 //! | `twine` | twining shoots |
@@ -40,8 +42,11 @@ mod dissected;
 mod erect;
 mod fern;
 mod flower;
+mod flower_desc;
 mod growth;
 mod inflorescence;
+mod inflorescence_check;
+mod inflorescence_desc;
 mod kind;
 mod leaf;
 mod leaflets;
@@ -69,8 +74,8 @@ pub use age::{LeafAge, LeafLife};
 pub use bound::most_triangles;
 pub use condition::{Condition, ConditionDesc};
 pub use desc::{Form, PlantDesc, Stage};
-pub use flower::desc::{FlowerDesc, RingDesc};
-pub use inflorescence::desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
+pub use flower_desc::{FlowerDesc, RingDesc};
+pub use inflorescence_desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc};
 pub use kind::{LeafKind, Shape, Spines, Stipules};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind, StemLine, StemPosition, StemVertices};
 pub use rig::RigJoint;

@@ -5,7 +5,7 @@
 //! largest number of leaves that its species file allows. Numbers of leaves that do not exist stay unused.
 
 use super::desc::{Form, PlantDesc};
-use super::inflorescence::check;
+use super::inflorescence_check;
 use super::stage::{MOST_SHOOTS, StageDesc};
 use furrow_base::math::RoundTo;
 
@@ -46,8 +46,10 @@ impl Numbers {
         };
         let mut first = each * (1 + numbers.shoots * (1 + numbers.branches));
         for k in 0..last.map_or(0, |stage| stage.inflorescences.len()) {
-            let axes =
-                stages().filter_map(|stage| check::axes(stage).get(k).copied()).fold(0.0, f64::max).trunc_to::<usize>();
+            let axes = stages()
+                .filter_map(|stage| inflorescence_check::axes(stage).get(k).copied())
+                .fold(0.0, f64::max)
+                .trunc_to::<usize>();
             // Side shoots of second order have tips too.
             let axes = axes * (1 + numbers.branches);
             let rows = stages().filter_map(|stage| stage.inflorescences.get(k)).map(|axis| axis.leaves.len()).max();

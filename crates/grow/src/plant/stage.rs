@@ -6,7 +6,7 @@
 //! Sources: Di Cicco et al. 2017, "Automatic model based dataset generation for fast and accurate crop and weeds
 //! detection", IROS, §III-B; BBCH scale: Meier 2001, "Growth stages of mono- and dicotyledonous plants".
 
-use super::inflorescence::desc::InflorescenceDesc;
+use super::inflorescence_desc::InflorescenceDesc;
 use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};

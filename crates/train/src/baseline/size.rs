@@ -87,7 +87,8 @@ impl Sizes {
                 let soil = self.bare[class] + below[weed][class];
                 vec![soil, below[SIZES][class] - below[crop][class], below[crop][class] - below[weed][class]]
             };
-            let matrix = Confusion::from_rows(&[row(0), row(1), row(2)]).expect("three classes");
+            let matrix = Confusion::from_rows(&[row(0), row(1), row(2)])
+                .expect("three rows of three counts are a square matrix");
             Scores::of(&matrix, &[false, true, true]).mean_iou.unwrap_or(0.0)
         };
         let pairs = (0..=SIZES).flat_map(|weed| (weed..=SIZES).map(move |crop| (weed, crop)));

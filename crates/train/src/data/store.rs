@@ -158,7 +158,7 @@ impl Store {
             // Another thread has cached the same image meanwhile: its memory is counted once.
             self.free.fetch_add(bytes, Ordering::Relaxed);
         }
-        Cow::Borrowed(self.kept[place].get().expect("the image was just cached"))
+        Cow::Borrowed(self.kept[place].get().expect("this thread or another has just cached the image"))
     }
 
     /// Returns the fingerprint of each dataset and the numbers of its images, which identify the content of the store.

@@ -142,7 +142,7 @@ fn report(found: &Evaluation) -> Report {
     let flat = |matrix: &Confusion| Scores::of(matrix, &found.plants).values().copied().collect::<Vec<_>>();
     let mut drawn = bootstrap::intervals(&matrices, SEED, flat);
     drawn.resize(scores.values().count(), None);
-    let intervals = Measures::from_values(n, drawn).expect("one interval for each score");
+    let intervals = Measures::from_values(n, drawn).expect("`drawn` was resized to the number of scores");
     let boundaries: Vec<ClassBoundary> = found.boundaries.iter().map(class_boundary).collect();
     Report {
         classes: found.classes.clone(),

@@ -1,5 +1,8 @@
 //! Thread that builds and renders requested fields. A newer request interrupts it. If a scene file cannot be rendered,
 //! the last image is kept and the error is shown.
+//!
+//! `furrow_job::Schedule` does not fit: it makes every item of a known list, whereas here only the newest request counts
+//! and a newer one discards the image in progress.
 
 use super::contact_sheet;
 use super::files::Files;

@@ -1,8 +1,9 @@
 //! Maize ears: husk leaves wrapped around a spindle, with silks that hang out of its tip.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::head::GOLDEN;
 use super::mesher::{FlowerMesher, Sheet, Solid};
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{RoundTo, ToFloat, Vec3, lerp};

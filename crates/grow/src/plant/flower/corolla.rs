@@ -1,8 +1,9 @@
 //! Single flowers: rings of sepals and petals around the ovary and the stamens.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::mesher::{FlowerMesher, ROUND, Solid};
 use super::ring;
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::sampling::Stream;

@@ -1,8 +1,9 @@
 //! Fruits. Pods, silicles and capsules are solids within an outline; a poppy's capsule has the disc of the stigma on
 //! top. Berries are round, with a calyx.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::mesher::{FlowerMesher, ROUND, Sheet, Solid};
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{RoundTo, ToFloat};

@@ -3,9 +3,10 @@
 //! Floret k of n has the radius R √((k + ½)/n) and the azimuth k · 137.508°. Source: Vogel 1979, "A better way to
 //! construct the sunflower head", Mathematical Biosciences 44. The dome is a paraboloid.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::mesher::{FlowerMesher, Solid};
 use super::{corolla, ring};
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, RoundTo, ToFloat, Vec3, lerp};

@@ -4,9 +4,9 @@
 //! A flower has many small parts, so all parts of a plant with the same kind and material are merged into one mesh: one
 //! organ, one label.
 
-use super::desc::LOBE_SIDES;
 use crate::plant::axis;
 use crate::plant::blade::RestMesh;
+use crate::plant::flower_desc::LOBE_SIDES;
 use crate::plant::organ::{Organ, OrganKind, StemLine, StemPosition, StemVertices};
 use crate::plant::skeleton::Weights;
 use crate::plant::tube::{self, Profile};

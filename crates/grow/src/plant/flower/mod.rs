@@ -8,14 +8,14 @@
 //! | `cob` | a maize ear in its husks, with silks | ear |
 //! | `panicle` | a tassel: a rachis and its branches with spikelets | tassel |
 //! | `fruit` | pods, silicles and capsules; berries | pod, berry |
-//! | `desc` | descriptions in species files | |
+//! | `bloom` | place, size and opening of a flower | |
 //! | `pen`, `ring` | mesh primitives shared by all of them | |
 //!
-//! To add a shape, write a file with a `grow`, add a variant to [`FlowerDesc`] with its lines in `desc`, and a line to [`grow`].
+//! To add a shape, write a file with a `grow`, add a variant to [`FlowerDesc`] with its lines in `flower_desc`, and a line to [`grow`].
 
+pub(super) mod bloom;
 mod cob;
 mod corolla;
-pub(super) mod desc;
 mod fruit;
 pub(super) mod head;
 pub(super) mod mesher;
@@ -23,7 +23,8 @@ mod panicle;
 mod ring;
 mod spike;
 
-use desc::{Bloom, FlowerDesc};
+use super::flower_desc::FlowerDesc;
+use bloom::Bloom;
 use furrow_base::sampling::Stream;
 use mesher::FlowerMesher;
 

@@ -1,8 +1,9 @@
 //! Tassels: a rachis with a central spike and branches below it, all covered with spikelets.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::head::GOLDEN;
 use super::mesher::{FlowerMesher, Solid};
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, RoundTo, ToFloat, Vec3, lerp};

@@ -1,7 +1,8 @@
 //! Rings of sheets around a flower's axis: sepals, petals, bracts, rays.
 
-use super::desc::{Bloom, RingDesc};
+use super::bloom::Bloom;
 use super::mesher::{FlowerMesher, Sheet};
+use crate::plant::flower_desc::RingDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::math::{RoundTo, ToFloat, lerp};
 use furrow_base::sampling::Stream;

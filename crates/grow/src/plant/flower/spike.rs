@@ -1,9 +1,10 @@
 //! Ears and spikes: spikelets in two ranks or a spiral along a rachis, each of one or more florets, with or without
 //! awns.
 
-use super::desc::{Bloom, FlowerDesc};
+use super::bloom::Bloom;
 use super::head::GOLDEN;
 use super::mesher::{FlowerMesher, Solid};
+use crate::plant::flower_desc::FlowerDesc;
 use crate::plant::organ::OrganKind;
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Frame, RoundTo, ToFloat, Vec3, lerp};

@@ -7,23 +7,19 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `desc` | descriptions in species files |
-//! | `check` | consistency checks; maximum numbers of axes |
 //! | `seat` | tips and axils |
 
-pub(super) mod check;
-pub(super) mod desc;
 mod seat;
 
 use super::flower;
-use super::flower::desc::Bloom;
+use super::flower::bloom::Bloom;
 use super::flower::head::GOLDEN;
 use super::flower::mesher::FlowerMesher;
 use super::growth::{Growth, LeafState, StageInterpolation};
+use super::inflorescence_desc::{FlowersDesc, InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat, StemLeafDesc};
 use super::leaf::{self, Lower};
 use super::organ::{self, Organ, OrganKind, StemLine, StemPosition};
 use super::stage::BUD;
-use desc::{FlowersDesc, InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat, StemLeafDesc};
 use furrow_base::math::{Frame, RoundTo, ToFloat, ToInt, Vec3, lerp};
 use furrow_base::ron_file::{Bound, Vary};
 use furrow_base::sampling::{Purpose, Stream};

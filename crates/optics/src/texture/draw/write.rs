@@ -82,7 +82,7 @@ pub fn encode_height(relief: &HeightImage, source: &str) -> Vec<u8> {
 /// Adds a text chunk. PNG texts are Latin-1, so other characters of a file name become `?`.
 fn text(encoder: &mut png::Encoder<'_, &mut Vec<u8>>, keyword: &str, words: &str) {
     let latin = words.chars().map(|c| if u32::from(c) < 256 { c } else { '?' }).collect();
-    encoder.add_text_chunk(keyword.to_owned(), latin).expect("keywords are short");
+    encoder.add_text_chunk(keyword.to_owned(), latin).expect("keywords are constants of at most 79 characters");
 }
 
 fn png_file(

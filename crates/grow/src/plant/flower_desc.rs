@@ -1,7 +1,7 @@
 //! Flowers and fruits in a species file, and the bounds of their numbers of triangles.
 
 use furrow_base::geometry::outline::Outline;
-use furrow_base::math::{Frame, ToFloat, Vec3};
+use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ const SHEET: f64 = 2.0 * 10.0 * 8.0;
 /// Maximum number of triangles of a solid.
 const SOLID: f64 = 2.0 * 10.0 * 12.0;
 /// Number of vertices around a lobe of a solid.
-pub(super) const LOBE_SIDES: u32 = 4;
+pub(in crate::plant) const LOBE_SIDES: u32 = 4;
 /// Maximum number of triangles of a lobe of a solid.
 const LOBE: f64 = 2.0 * 10.0 * LOBE_SIDES as f64;
 /// Maximum number of triangles of a strand.
@@ -236,19 +236,6 @@ macro_rules! names {
     ($($name:ident),*) => { $(fn $name() -> String { stringify!($name).into() })* };
 }
 names!(sepal, anther, disc, husk, silk, pod, stigma, berry);
-
-/// Place, size and opening of one flower.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::plant) struct Bloom {
-    /// End of its stalk, metres.
-    pub(in crate::plant) base: Vec3,
-    /// Frame: z along its axis, away from its stalk; x is the upward direction perpendicular to it.
-    pub(in crate::plant) frame: Frame,
-    /// Diameter or length, metres.
-    pub(in crate::plant) size: f32,
-    /// Opening: 0 closed, 1 open.
-    pub(in crate::plant) opening: f32,
-}
 
 /// Ring of sheets around a flower's axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

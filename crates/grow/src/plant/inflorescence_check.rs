@@ -1,9 +1,9 @@
 //! Consistency checks of flowering axes.
 
-use super::desc::{InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat};
-use crate::plant::flower::desc::FlowerDesc;
-use crate::plant::kind::LeafKind;
-use crate::plant::stage::StageDesc;
+use super::flower_desc::FlowerDesc;
+use super::inflorescence_desc::{InflorescenceDesc, MOST_AXES, MOST_FLOWERS, Seat};
+use super::kind::LeafKind;
+use super::stage::StageDesc;
 use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Step, choose};
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 type PathError = (Vec<Step<'static>>, String, String);
 
 /// Checks the flowering axes of stage `i`.
-pub(in crate::plant) fn stage(
+pub(super) fn stage(
     (flowers, kinds): (&BTreeMap<String, FlowerDesc>, &BTreeMap<String, LeafKind>),
     stages: &[StageDesc],
     i: usize,
@@ -92,7 +92,7 @@ pub(in crate::plant) fn stage(
 }
 
 /// Returns the maximum number of axes of each kind that a plant can have at a stage.
-pub(in crate::plant) fn axes(stage: &StageDesc) -> Vec<f64> {
+pub(super) fn axes(stage: &StageDesc) -> Vec<f64> {
     let mut by_name: BTreeMap<&str, f64> = BTreeMap::new();
     let mut all = Vec::with_capacity(stage.inflorescences.len());
     for axis in &stage.inflorescences {
