@@ -40,8 +40,8 @@ pub use furrow_grow::soil::{
 pub use furrow_optics::light::desc::*;
 #[doc(inline)]
 pub use furrow_optics::sensor::{
-    AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, MatrixDesc, MosaicDesc,
-    MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,
+    AdcDesc, ApertureDesc, CameraDesc, DistortionDesc, ExposureDesc, IntrinsicsDesc, JpegDesc, LimitsDesc, MatrixDesc,
+    MosaicDesc, MotionDesc, NoiseDesc, PoseDesc, PsfDesc, SensorDesc, SharpenDesc, Tone, WhiteBalanceDesc,
 };
 #[doc(inline)]
 pub use furrow_optics::sensor::{BeamsDesc, LidarDesc, PulsesDesc, Returns};

@@ -40,7 +40,7 @@ fn shares(film: &Film) -> Vec<Vec<f64>> {
 fn a_moving_edge_is_as_wide_as_the_way_driven() {
     let pixels_a_metre = edge(Motion::default()).1;
     let motion =
-        Motion { velocity: vec3(0.5, 0.2, 0.0), exposure: (16.0 / (0.5 * pixels_a_metre)) as f32, readout: 0.0 };
+        Motion { velocity: vec3(0.5, 0.2, 0.0), exposure: (16.0 / (0.5 * pixels_a_metre)) as f32, ..Motion::default() };
     let (scene, _) = edge(motion);
     for row in shares(&shoot(&scene, &PathTracer::default(), 256, 1)) {
         for (x, share) in row.iter().enumerate() {
@@ -55,7 +55,12 @@ fn a_moving_edge_is_as_wide_as_the_way_driven() {
 fn a_rolling_shutter_leans_light_and_labels_alike() {
     let pixels_a_metre = edge(Motion::default()).1;
     let lean = 20.0;
-    let motion = Motion { velocity: vec3(1.0, 0.0, 0.0), exposure: 0.0, readout: (lean / pixels_a_metre) as f32 };
+    let motion = Motion {
+        velocity: vec3(1.0, 0.0, 0.0),
+        exposure: 0.0,
+        readout: (lean / pixels_a_metre) as f32,
+        ..Motion::default()
+    };
     let (scene, _) = edge(motion);
     let film = shoot(&scene, &PathTracer::default(), 64, 1);
     let geometry = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
@@ -71,7 +76,7 @@ fn a_rolling_shutter_leans_light_and_labels_alike() {
 
 #[test]
 fn a_driving_camera_gives_the_same_bits_on_any_number_of_threads() {
-    let (scene, _) = edge(Motion { velocity: vec3(0.4, -0.7, 0.0), exposure: 0.1, readout: 0.2 });
+    let (scene, _) = edge(Motion { velocity: vec3(0.4, -0.7, 0.0), exposure: 0.1, readout: 0.2, ..Motion::default() });
     let film = |threads| {
         with_world(&scene, threads, |world, watch| {
             let window = Window::full(SIZE.0, SIZE.1);

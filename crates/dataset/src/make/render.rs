@@ -181,6 +181,7 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
         gain: photograph.gain,
         nir_gain: photograph.nir_gain,
         white_balance: photograph.white_balance,
+        bands: Some(photograph.shot),
     });
     sample.record.sampling = if denoised.is_none() { film.sampling() } else { None };
     sample.rgb = photograph.rgb.as_chunks::<3>().0.to_vec();

@@ -5,6 +5,7 @@ use crate::model::split::Split;
 use furrow_field::record::Conditions;
 use furrow_field::traits::{Canopy, LeafTraits, PlantTraits};
 use furrow_grow::plant::Condition;
+use furrow_optics::sensor::ShotRecord;
 use furrow_render::film::Sampling;
 use furrow_render::scene::tag::{Class, lowercase};
 use serde::{Deserialize, Serialize, Serializer, ser};
@@ -101,6 +102,10 @@ pub struct Exposure {
     pub nir_gain: f32,
     /// White-balance gains of R, G and B.
     pub white_balance: [f32; 3],
+    /// Exposure time, analog gain, electrons at full scale and saturated fraction of R, G, B and NIR; null in records of
+    /// earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<ShotRecord>,
 }
 
 /// Pixels of one class in an image.

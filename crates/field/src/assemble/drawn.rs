@@ -11,7 +11,7 @@ use crate::drive::Capture;
 use crate::estimate::usual_memory;
 use crate::layer::Layer;
 use crate::library::Library;
-use furrow_base::math::{ToInt, Vec2, Vec3};
+use furrow_base::math::{Spectrum, ToInt, Vec2, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
@@ -101,9 +101,17 @@ impl<'a> Drawn<'a> {
         if lights.is_empty() && options.scan.is_none() {
             warnings.push("no light in the scene: the image will be black".into());
         }
-        let captures = rig::captures(page, desc, library, camera, sown.clone(), &|purpose, k| {
+        let mut captures = rig::captures(page, desc, library, camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
+        if captures.iter().any(|capture| capture.camera.blurs()) {
+            // The time is that of a meter: the image that would give it is not rendered yet.
+            let sensor = desc.sensor.build(&mut Stream::of(seed, index, Purpose::Sensor, 0));
+            let illuminant = lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
+            for capture in &mut captures {
+                capture.camera = capture.camera.with_metered(sensor.metered_s(illuminant, &capture.camera));
+            }
+        }
         let scanners = lidar::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         let camera = captures.first().map_or(camera, |first| first.camera);
         let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, captures, scanners };
@@ -227,4 +235,28 @@ pub(super) struct Asked<'a> {
     pub(super) drawn: &'a Drawn<'a>,
     pub(super) library: &'a mut Library,
     pub(super) warnings: &'a mut Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::assemble::{self, Options};
+
+    /// Expected: a moving camera blurs for as long as its sensor is exposed: half the light, twice the time, up to the
+    /// sensor's longest time; a time in the scene file stays.
+    #[test]
+    fn a_moving_camera_blurs_while_it_is_exposed() {
+        let exposure = |light: f32, more: &str| {
+            let camera = "Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1)";
+            let text = format!(
+                "Field(camera: {camera}, motion: (speed_m_s: 1{more})), sensor: (limits: (longest_ms: 20)), \
+                 lights: [Constant(radiance: ({light}, {light}, {light}, {light}))])"
+            );
+            assemble::field_of(&text, &Options::default()).unwrap().scene.camera.exposure()
+        };
+        let sunny = exposure(0.2, "");
+        assert!(sunny > 1e-4 && sunny < 5e-3, "{sunny}");
+        assert!((exposure(0.1, "") / sunny - 2.0).abs() < 1e-3);
+        assert!((exposure(1e-3, "") - 0.02).abs() < 1e-6);
+        assert!((exposure(1e-3, ", exposure_ms: 3") - 3e-3).abs() < 1e-6 && exposure(0.1, ", exposure_ms: 0") == 0.0);
+    }
 }

@@ -3,7 +3,7 @@
 //! The steps follow a camera: radiance → blur of the optics → vignetting → exposure → electrons with shot and read
 //! noise, dark current and fixed pattern, full well → integers above black → white balance → demosaicing → colour
 //! matrix → tone curve → sharpening → 8 bits → JPEG loss. The two images have separate exposures, as the two sensors of
-//! the JAI AD-130 have. A step that is off is skipped and changes no bit.
+//! the JAI AD-130 have, within the limits of exposure time and analog gain. A step that is off is skipped and changes no bit.
 //!
 //! A linear value of 1 is white: 90 % of the full well, as that camera sets its output. The channels' responses to
 //! radiance are 0.94, 1, 0.77, 0.93 in R, G, B, NIR, from its quantum efficiencies. Red and blue are amplified by the
@@ -16,13 +16,16 @@
 //! sharpening use neighbours, so a few pixels along a window's edge differ from the whole image, and JPEG blocks start
 //! at the window's corner.
 
-use super::chip::{Adc, CLIP, Exposure, Mosaic, MosaicDesc, Noise, RESPONSE};
+use super::chip::{Adc, CLIP, Exposure, Limits, Mosaic, MosaicDesc, Noise, RESPONSE, ShotRecord, Shutter};
 use super::develop::{Jpeg, Sharpen, Tone, WhiteBalance, apply_matrix};
 use super::lens::{Camera, Psf};
 use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt};
 use furrow_base::sampling::rng::Stream;
 use rayon::prelude::*;
 use std::f32::consts::FRAC_1_PI;
+
+/// Reflectance that a light meter assumes for a field: dry soil and leaves reflect 0.1 to 0.2 of visible light.
+const GROUND: f32 = 0.18;
 
 /// Sensor with sampled settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +34,8 @@ pub struct Sensor {
     pub exposure: Exposure,
     /// Exposure of the NIR image.
     pub nir_exposure: Exposure,
+    /// Limits of both exposures.
+    pub limits: Limits,
     /// White balance of the colour image.
     pub white_balance: WhiteBalance,
     /// Whether natural vignetting (cos⁴) is applied.
@@ -89,6 +94,8 @@ pub struct Photograph {
     pub nir_gain: f32,
     /// White-balance gains on R, G, B.
     pub white_balance: [f32; 3],
+    /// Exposure time, gain and saturation of each band.
+    pub shot: ShotRecord,
 }
 
 /// Output images with more than 8 bits; the steps are spread over 16 bits.
@@ -131,10 +138,15 @@ impl Sensor {
             || self.nir_exposure.gain(&mut metered(&|s| s.to_array()[3]), white.to_array()[3]),
         );
 
+        let within = |level| self.limits.shutter(level, camera.f_number(), camera.motion().shutter);
+        let (color, near_infrared) = (within(gain), within(nir_gain));
+        let shutters = [color, color, color, near_infrared];
+        let (gain, nir_gain) = (color.level, near_infrared.level);
         let gains = Spectrum::new(gain, gain, gain, nir_gain);
         let mut values = signals;
+        let shot = self.shot(&shutters, values.par_iter().map(|value| saturated(*value * gains)));
         values.par_iter_mut().enumerate().for_each(|(i, value)| {
-            *value = self.read_out(*value * gains, camera, place(i), stream) * balanced;
+            *value = self.read_out(*value * gains, &shutters, place(i), stream) * balanced;
         });
         // If each pixel averages two by two sensor pixels or more, it has measured all colours.
         if camera.scale() > 0.5 {
@@ -159,7 +171,31 @@ impl Sensor {
         }
         let deep = (self.bits > 8).then(|| Deep::of(&values, self.bits));
         let nir_gain = nir_gain * RESPONSE.to_array()[3];
-        Photograph { width, height, rgb, nir, deep, gain, nir_gain, white_balance: balance }
+        Photograph { width, height, rgb, nir, deep, gain, nir_gain, white_balance: balance, shot }
+    }
+
+    /// Returns the time for which the colour image is exposed under lights of this horizontal irradiance, seconds, as a
+    /// light meter sets it before the image is taken: for ground of the usual reflectance.
+    pub fn metered_s(&self, illuminant: Spectrum, camera: &Camera) -> f32 {
+        let white = illuminant * RESPONSE * FRAC_1_PI;
+        let ground = white * GROUND;
+        let [r, g, b] = self.white_balance.gains(illuminant, &[ground]);
+        let luminance = |signal: Spectrum| (signal * Spectrum::new(r, g, b, 1.0)).luminance();
+        let level = self.exposure.gain(&mut [luminance(ground)], luminance(white));
+        self.limits.shutter(level, camera.f_number(), camera.motion().shutter).time_s
+    }
+
+    /// Returns the record of an exposure. `saturated` has a 1 for each band of each pixel that is saturated.
+    fn shot(&self, shutters: &[Shutter; 4], saturated: impl IndexedParallelIterator<Item = [u64; 4]>) -> ShotRecord {
+        let pixels = saturated.len().max(1).to_f32();
+        let sum = |a: [u64; 4], b: [u64; 4]| std::array::from_fn(|i| a[i] + b[i]);
+        let count = saturated.reduce(|| [0; 4], sum);
+        ShotRecord {
+            time_s: shutters.map(|shutter| shutter.time_s),
+            analog_gain: shutters.map(|shutter| shutter.gain),
+            full_scale_electrons: shutters.map(|shutter| self.limits.white * CLIP / shutter.gain),
+            saturated: count.map(|n| n.to_f32() / pixels),
+        }
     }
 
     /// Returns the fraction of the light that reaches a pixel.
@@ -174,10 +210,10 @@ impl Sensor {
 
     /// Returns the levels as read out: with noise, limited by the full well, quantised. Levels below black are clamped
     /// to 0 unless a black level leaves room for them.
-    fn read_out(&self, level: Spectrum, camera: &Camera, place: (u32, u32), stream: &Stream) -> Spectrum {
+    fn read_out(&self, level: Spectrum, shutters: &[Shutter; 4], place: (u32, u32), stream: &Stream) -> Spectrum {
         let least = if self.adc.is_some() { f32::NEG_INFINITY } else { 0.0 };
         let level = match &self.noise {
-            Some(noise) => noise.count(level, place, camera.exposure(), least, stream),
+            Some(noise) => noise.count(level, place, shutters, least, stream),
             None => level.clamp(0.0, CLIP),
         };
         match self.adc {
@@ -208,6 +244,11 @@ impl Deep {
         let (rgb, nir) = split(values, step);
         Self { rgb, nir }
     }
+}
+
+/// Returns a 1 for each band of a level that is saturated.
+fn saturated(level: Spectrum) -> [u64; 4] {
+    level.to_array().map(|level| u64::from(level >= CLIP))
 }
 
 /// Splits output values into colour and near infrared, each encoded by `code`.

@@ -27,7 +27,8 @@ mod tests;
 
 pub use chain::{Deep, Linear, Photograph, Sensor};
 pub use chip::{
-    Adc, AdcDesc, Black, Demosaic, Depth, Exposure, ExposureDesc, MosaicDesc, Noise, NoiseDesc, Pattern, Percent,
+    Adc, AdcDesc, Black, Demosaic, Depth, Exposure, ExposureDesc, Limits, LimitsDesc, MosaicDesc, Noise, NoiseDesc,
+    Pattern, Percent, ShotRecord,
 };
 pub use develop::{
     Jpeg, JpegDesc, MatrixDesc, MatrixRow, Quality, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,

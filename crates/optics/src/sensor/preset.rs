@@ -1,6 +1,6 @@
 //! Named sensors. Each has a camera of the same name that defines its pixels, lens and shutter.
 
-use super::chip::{AdcDesc, Demosaic, MosaicDesc, NoiseDesc, Pattern};
+use super::chip::{AdcDesc, Demosaic, LimitsDesc, MosaicDesc, NoiseDesc, Pattern};
 use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, Tone, WhiteBalanceDesc};
 use super::given;
 use super::lens::PsfDesc;
@@ -46,15 +46,29 @@ fn psf(color: f64, nir: f64, red: f64, blue: f64) -> PsfDesc {
     }
 }
 
+const fn limits(longest_ms: f64, gain_db: f64, f_number: f64, sensitivity: f64) -> LimitsDesc {
+    LimitsDesc {
+        on: true,
+        longest_ms: Num::new(longest_ms),
+        gain_db: Num::new(gain_db),
+        f_number: Num::new(f_number),
+        sensitivity: Num::new(sensitivity),
+    }
+}
+
 const fn bits(bits: f64) -> AdcDesc {
     AdcDesc::Bits { bits: Num::new(bits), black: Num::new(0.032), kept: false }
 }
 
 /// Returns the JAI AD-130GE: two CCDs of Sony's ICX445 class behind a prism, 10 bits. The read noise follows from the
 /// signal-to-noise ratios in its data sheet, 52 dB in colour and 54 dB in NIR; dark current, non-uniformities and point
-/// spread are estimates for its class.
+/// spread are estimates for its class. The longest exposure is one frame of 31.76 ms (manual 1036E-1201, §11.1.2); its
+/// largest gain is that of another prism camera of the maker, the SW-2001Q-CL (12 dB, manual §7.13). The sensitivity is
+/// that of pixels of 3.75 µm behind a lens with a transmission of 0.9, with an integral of the quantum efficiency over
+/// the green band of 39 nm.
 fn jai_ad130() -> SensorDesc {
     SensorDesc {
+        limits: limits(31.76, 12.0, 4.0, 1.04e9),
         corner_shading: Vary::fixed(0.1),
         psf: psf(0.6, 0.8, 0.15, -0.15),
         noise: NoiseDesc {
@@ -79,6 +93,8 @@ fn phone() -> SensorDesc {
     SensorDesc {
         // Phones correct vignetting before they store an image.
         natural_vignetting: false,
+        // 1/15 s by hand, ISO 1600; pixels of 1.4 µm with a quantum efficiency of 0.6 over 100 nm.
+        limits: limits(67.0, 24.0, 1.8, 2.24e8),
         white_balance: WhiteBalanceDesc::GreyWorld { strength: Vary::fixed(0.6) },
         corner_shading: Vary::fixed(0.1),
         psf: psf(0.6, 0.8, 0.3, -0.3),
@@ -103,9 +119,11 @@ fn phone() -> SensorDesc {
 
 /// Returns a machine-vision colour camera with Sony's IMX250: 5 million pixels of 3.45 µm, global shutter, 12 bits,
 /// little processing. Full well and read noise are the EMVA 1288 values published by makers of cameras with this chip;
-/// the others are estimates for its class.
+/// the longest exposure is one frame at 30 frames per second, the largest gain the analog part (24 dB) of the sensor's
+/// gain of 48 dB (Teledyne Genie Nano, manual, M2450). The others are estimates for its class.
 fn machine_vision() -> SensorDesc {
     SensorDesc {
+        limits: limits(33.0, 24.0, 4.0, 1.3e9),
         corner_shading: Vary::fixed(0.08),
         psf: psf(0.6, 0.8, 0.2, -0.2),
         noise: NoiseDesc {

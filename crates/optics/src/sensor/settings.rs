@@ -1,7 +1,7 @@
 //! Sensor description in a scene file: the steps of the camera chain with their settings, and named cameras.
 
 use super::chain::Sensor;
-use super::chip::{AdcDesc, Depth, ExposureDesc, MosaicDesc, NoiseDesc, NoiseWritten};
+use super::chip::{AdcDesc, Depth, ExposureDesc, LimitsDesc, LimitsWritten, MosaicDesc, NoiseDesc, NoiseWritten};
 use super::develop::{JpegDesc, MatrixDesc, SharpenDesc, SharpenWritten, Tone, WhiteBalanceDesc};
 use super::given::{Given, layered};
 use super::lens::{PsfDesc, PsfWritten};
@@ -21,6 +21,7 @@ layered! {
     ///     "(
     ///         exposure: Auto(level: Uniform(0.15, 0.21)),
     ///         nir_exposure: White(level: 0.8),
+    ///         limits: (longest_ms: 10, gain_db: 18, f_number: 5.6),
     ///         white_balance: Fixed(red: 1.1, green: 1, blue: 1.4),
     ///         natural_vignetting: true,
     ///         corner_shading: 0.1,
@@ -55,6 +56,8 @@ layered! {
         pub exposure: ExposureDesc = Given<ExposureDesc>,
         /// Exposure of the NIR image; default `Auto(level: 0.25)`.
         pub nir_exposure: ExposureDesc = Given<ExposureDesc>,
+        /// Limits of both exposures; the default is that of the JAI AD-130.
+        pub limits: LimitsDesc = LimitsWritten,
         /// White balance of the colour image; default `Reflector`.
         pub white_balance: WhiteBalanceDesc = Given<WhiteBalanceDesc>,
         /// Whether natural vignetting, cos⁴ of the angle to the optical axis, is applied; default true.
@@ -89,6 +92,7 @@ impl Default for SensorDesc {
         Self {
             exposure: ExposureDesc::Auto { level: Vary::fixed(0.18) },
             nir_exposure: ExposureDesc::Auto { level: Vary::fixed(0.25) },
+            limits: LimitsDesc::default(),
             white_balance: WhiteBalanceDesc::default(),
             natural_vignetting: true,
             corner_shading: Vary::fixed(0.05),
@@ -112,6 +116,7 @@ impl SensorDesc {
         Sensor {
             exposure: self.exposure.draw(stream),
             nir_exposure: self.nir_exposure.draw(stream),
+            limits: self.limits.build(self.noise.full_well.f32()),
             white_balance: self.white_balance.draw(stream),
             natural_vignetting: self.natural_vignetting,
             corner_shading: self.corner_shading.draw32(stream),

@@ -92,8 +92,9 @@ fn more_light_never_gives_a_darker_pixel() {
 #[test]
 fn automatic_exposure_brings_the_mean_to_its_level() {
     let scene: Vec<Spectrum> = (0..48 * 32).map(|i| EVENING * (0.05 + (i % 97).to_f32() / 400.0)).collect();
-    let auto =
-        sensor("(tone: Linear, noise: (on: false), exposure: Auto(level: 0.18), nir_exposure: Auto(level: 0.25))");
+    let auto = sensor(
+        "(tone: Linear, noise: (on: false), limits: (on: false), exposure: Auto(level: 0.18), nir_exposure: Auto(level: 0.25))",
+    );
     for brightness in [1e-3, 1.0, 500.0] {
         let scene: Vec<Spectrum> = scene.iter().map(|&s| s * brightness).collect();
         let shot = expose(&auto, &scene, EVENING * brightness);
@@ -128,6 +129,84 @@ fn noise_is_counted_in_electrons_and_never_changes() {
     let part = noisy.expose(window, &small(), Spectrum::ONE, &Stream::of(3, 0, Purpose::Sensor, 0));
     assert_eq!((part.width, part.height), (10, 10));
     assert_eq!(part.nir[23], shot.nir[(7 + 2) * 48 + 5 + 3]);
+}
+
+/// Returns mean and squared signal-to-noise ratio of the NIR levels of an even card of this radiance.
+fn nir_of(sensor: &Sensor, radiance: f32) -> (f64, f64, ShotRecord) {
+    let shot = expose(sensor, &vec![Spectrum::splat(radiance); 48 * 32], Spectrum::ONE);
+    let levels: Vec<f64> = shot.deep.unwrap().nir.iter().map(|v| f64::from(*v) / 65535.0).collect();
+    let mean = levels.iter().sum::<f64>() / levels.len().to_f64();
+    let variance = levels.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / levels.len().to_f64();
+    (mean, mean * mean / variance, shot.shot)
+}
+
+/// Rationale: an exposure without limits makes any light as bright and as clean as the sun. Expected: at a thousandth of
+/// the light the longest time and the largest gain are reached, the image is darker, and SNR² without read noise is the
+/// number of electrons; with read noise it is n² / (n + read²). Source: EMVA 1288, equation 21.
+#[test]
+fn a_thousandth_of_the_light_is_darker_and_noisier() {
+    let page = |read: u32| {
+        sensor(&format!(
+            "(tone: Linear, natural_vignetting: false, corner_shading: 0, bits: 16, nir_exposure: Auto(level: 0.18), \
+             noise: (read_nir: {read}))"
+        ))
+    };
+    for read in [0, 14] {
+        let [(bright, clean, full), (dark, noisy, dim)] = [0.08, 0.08e-3].map(|light| nir_of(&page(read), light));
+        assert!((bright - 0.18).abs() < 0.002 && full.analog_gain == [1.0; 4] && full.time_s[3] < 5e-3, "{full:?}");
+        assert!((dim.time_s[3] - 0.03176).abs() < 1e-6 && (dim.analog_gain[3] - 3.981).abs() < 1e-3, "{dim:?}");
+        // Electrons: 1.04e9 / 16 · 0.93 · radiance · time.
+        let electrons = 1.04e9 / 16.0 * 0.93 * 0.08e-3 * 0.03176;
+        assert!((dark / (electrons * 3.981 / 6300.0) - 1.0).abs() < 0.05, "{dark} {electrons}");
+        for (n, snr2) in [(0.18 * 6300.0, clean), (electrons, noisy)] {
+            let expected = n * n / (n + f64::from(read * read));
+            assert!((snr2 / expected - 1.0).abs() < 0.15, "{snr2} for {expected}");
+        }
+    }
+}
+
+/// Expected: within the limits the longest time is used before any gain; a scene file sets both limits, a larger
+/// aperture or a fixed time counts, and values outside their ranges are refused.
+#[test]
+fn limits_are_those_of_the_scene_file() {
+    let shot = |limits: &str, camera: &str| {
+        let camera =
+            ron::from_str::<CameraDesc>(camera).unwrap().build(&mut Stream::of(1, 0, Purpose::Test, 0)).unwrap();
+        let sensor = sensor(&format!("(exposure: Fixed(gain: 400), limits: ({limits}))"));
+        let film = Linear { pixels: &[Spectrum::splat(1e-3); 16], width: 4, left: 0, top: 0 };
+        sensor.expose(film, &camera, Spectrum::ONE, &Stream::of(3, 0, Purpose::Sensor, 0))
+    };
+    let still = "JaiAd130()";
+    // A level of 10,317 per radiance and second: 38.8 ms for a gain of 400.
+    let usual = shot("", still);
+    assert!((usual.shot.time_s[0] - 0.03176).abs() < 1e-6 && (usual.shot.analog_gain[0] - 1.2208).abs() < 1e-3);
+    assert!((usual.gain - 400.0).abs() < 1e-3 && (usual.shot.full_scale_electrons[0] - 7000.0 / 1.2208).abs() < 5.0);
+    let long = shot("longest_ms: 50", still);
+    assert!((long.shot.time_s[0] - 0.03877).abs() < 1e-4 && long.shot.analog_gain[0] == 1.0);
+    let short = shot("longest_ms: 10, gain_db: 6", still);
+    assert!((short.gain - 103.17 * 1.9953).abs() < 0.1, "{}", short.gain);
+    let open = shot("", "JaiAd130(f_number: 2)");
+    assert!((open.shot.time_s[0] - 0.03877 / 4.0).abs() < 1e-4);
+    let fixed = shot("", "JaiAd130(motion: (exposure_ms: 15))").shot;
+    assert!((fixed.time_s[0] - 0.015).abs() < 1e-6 && (fixed.analog_gain[0] - 2.585).abs() < 1e-2, "{fixed:?}");
+    let none = shot("on: false", "JaiAd130(f_number: 8)");
+    assert!(none.gain == 400.0 && none.shot.analog_gain[0] == 1.0 && none.shot.time_s[0] > 0.1);
+    for (limits, why) in [("gain_db: 61", "between 0 and 60"), ("longest_ms: 0", "above 0"), ("f_number: 0", "above 0")]
+    {
+        let error = ron::from_str::<SensorDesc>(&format!("(limits: ({limits}))")).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
+}
+
+/// Expected: the fraction of saturated pixels is counted before noise, for each band.
+#[test]
+fn saturated_pixels_are_counted() {
+    let ramp: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(i.to_f32() / 768.0)).collect();
+    let page =
+        "(natural_vignetting: false, corner_shading: 0, exposure: Fixed(gain: 1), nir_exposure: Fixed(gain: 0.1))";
+    let [red, green, _, nir] = expose(&sensor(page), &ramp, Spectrum::ONE).shot.saturated;
+    // White is reached at 1 / 0.9.
+    assert!((green - (1.0 - 0.5 / 0.9)).abs() < 2e-3 && red < green && nir == 0.0, "{red} {green} {nir}");
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Noise model of a pixel in electrons: photoelectrons, dark current, full well and read noise.
 //!
 //! The model is that of EMVA 1288 (release 4.0, §2). A pixel collects μ = (1 + PRNU) · light + dark current · exposure,
-//! with Poisson variance, up to its full well. Reading adds a normal error and the pixel's own offset (DSNU). Both
-//! non-uniformities are normally distributed and belong to the camera body: they are derived from its number and the
-//! pixel's position, so all images and scene files with the same body share them.
+//! with Poisson variance, up to its full well. Reading adds a normal error and the pixel's own offset (DSNU), and an
+//! analog gain amplifies the sum, so that fewer electrons are white. Both non-uniformities are normally distributed and
+//! belong to the camera body: they are derived from its number and the pixel's position, so all images and scene files
+//! with the same body share them.
 
 use super::level::CLIP;
+use super::limits::Shutter;
 use crate::sensor::given::{Given, layered};
 use furrow_base::math::{RoundTo, Spectrum};
 use furrow_base::ron_file::{Count, Fraction, NonNegative, Num, Positive};
@@ -27,7 +29,7 @@ layered! {
         pub read: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Standard deviation of the read noise of a NIR pixel, electrons; default 14.
         pub read_nir: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
-        /// Dark current of a pixel, electrons per second, collected during the camera's exposure time; default 0.
+        /// Dark current of a pixel, electrons per second, collected during the exposure time; default 0.
         pub dark_current: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
         /// Dark signal non-uniformity: standard deviation of the pixels' offsets, electrons; default 0.
         pub dsnu: Num<NonNegative<1_000_000>> = Given<Num<NonNegative<1_000_000>>>,
@@ -88,13 +90,13 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Returns noisy levels (1 is white: 90 % of the full well) of a pixel after `exposure` seconds, clamped below at
-    /// `least`. Each pixel uses its own sub-stream of `stream`.
+    /// Returns noisy levels (1 is white: 90 % of the full well at gain 1) of a pixel exposed by the shutters of R, G, B
+    /// and NIR, clamped below at `least`. Each pixel uses its own sub-stream of `stream`.
     pub(in crate::sensor) fn count(
         &self,
         level: Spectrum,
         (x, y): (u32, u32),
-        exposure: f32,
+        shutters: &[Shutter; 4],
         least: f32,
         stream: &Stream,
     ) -> Spectrum {
@@ -103,13 +105,14 @@ impl Noise {
         let noise = normals(&mut stream.child(Purpose::Sensor, place));
         let (response, offset) = self.pattern(place);
         let read = [self.read, self.read, self.read, self.read_nir];
-        let dark = self.dark_current * exposure;
         let levels = level.to_array();
         Spectrum::from(std::array::from_fn::<f32, 4, _>(|i| {
-            let electrons = (levels[i] * white * response[i] + dark).min(self.full_well);
+            let Shutter { gain, time_s, .. } = shutters[i];
+            let light = levels[i] * white / gain;
+            let electrons = (light * response[i] + self.dark_current * time_s).min(self.full_well);
             // A Poisson count of many electrons is approximately normal.
             let counted = electrons + (electrons + read[i] * read[i]).sqrt() * noise[i];
-            (counted + offset[i]).clamp(least * white, self.full_well) / white
+            ((counted + offset[i]) * gain).clamp(least * white, self.full_well) / white
         }))
     }
 
@@ -146,7 +149,8 @@ mod tests {
     fn counted(noise: Noise, level: f32, exposure: f32, image: u64) -> (f64, f64, Vec<f64>) {
         let stream = Stream::of(1, image, Purpose::Test, 0);
         let electrons = |i: u32| {
-            let level = noise.count(Spectrum::splat(level), (i % 200, i / 200), exposure, -1.0, &stream);
+            let shutter = Shutter { level: 1.0, gain: 1.0, time_s: exposure };
+            let level = noise.count(Spectrum::splat(level), (i % 200, i / 200), &[shutter; 4], -1.0, &stream);
             f64::from(level.to_array()[1] * noise.full_well / CLIP)
         };
         let all: Vec<f64> = (0..40_000).map(electrons).collect();

@@ -27,8 +27,8 @@ impl ApertureDesc {
                  pixel_um: …)",
             ));
         };
-        let radius = (focal * 1e-3 / (2.0 * self.f_number.draw(stream))).to_f32();
-        Ok(Aperture { radius, focus: self.focus_m.draw32(stream) })
+        let f_number = self.f_number.draw(stream);
+        Ok(Aperture::new(focal, f_number, self.focus_m.draw32(stream)))
     }
 }
 
@@ -39,4 +39,13 @@ pub struct Aperture {
     pub radius: f32,
     /// Distance of the plane in focus along the optical axis, metres.
     pub focus: f32,
+    /// Focal length divided by the pupil's diameter.
+    pub f_number: f32,
+}
+
+impl Aperture {
+    /// Creates the aperture of a lens of `focal_mm` that is focused at `focus` metres.
+    pub(super) fn new(focal_mm: f64, f_number: f64, focus: f32) -> Self {
+        Self { radius: (focal_mm * 1e-3 / (2.0 * f_number)).to_f32(), focus, f_number: f_number.to_f32() }
+    }
 }

@@ -111,6 +111,11 @@ impl Camera {
         self.aperture
     }
 
+    /// Returns the f-number of the lens; `None` for a pinhole.
+    pub fn f_number(&self) -> Option<f32> {
+        self.aperture.map(|aperture| aperture.f_number)
+    }
+
     /// Returns origin and unit direction, in world space, of the ray through continuous pixel coordinates `px` ((0.5,
     /// 0.5) is the first pixel's centre) and the lens point chosen by two numbers in [0, 1), which a pinhole ignores.
     /// The time is the middle of the exposure.
@@ -125,7 +130,7 @@ impl Camera {
         let [x, y] = self.unproject([f64::from(px.x), f64::from(px.y)]);
         let position = self.position(f64::from(px.y), (shutter_u - 0.5) * self.motion.exposure);
         let through = vec3(x.to_f32(), y.to_f32(), 1.0);
-        let Some(Aperture { radius, focus }) = self.aperture else {
+        let Some(Aperture { radius, focus, .. }) = self.aperture else {
             return (position, self.pose.to_world(through).normalize());
         };
         let pupil = warp::disc(lens_u) * radius;

@@ -8,7 +8,7 @@ use super::intrinsics::{IntrinsicsDesc, middle};
 use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
 use furrow_base::Result;
-use furrow_base::math::{RoundTo, ToFloat};
+use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use serde::{Deserialize, Serialize};
@@ -245,9 +245,7 @@ impl Named<'_> {
         let focal = self.focal_mm.draw(stream);
         let pose = nadir(self.height_m, self.at_m, self.turns_deg, stream);
         let distortion = self.distortion.draw(stream);
-        let aperture = self
-            .f_number
-            .map(|f| Aperture { radius: (focal * 1e-3 / (2.0 * f.draw(stream))).to_f32(), focus: pose.height() });
+        let aperture = self.f_number.map(|f| Aperture::new(focal, f.draw(stream), pose.height()));
         let pixels = focal * 1e3 / pixel_um;
         let camera = Camera::new(size, [pixels; 2], middle(size), distortion, pose)?;
         Ok(camera.with_aperture(aperture).with_motion(self.motion.draw(readout_ms, stream)))

@@ -37,6 +37,15 @@ impl Camera {
         self
     }
 
+    /// Returns the camera with this exposure time for its motion blur, seconds, unless its scene file sets one.
+    #[must_use]
+    pub fn with_metered(mut self, exposure: f32) -> Self {
+        if self.motion.shutter.is_none() && self.blurs() {
+            self.motion.exposure = exposure;
+        }
+        self
+    }
+
     /// Returns the motion.
     pub fn motion(&self) -> &Motion {
         &self.motion
@@ -191,7 +200,7 @@ mod tests {
     fn bounds_hold_what_a_rolling_shutter_sees() {
         let lens = Distortion { k1: -0.2, k2: 0.05, p1: 1e-3, ..Distortion::default() };
         let pose = Pose::look_at(vec3(0.1, -0.6, 0.9), Vec3::ZERO).unwrap();
-        let motion = Motion { velocity: vec3(1.0, 1.5, 0.0), exposure: 1e-3, readout: 0.05 };
+        let motion = Motion { velocity: vec3(1.0, 1.5, 0.0), readout: 0.05, ..Motion::default() };
         let mut s = Stream::of(11, 0, Purpose::Test, 0);
         let (mut inside, mut small, mut loose) = (0, 0, 0);
         for lens in [Distortion::default(), lens] {

@@ -19,7 +19,8 @@ pub struct MotionDesc {
     pub speed_m_s: Vary<Signed<100>>,
     /// Heading, degrees clockwise from north; default 0. At yaw 0 that is the image's top.
     pub heading_deg: Vary<Signed<360>>,
-    /// Exposure time of a row; default that of the camera, 1 ms.
+    /// Exposure time of a row, for motion blur and for the sensor. By default the sensor's exposure determines it, from
+    /// the light of the scene.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vary<NonNegative<10_000>>>")]
     pub exposure_ms: Option<Vary<NonNegative<10_000>>>,
@@ -46,18 +47,19 @@ impl MotionDesc {
     pub fn draw(&self, readout_ms: f64, stream: &Stream) -> Motion {
         let mut stream = stream.child(Purpose::Motion, 0);
         let (speed, heading) = (self.speed_m_s.draw32(&mut stream), self.heading_deg.draw32(&mut stream).to_radians());
-        let mut seconds = |of: &Option<Vary<NonNegative<10_000>>>, own: f64| {
-            (of.as_ref().map_or(own, |ms| ms.draw(&mut stream)) * 1e-3).to_f32()
-        };
+        let mut seconds =
+            |of: &Option<Vary<NonNegative<10_000>>>| of.as_ref().map(|ms| (ms.draw(&mut stream) * 1e-3).to_f32());
+        let (exposure, readout) = (seconds(&self.exposure_ms), seconds(&self.readout_ms));
         Motion {
             velocity: vec3(heading.sin(), heading.cos(), 0.0) * speed,
-            exposure: seconds(&self.exposure_ms, EXPOSURE_MS),
-            readout: seconds(&self.readout_ms, readout_ms),
+            exposure: exposure.unwrap_or(Motion::default().exposure),
+            shutter: exposure.filter(|s| *s > 0.0),
+            readout: readout.unwrap_or((readout_ms * 1e-3).to_f32()),
         }
     }
 }
 
-/// Default exposure time of a row: that of the JAI AD-130 at f/4 in sunlight.
+/// Exposure time of a row before the light is metered: that of the JAI AD-130 at f/4 in sunlight.
 const EXPOSURE_MS: f64 = 1.0;
 
 /// Motion and shutter of a camera.
@@ -65,8 +67,11 @@ const EXPOSURE_MS: f64 = 1.0;
 pub struct Motion {
     /// Velocity in world space, m/s.
     pub velocity: Vec3,
-    /// Exposure time of a row, seconds.
+    /// Time for which the motion blurs a row, seconds.
     pub exposure: f32,
+    /// Exposure time of the sensor in the scene file, seconds; `None` for automatic exposure. A time of 0 is none: it
+    /// removes the blur alone.
+    pub shutter: Option<f32>,
     /// Time from the first row's exposure to the last one's, seconds.
     pub readout: f32,
 }
@@ -74,7 +79,7 @@ pub struct Motion {
 /// Camera at rest.
 impl Default for Motion {
     fn default() -> Self {
-        Self { velocity: Vec3::ZERO, exposure: EXPOSURE_MS.to_f32() * 1e-3, readout: 0.0 }
+        Self { velocity: Vec3::ZERO, exposure: EXPOSURE_MS.to_f32() * 1e-3, shutter: None, readout: 0.0 }
     }
 }
 
