@@ -359,6 +359,11 @@ pub struct ModelDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(0.05, 0.12, 0.03, 0.45)"))]
     pub transmission: Option<Shares>,
+    /// Factor on the reflectance of the file's colours and images; default 1. The colours of photographs are brighter than
+    /// the surface: 0.2 for a photograph of a leaf. Reflectances above 0.95 are cut to 0.95.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.2"))]
+    pub gain: Option<Num<Positive<100>>>,
     /// Reflectance in near infrared. Default: 0.45 for materials that transmit light, the red reflectance for opaque ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nir: Option<Num<Fraction>>,

@@ -360,6 +360,17 @@ impl Library {
         poses::read(&bytes).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
+    /// Notes a warning about the file that `page` names, once.
+    pub(super) fn warn(&mut self, page: &RonFile, path: &str, words: &str) -> Result<()> {
+        let full = self.need(page, path)?;
+        let known = self.file_warnings.entry(full).or_default();
+        let words = format!("{path}: {words}");
+        if !known.contains(&words) {
+            known.push(words);
+        }
+        Ok(())
+    }
+
     /// Returns the band means of the soil spectrum that `page` names.
     pub(super) fn soil_spectrum(&mut self, page: &RonFile, path: &str) -> Result<Spectrum> {
         let full = self.need(page, path)?;

@@ -21,6 +21,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
+/// Mean visible reflectance of a model above which a warning is given: photographs used as colours, and white paint.
+const BRIGHT: f32 = 0.6;
+/// Mean visible reflectance of a green leaf.
+const LEAF: f32 = 0.1;
+
 /// Adds all models to `parts`. `numbered` is the number of plants that already have a label number. Returns the plants among the models.
 pub(super) fn models(
     drawn: &Drawn<'_>,
@@ -66,9 +71,13 @@ fn place(
         roughness: desc.roughness.map(Num::f32),
         transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
         nir: desc.nir.map(Num::f32),
+        gain: desc.gain.map(Num::f32),
     };
-    let materials: Vec<u32> =
-        model.surfaces.iter().map(|s| all.material(Material::ModelSurface(ModelSurface::new(s, &repaint)))).collect();
+    let surfaces: Vec<ModelSurface> = model.surfaces.iter().map(|s| ModelSurface::new(s, &repaint)).collect();
+    if let Some(words) = bright(desc, &model, &surfaces) {
+        library.warn(drawn.page, &desc.file, &words)?;
+    }
+    let materials: Vec<u32> = surfaces.into_iter().map(|s| all.material(Material::ModelSurface(s))).collect();
     let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     let meshes = meshes(drawn, k, &PlacedModel { model: model.clone(), turn, scale, foot });
     for (part, mesh) in model.parts.iter().zip(meshes) {
@@ -98,6 +107,30 @@ fn place(
         record((number, id), &parts, called(desc), foot, &model)
     });
     Ok(plants.collect())
+}
+
+/// Returns a warning if a model reflects more of the visible light than plants and ground do. Objects that are painted
+/// white without an image are as bright on purpose.
+fn bright(desc: &ModelDesc, model: &Model, surfaces: &[ModelSurface]) -> Option<String> {
+    if desc.class == Some(Class::Soil) && model.surfaces.iter().all(|surface| surface.picture.is_none()) {
+        return None;
+    }
+    let reflectances = surfaces.iter().map(ModelSurface::mean_reflectance);
+    let visible: Vec<f32> = reflectances.map(|mean| mean.to_array()[..3].iter().sum::<f32>() / 3.0).collect();
+    let (mut light, mut area) = (0.0, 0.0);
+    for part in &model.parts {
+        let of = part.mesh.area();
+        area += of;
+        light += of * visible[part.surface];
+    }
+    let mean = light / area;
+    (mean > BRIGHT).then(|| {
+        let gain = desc.gain.map_or(1.0, Num::f32) * LEAF / mean;
+        format!(
+            "its mean reflectance in the visible is {mean:.2}; leaves have 0.1, soil 0.2, white paint 0.8: \
+             gain: {gain:.2} gives it that of a leaf"
+        )
+    })
 }
 
 /// Returns the meshes of a model's parts in world space.

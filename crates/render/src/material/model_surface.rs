@@ -28,6 +28,9 @@ const SIGMA: f32 = 0.3;
 /// Reflectance and transmittance of a leaf in near infrared.
 const LEAF_NIR: f32 = 0.45;
 
+/// Reflectance at which the bands of a surface are cut: that of fresh snow and barium sulphate.
+const BRIGHTEST: f32 = 0.95;
+
 /// Surface properties in a scene file that override those of a model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SurfaceOverride {
@@ -37,6 +40,8 @@ pub struct SurfaceOverride {
     pub transmission: Option<Spectrum>,
     /// Reflectance in near infrared, 0–1.
     pub nir: Option<f32>,
+    /// Factor on the reflectance of the file's colours.
+    pub gain: Option<f32>,
 }
 
 /// A surface of a model, prepared for shading.
@@ -81,17 +86,18 @@ impl ModelSurface {
         };
         let roughness = page.roughness.or(surface.roughness).unwrap_or(1.0).max(0.02);
         let known = page.nir.or(surface.nir);
+        let color = Vec3::from(surface.color) * page.gain.unwrap_or(1.0);
         let nir = match (&transmission, known) {
             (Some(_), nir) => Nir::Even(nir.unwrap_or(LEAF_NIR)),
             (None, None) => Nir::OfRed(1.0),
             (None, Some(nir)) => {
-                let red = surface.color[0] * surface.picture.as_ref().map_or(1.0, |p| mean(p).x);
+                let red = color.x * surface.picture.as_ref().map_or(1.0, |p| mean(p).x);
                 // A black surface has no red to scale.
                 if red > 0.01 { Nir::OfRed(nir / red) } else { Nir::Even(nir) }
             }
         };
         Self {
-            color: Vec3::from(surface.color),
+            color,
             picture: surface.picture.clone(),
             nir,
             relief: surface.relief.clone(),
@@ -99,6 +105,11 @@ impl ModelSurface {
             transmission,
             level: None,
         }
+    }
+
+    /// Returns the mean reflectance of the surface.
+    pub fn mean_reflectance(&self) -> Spectrum {
+        self.tone(mean).reflectance
     }
 
     /// Tone at a point; `of` samples the images there.
@@ -109,7 +120,7 @@ impl ModelSurface {
             Nir::Even(nir) => nir,
             Nir::OfRed(share) => share * color.x,
         };
-        let reflectance = Spectrum(color.extend(nir)).clamp(0.0, 0.95);
+        let reflectance = Spectrum(color.extend(nir)).clamp(0.0, BRIGHTEST);
         let transmittance = self.transmission.as_ref().map_or(Spectrum::ZERO, |sheet| {
             let passed = sheet.transmittance * Spectrum(seen(&sheet.picture).extend(1.0));
             // Energy conservation: reflectance plus transmittance at most 0.99.
@@ -240,6 +251,20 @@ mod tests {
             let sum = (tone.reflectance + tone.transmittance).max();
             prop_assert!(sum <= 0.9901 && tone.transmittance.0.min_element() >= 0.0, "{tone:?}");
         }
+    }
+
+    /// Expected: a gain scales the colours and the near infrared that follows red, and leaves a near infrared that the
+    /// scene file gives.
+    #[test]
+    fn a_gain_darkens_what_the_file_paints() {
+        let surface = Surface { color: [0.8, 0.6, 0.4], ..Surface::default() };
+        let mean = |page: SurfaceOverride| ModelSurface::new(&surface, &page).mean_reflectance().to_array();
+        let gain = SurfaceOverride { gain: Some(0.25), ..SurfaceOverride::default() };
+        let close = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(close(mean(gain), [0.2, 0.15, 0.1, 0.2]), "{:?}", mean(gain));
+        let given = SurfaceOverride { nir: Some(0.5), ..gain };
+        assert!(close(mean(given), [0.2, 0.15, 0.1, 0.5]), "{:?}", mean(given));
+        assert_eq!(mean(SurfaceOverride { gain: Some(9.0), ..gain })[0], BRIGHTEST);
     }
 
     #[test]
