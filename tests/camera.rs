@@ -6,10 +6,12 @@
 //! it shifts by speed × readout time × pixels per metre over the height of the image, in the image and the labels
 //! alike; any number of threads gives the same bits. Source: geometry.
 
+use crate::common::program::scratch;
 use crate::common::scenes::{camera, scene, shoot, square, with_world};
 use furrow_base::geometry::Window;
 use furrow_base::math::{Spectrum, Vec3, vec3};
 use furrow_base::sampling::Points;
+use furrow_field::assemble::{self, Options};
 use furrow_optics::bsdf::{Bsdf, OrenNayar};
 use furrow_optics::sensor::Motion;
 use furrow_render::accel::EmbreeAccel;
@@ -85,4 +87,57 @@ fn a_driving_camera_gives_the_same_bits_on_any_number_of_threads() {
         })
     };
     assert_eq!(film(1), film(3));
+}
+
+/// A calibration of `cv2.fisheye`, as `cv2.FileStorage` writes it.
+const CALIBRATION: &str = "%YAML 1.2
+---
+image_width: 640
+image_height: 480
+fisheye_model: 1
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500., 0., 322.5, 0., 510., 238.25, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ -0.031, 0.012,
+       -0.0045, 0.00069999999999999999 ]
+";
+
+/// Expected: a scene that names a calibration has its camera: a point of the ground is at the pixel that
+/// `cv2.fisheye.projectPoints` gives, for images of half the size; the ray of that pixel meets the point; the record
+/// holds the model, and the scene's hash the file. A bad file is an error with both places.
+#[test]
+fn a_calibration_file_gives_the_camera_of_its_scene() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let field = |calibration: &str, more: &str| {
+        std::fs::write(folder.join("camera.yaml"), calibration).unwrap();
+        let camera =
+            format!("size: (320, 240), intrinsics: Calibration(file: \"camera.yaml\"{more}), pose: Nadir(height_m: 1)");
+        let page = folder.join("page.ron");
+        std::fs::write(&page, format!("Field(camera: Pinhole({camera}), lights: [Overcast()])")).unwrap();
+        assemble::field(&page, &Options::default())
+    };
+    let good = field(CALIBRATION, "").unwrap();
+    let (camera, ground) = (good.scene.camera, vec3(0.3, 0.2, 0.0));
+    let px = camera.project(ground).unwrap();
+    // (465.953482, 140.701632) of 640 × 480 pixels, with centres at 0.
+    assert!((px.x - 233.226_74).abs() < 1e-3 && (px.y - 70.600_82).abs() < 1e-3, "{px}");
+    let (origin, direction) = camera.ray(px, [0.5; 2]);
+    assert!((origin + direction * (origin.z / -direction.z) - ground).length() < 1e-5);
+    let record = serde_json::to_value(&good.conditions.camera).unwrap();
+    assert_eq!(record["lens"], serde_json::json!({ "model": "fisheye", "k": [-0.031, 0.012, -0.0045, 0.0007] }));
+    assert_eq!(good.files.len(), 2);
+
+    let error = field(&CALIBRATION.replace("-0.031, ", ""), "").err().unwrap().to_string();
+    for part in ["page.ron:1", "camera.yaml", "line 11: distortion_coefficients has 3 numbers, not 4 × 1", "help: "] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    let twice = field(CALIBRATION, "), distortion: (k1: 0.1").err().unwrap().to_string();
+    assert!(twice.contains("the calibration file has a distortion"), "{twice}");
 }

@@ -35,6 +35,7 @@ fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
     Part { mesh: Arc::new(mesh), mask, material: 0, tag, instance: None }
 }
 
+#[allow(clippy::large_types_passed_by_value, reason = "the scene takes the camera")]
 fn scene(parts: Vec<Part>, camera: Camera) -> Scene {
     Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box.footprint() }
 }
@@ -70,7 +71,8 @@ fn undistort(d: &Distortion, to: [f64; 2]) -> [f64; 2] {
 /// Returns the pixel's centre on the camera's plane z = 1, by the pinhole model.
 fn centre(camera: &Camera, x: u32, y: u32) -> [f64; 2] {
     let [fx, fy, cx, cy] = camera.intrinsics();
-    undistort(&camera.distortion(), [(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy])
+    let lens = camera.distortion().polynomials().expect("a lens of these tests has polynomials alone");
+    undistort(&lens, [(f64::from(x) + 0.5 - cx) / fx, (f64::from(y) + 0.5 - cy) / fy])
 }
 
 /// Projects a world point onto that plane.

@@ -56,6 +56,7 @@ pub fn camera(size: (u32, u32), position: Vec3, target: Vec3, fov_deg: f64) -> C
 }
 
 /// Builds a scene of meshes without masks, each with one BSDF.
+#[allow(clippy::large_types_passed_by_value, reason = "the scene takes the camera")]
 pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Scene {
     let materials = parts.iter().map(|(_, b)| Material::Plain(*b)).collect();
     let part = |(i, (mesh, _)): (usize, (Mesh, Bsdf))| Part {

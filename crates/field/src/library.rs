@@ -17,7 +17,7 @@ use furrow_grow::model::{Model, Up};
 use furrow_grow::soil::LayerDesc;
 use furrow_optics::light::{Infrared, Table};
 use furrow_optics::optics::{Pigments, measured};
-use furrow_optics::sensor::Pose;
+use furrow_optics::sensor::{Calibration, Pose};
 use furrow_optics::texture::{ColorSpace, Header, Height, HeightFromBrightness, Maps, Texture, Wrap};
 use furrow_render::material::{LeafMaterial, LeafTexture, Tones};
 use sha2::{Digest, Sha256};
@@ -27,6 +27,8 @@ use std::sync::{Arc, OnceLock};
 
 /// Maximum size of a file of poses in bytes: about a million lines.
 const MOST_POSES: u64 = 64 << 20;
+/// Maximum size of a file of a camera's calibration, bytes: it may hold the points of many images.
+const MOST_CALIBRATION: u64 = 64 << 20;
 
 /// A leaf image with its opacity mask.
 #[derive(Clone)]
@@ -358,6 +360,15 @@ impl Library {
         let bytes = input::read(&full, MOST_POSES).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
         poses::read(&bytes).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+    }
+
+    /// Reads the calibration of a camera that `page` names.
+    pub(super) fn calibration(&mut self, page: &RonFile, path: &str) -> Result<Calibration> {
+        let full = self.need(page, path)?;
+        let bytes = input::read(&full, MOST_CALIBRATION).map_err(|refusal| refusal.into_error(&full))?;
+        self.files.insert(full.clone(), Sha256::digest(&bytes).into());
+        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
+        Calibration::read(&text).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
     /// Notes a warning about the file that `page` names, once.

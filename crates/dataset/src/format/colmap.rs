@@ -2,10 +2,11 @@
 //! programs for NeRFs and Gaussian splats read them.
 //!
 //! A camera has the simplest model that holds its distortion, because some readers take `PINHOLE` alone: `PINHOLE` (fx
-//! fy cx cy) without distortion, `OPENCV` (and k1 k2 p1 p2) without k3, otherwise `FULL_OPENCV` (and k3 k4 k5 k6). The
-//! first pixel's centre is (0.5, 0.5) as here. Images have the rotation w x y z and the translation from the world to the camera (x right, y down, z
-//! forward), in metres. Their names are paths relative to the dataset's `images/`, so nothing is copied:
-//! `image_path=DATASET/images`. There are no points, since no features are matched.
+//! fy cx cy) without distortion, `OPENCV` (and k1 k2 p1 p2) without k3, `OPENCV_FISHEYE` (and k1 k2 k3 k4) for a fisheye,
+//! otherwise `FULL_OPENCV` (and k3 k4 k5 k6). Thin prism distortion and a tilted sensor are refused. The first pixel's
+//! centre is (0.5, 0.5) as here. Images have the rotation w x y z and the translation from the world to the camera (x
+//! right, y down, z forward), in metres. Their names are paths relative to the dataset's `images/`, so nothing is
+//! copied: `image_path=DATASET/images`. There are no points, since no features are matched.
 //!
 //! The format cannot represent a rolling shutter; poses are those of the middle row.
 //!
@@ -13,8 +14,8 @@
 
 use super::SetWriter;
 use super::drives::{self, OfFields, DriveImage};
-use furrow_base::Result;
-use furrow_optics::sensor::CameraRecord;
+use furrow_base::{Error, Result};
+use furrow_optics::sensor::{CameraRecord, LensRecord};
 use crate::read::set::Set;
 use std::fmt::Write;
 
@@ -37,30 +38,46 @@ impl OfFields for Writer {
 
     fn field(&self, set: &Set, name: &str, images: &[DriveImage], out: &mut SetWriter<'_>) -> Result<()> {
         let folder = format!("{FOLDER}/{name}");
-        out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras(images)))?;
+        let cameras = cameras(images)?;
+        out.file(&format!("{folder}/cameras.txt"), |w| w.put(cameras))?;
         out.file(&format!("{folder}/images.txt"), |w| w.put(poses(set, images)))?;
         out.file(&format!("{folder}/points3D.txt"), |w| w.put("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n"))
     }
 }
 
 /// Returns one row per camera, numbered from 1 in the order of their names.
-fn cameras(images: &[DriveImage]) -> String {
+fn cameras(images: &[DriveImage]) -> Result<String> {
     let mut text = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n".to_owned();
     for (number, of) in (1..).zip(drives::by_camera(images).values()) {
         let c = &of[0].camera;
-        let _ = writeln!(text, "{number} {}", model(c));
+        let _ = writeln!(text, "{number} {}", model(c)?);
     }
-    text
+    Ok(text)
 }
 
 /// Returns the model of a camera, its size and its parameters.
-fn model(c: &CameraRecord) -> String {
+fn model(c: &CameraRecord) -> Result<String> {
     let pinhole = format!("{} {} {} {} {} {}", c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px);
-    if [c.k1, c.k2, c.p1, c.p2, c.k3] == [0.0; 5] {
-        return format!("PINHOLE {pinhole}");
+    let rational = match &c.lens {
+        None => [0.0; 3],
+        Some(LensRecord::Fisheye { k: [k1, k2, k3, k4] }) => {
+            return Ok(format!("OPENCV_FISHEYE {pinhole} {k1} {k2} {k3} {k4}"));
+        }
+        Some(LensRecord::OpenCv { k4_k6, s, tilt }) if *s == [0.0; 4] && *tilt == [0.0; 2] => *k4_k6,
+        Some(LensRecord::OpenCv { .. }) => {
+            return Err(Error::misuse("COLMAP has no camera with thin prism distortion (s1 to s4) or a tilted sensor")
+                .help("export tum, which holds poses alone, or calibrate with eight coefficients"));
+        }
+    };
+    if [c.k1, c.k2, c.p1, c.p2, c.k3] == [0.0; 5] && rational == [0.0; 3] {
+        return Ok(format!("PINHOLE {pinhole}"));
     }
     let opencv = format!("{pinhole} {} {} {} {}", c.k1, c.k2, c.p1, c.p2);
-    if c.k3 == 0.0 { format!("OPENCV {opencv}") } else { format!("FULL_OPENCV {opencv} {} 0 0 0", c.k3) }
+    if c.k3 == 0.0 && rational == [0.0; 3] {
+        return Ok(format!("OPENCV {opencv}"));
+    }
+    let [k4, k5, k6] = rational;
+    Ok(format!("FULL_OPENCV {opencv} {} {k4} {k5} {k6}", c.k3))
 }
 
 /// Returns two rows per image: its pose, and an empty row for its points.
@@ -103,9 +120,17 @@ mod tests {
             }
             serde_json::from_value(all).unwrap()
         };
-        assert_eq!(model(&camera(serde_json::json!({}))), "PINHOLE 6 4 5 5.5 3 2");
-        assert_eq!(model(&camera(serde_json::json!({ "p1": 0.25 }))), "OPENCV 6 4 5 5.5 3 2 0 0 0.25 0");
-        let all = serde_json::json!({ "k1": -0.5, "k3": 0.125 });
-        assert_eq!(model(&camera(all)), "FULL_OPENCV 6 4 5 5.5 3 2 -0.5 0 0 0 0.125 0 0 0");
+        let model = |distortion| model(&camera(distortion)).map_err(|e| e.to_string());
+        let is = |distortion, expected: &str| assert_eq!(model(distortion).unwrap(), expected);
+        is(serde_json::json!({}), "PINHOLE 6 4 5 5.5 3 2");
+        is(serde_json::json!({ "p1": 0.25 }), "OPENCV 6 4 5 5.5 3 2 0 0 0.25 0");
+        is(serde_json::json!({ "k1": -0.5, "k3": 0.125 }), "FULL_OPENCV 6 4 5 5.5 3 2 -0.5 0 0 0 0.125 0 0 0");
+        let fisheye = serde_json::json!({ "lens": { "model": "fisheye", "k": [0.5, 0.25, 0.0, 1.0] } });
+        is(fisheye, "OPENCV_FISHEYE 6 4 5 5.5 3 2 0.5 0.25 0 1");
+        let rational = |prism: f64| {
+            serde_json::json!({ "k1": 2.0, "lens": { "model": "opencv", "k4_k6": [0.5, 0.0, 0.0], "s": [prism, 0.0, 0.0, 0.0], "tilt": [0.0, 0.0] } })
+        };
+        is(rational(0.0), "FULL_OPENCV 6 4 5 5.5 3 2 2 0 0 0 0 0.5 0 0");
+        assert!(model(rational(0.1)).unwrap_err().contains("thin prism"));
     }
 }

@@ -69,7 +69,7 @@ impl<'a> Drawn<'a> {
         library.counted.begin(options.memory);
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
-        let camera = rig::first(page, desc, (options.width, options.height), &mut stream)?;
+        let camera = rig::first(page, desc, library, (options.width, options.height), &mut stream)?;
         let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
         let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
         let today = FieldDay::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
@@ -101,7 +101,7 @@ impl<'a> Drawn<'a> {
         if lights.is_empty() && options.scan.is_none() {
             warnings.push("no light in the scene: the image will be black".into());
         }
-        let mut captures = rig::captures(page, desc, library, camera, sown.clone(), &|purpose, k| {
+        let mut captures = rig::captures(page, desc, library, &camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
         if captures.iter().any(|capture| capture.camera.blurs()) {

@@ -27,10 +27,12 @@ const SAME_SHAPE: f64 = 1e-3;
 pub(super) fn first(
     page: &RonFile,
     desc: &FieldDesc,
+    library: &mut Library,
     (width, height): (Option<u32>, Option<u32>),
     stream: &mut Stream,
 ) -> Result<Camera> {
-    let camera = desc.camera.build(stream).map_err(|e| page.blame(&[Step::Field("camera")], e))?;
+    let camera = desc.camera.build_with(stream, &mut |file| library.calibration(page, file));
+    let camera = camera.map_err(|e| page.blame(&[Step::Field("camera")], e))?;
     let camera = match (width, height) {
         (None, None) => camera,
         (w, h) => {
@@ -57,11 +59,11 @@ pub(super) fn captures(
     page: &RonFile,
     desc: &FieldDesc,
     library: &mut Library,
-    first: Camera,
+    first: &Camera,
     sown: std::ops::Range<usize>,
     stream: &dyn Fn(Purpose, u64) -> Stream,
 ) -> Result<Vec<Capture>> {
-    let mut cameras = vec![(FIRST.to_owned(), first)];
+    let mut cameras = vec![(FIRST.to_owned(), *first)];
     for (k, mounted) in desc.cameras.iter().enumerate() {
         let at = [Step::Field("cameras"), Step::Item(k)];
         let blame = |e| page.blame(&at, e);
@@ -83,9 +85,11 @@ pub(super) fn captures(
             let help = format!("give this camera another name; the first camera is called `{FIRST}`");
             return Err(blame(Error::input(words).help(help)));
         }
-        let camera = mounted.camera.build(&mut stream(Purpose::Page, DRIVE + 1 + k.to_u64())).map_err(blame)?;
+        let mut own = stream(Purpose::Page, DRIVE + 1 + k.to_u64());
+        let camera = mounted.camera.build_with(&mut own, &mut |file| library.calibration(page, file)).map_err(blame)?;
         let shape = |camera: &Camera| f64::from(camera.width()) / f64::from(camera.height());
-        let own = desc.camera.build(&mut stream(Purpose::Page, 0)).map_or(shape(&first), |camera| shape(&camera));
+        let own = desc.camera.build_with(&mut stream(Purpose::Page, 0), &mut |file| library.calibration(page, file));
+        let own = own.map_or(shape(first), |camera| shape(&camera));
         if (shape(&camera) / own - 1.0).abs() > SAME_SHAPE {
             let words = "its images have another aspect ratio than the first camera's";
             return Err(blame(

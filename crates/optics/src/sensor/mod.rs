@@ -34,8 +34,9 @@ pub use develop::{
     Jpeg, JpegDesc, MatrixDesc, MatrixRow, Quality, Sharpen, SharpenDesc, Tone, WhiteBalance, WhiteBalanceDesc,
 };
 pub use lens::{
-    Aperture, ApertureDesc, ApertureRecord, Camera, CameraDesc, CameraModel, CameraRecord, Distortion, DistortionDesc,
-    IntrinsicsDesc, Motion, MotionDesc, MotionRecord, PixelBox, Pose, PoseDesc, Psf, PsfDesc,
+    Aperture, ApertureDesc, ApertureRecord, Calibration, Camera, CameraDesc, CameraModel, CameraRecord, Distortion,
+    DistortionDesc, Fisheye, IntrinsicsDesc, Lens, LensRecord, Motion, MotionDesc, MotionRecord, OpenCv, PixelBox,
+    Pose, PoseDesc, Psf, PsfDesc,
 };
 pub use lidar::{BeamRay, BeamsDesc, LIDARS, Lidar, LidarDesc, Pulse, PulsesDesc, Returns};
 pub use preset::PRESETS;

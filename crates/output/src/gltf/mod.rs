@@ -32,6 +32,7 @@ use furrow_grow::model::document::{
 };
 use furrow_grow::model::{Label, glb};
 use furrow_optics::light::Form;
+use furrow_optics::sensor::{Lens, OpenCv};
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Part, Scene};
 use materials::Materials;
@@ -157,7 +158,7 @@ fn camera(scene: &Scene, cameras: &mut Vec<Camera>) -> Node {
     let camera = &scene.camera;
     let [fx, fy, cx, cy] = camera.intrinsics();
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
-    let d = camera.distortion();
+    let (model, distortion) = lens(camera.distortion());
     cameras.push(Camera {
         name: Some("camera".into()),
         kind: "perspective".into(),
@@ -170,12 +171,24 @@ fn camera(scene: &Scene, cameras: &mut Vec<Camera>) -> Node {
             "size": [camera.width(), camera.height()],
             "focal": [fx, fy],
             "centre": [cx, cy],
-            "distortion": [d.k1, d.k2, d.p1, d.p2, d.k3],
+            "distortion_model": model,
+            "distortion": distortion,
         }),
     });
     let axes = camera.pose().axes;
     let node = standing("camera", axes.x_axis, -axes.y_axis, -axes.z_axis, camera.pose().position);
     Node { camera: Some(cameras.len() - 1), ..node }
+}
+
+/// Returns the name of a lens's model, and its coefficients in OpenCV's order.
+fn lens(of: Lens) -> (&'static str, Vec<f64>) {
+    match of {
+        Lens::BrownConrady(d) => ("opencv", vec![d.k1, d.k2, d.p1, d.p2, d.k3]),
+        Lens::OpenCv(OpenCv { k: [k1, k2, k3, k4, k5, k6], p, s, tilt }) => {
+            ("opencv", [&[k1, k2, p[0], p[1], k3, k4, k5, k6][..], &s, &tilt].concat())
+        }
+        Lens::Fisheye(of) => ("opencv_fisheye", of.k.to_vec()),
+    }
 }
 
 /// Creates the sun and lamps, each with its node; they emit along −z.

@@ -155,11 +155,7 @@ impl Camera {
             let inward = (radius / x.hypot(y).max(f64::MIN_POSITIVE)).min(1.0);
             self.distortion.distort([x * inward, y * inward])
         });
-        let margin = if beyond {
-            self.distortion.slope(radius) * (size + way)
-        } else {
-            self.distortion.curvature(radius) * (size * size + way * way) / 8.0
-        };
+        let margin = if beyond { self.bend[0] * (size + way) } else { self.bend[1] * (size * size + way * way) / 8.0 };
         (image, margin)
     }
 }

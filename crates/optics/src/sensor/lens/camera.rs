@@ -1,7 +1,8 @@
 //! Camera with a pose: the ray of a pixel, the pixel of a point.
 
 use super::aperture::Aperture;
-use super::distortion::Distortion;
+use super::fisheye::WIDEST;
+use super::model::Lens;
 use super::motion::Motion;
 use super::pose::Pose;
 use furrow_base::math::{ToFloat, Vec2, Vec3, vec2, vec3};
@@ -19,10 +20,12 @@ pub struct Camera {
     pub(super) focal: [f64; 2],
     /// cx, cy: optical axis, pixels.
     pub(super) centre: [f64; 2],
-    pub(super) distortion: Distortion,
+    pub(super) distortion: Lens,
     /// Limit of r² in the pinhole image beyond which nothing is projected, because the polynomial may fold back into
     /// the image.
     pub(super) horizon: f64,
+    /// Upper bounds of the lens's first and second derivatives within the horizon.
+    pub(super) bend: [f64; 2],
     aperture: Option<Aperture>,
     pub(super) pose: Pose,
     pub(super) motion: Motion,
@@ -36,7 +39,7 @@ impl Camera {
         size: (u32, u32),
         focal: [f64; 2],
         centre: [f64; 2],
-        distortion: Distortion,
+        distortion: impl Into<Lens>,
         pose: Pose,
     ) -> Result<Self> {
         let (width, height) = size;
@@ -46,10 +49,14 @@ impl Camera {
             ))
             .help("all values must be above 0"));
         }
-        let (horizon, aperture, motion) = (f64::INFINITY, None, Motion::default());
-        let mut camera = Self { width, height, scale: 1.0, focal, centre, distortion, horizon, aperture, pose, motion };
+        let distortion = distortion.into();
+        let (horizon, bend, aperture, motion) = (f64::INFINITY, [1.0, 0.0], None, Motion::default());
+        let scale = 1.0;
+        let mut camera =
+            Self { width, height, scale, focal, centre, distortion, horizon, bend, aperture, pose, motion };
         if !distortion.is_none() {
             camera.horizon = camera.check_distortion()?;
+            camera.bend = distortion.bend(camera.horizon.sqrt());
         }
         Ok(camera)
     }
@@ -97,7 +104,7 @@ impl Camera {
     }
 
     /// Returns the lens distortion.
-    pub fn distortion(&self) -> Distortion {
+    pub fn distortion(&self) -> Lens {
         self.distortion
     }
 
@@ -248,6 +255,15 @@ impl Camera {
             let t = f64::from(k) / f64::from(STEPS);
             for px in [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h]] {
                 let at = self.unproject(px);
+                if matches!(self.distortion, Lens::Fisheye(_)) && at[0].is_nan() {
+                    let words = format!(
+                        "the fisheye lens sees more than {:.0}° from its axis at the border of the image",
+                        WIDEST.to_degrees()
+                    );
+                    return Err(Error::input(words).help(
+                        "crop the images of this calibration: a smaller size, and cx and cy less by the pixels cut off",
+                    ));
+                }
                 let back = self.project_still([at[0], at[1], 1.0]).unwrap_or([f64::NAN; 2]);
                 let error = (back[0] - px[0]).abs().max((back[1] - px[1]).abs());
                 let folds = (0..=STEPS).any(|j| {

@@ -2,15 +2,17 @@
 
 use super::aperture::{Aperture, ApertureDesc};
 use super::bare;
+use super::calibration::Calibration;
 use super::camera::Camera;
 use super::distortion::DistortionDesc;
-use super::intrinsics::{IntrinsicsDesc, middle};
+use super::intrinsics::{Intrinsics, IntrinsicsDesc, middle};
+use super::model::Lens;
 use super::motion::MotionDesc;
 use super::pose::{PoseDesc, nadir, origin, zero};
-use furrow_base::Result;
 use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{Num, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
+use furrow_base::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// Defines [`CameraDesc`]. Named cameras all look down and share their fields, but each has its own defaults, pixels
@@ -77,8 +79,20 @@ macro_rules! cameras {
 
             /// Samples the camera. Returns a [`Kind::Input`](furrow_base::error::Kind::Input) error if no image could
             /// be taken: a distortion that folds the image, an aperture without a focal length in millimetres, or a
-            /// target at the camera's own position.
+            /// target at the camera's own position. A camera with a calibration file needs [`Self::build_with`].
             pub fn build(&self, stream: &mut Stream) -> Result<Camera> {
+                self.build_with(stream, &mut |file| {
+                    Err(Error::input(format!("the calibration `{file}` is read only for a scene file"))
+                        .help("write intrinsics: Pixels(…) and distortion: (…)"))
+                })
+            }
+
+            /// Like [`Self::build`]; `open` reads a calibration file.
+            pub fn build_with(
+                &self,
+                stream: &mut Stream,
+                open: &mut dyn FnMut(&str) -> Result<Calibration>,
+            ) -> Result<Camera> {
                 match self {
                     $(
                         Self::$name {
@@ -92,9 +106,13 @@ macro_rules! cameras {
                     )*
                     Self::Pinhole { size, intrinsics, pose, distortion, aperture, motion } => {
                         let size = (size.0.get().trunc_to::<u32>(), size.1.get().trunc_to::<u32>());
-                        let (focal, centre, focal_mm) = intrinsics.draw(size, stream)?;
+                        let Intrinsics { focal, centre, focal_mm, lens } = intrinsics.draw(size, stream, open)?;
                         let pose = pose.draw(stream)?;
-                        let distortion = distortion.draw(stream);
+                        if lens.is_some() && *distortion != DistortionDesc::default() {
+                            return Err(Error::input("the calibration file has a distortion, and so has the camera")
+                                .help("remove distortion: (…)"));
+                        }
+                        let distortion = lens.unwrap_or(Lens::BrownConrady(distortion.draw(stream)));
                         let aperture = aperture.as_ref().map(|of| of.draw(focal_mm, stream)).transpose()?;
                         let camera = Camera::new(size, focal, centre, distortion, pose)?;
                         Ok(camera.with_aperture(aperture).with_motion(motion.draw(0.0, stream)))

@@ -42,7 +42,7 @@ impl Distortion {
     }
 
     /// Returns the derivatives of [`Self::distort`]: ∂x′/∂x, ∂x′/∂y = ∂y′/∂x, ∂y′/∂y.
-    fn jacobian(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+    pub(super) fn jacobian(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         let Self { k1, k2, p1, p2, k3 } = *self;
         let r2 = x * x + y * y;
         let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));

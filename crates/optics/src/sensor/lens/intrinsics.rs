@@ -1,5 +1,7 @@
 //! Focal length and principal point of a camera, as written in a scene file.
 
+use super::calibration::Calibration;
+use super::model::Lens;
 use furrow_base::ron_file::{Positive, Signed, Vary};
 use furrow_base::sampling::rng::Stream;
 use furrow_base::{Error, Result};
@@ -41,19 +43,54 @@ pub enum IntrinsicsDesc {
         #[schemars(extend("x-example" = "60"))]
         horizontal_deg: Vary<Positive<180>>,
     },
+    /// Intrinsics and lens from a calibration file that OpenCV has written (`cv2.FileStorage`, YAML or XML):
+    /// `camera_matrix` and `distortion_coefficients`. Pixel centres are converted; images of another size than the
+    /// file's are scaled.
+    Calibration {
+        /// File, relative to the scene file.
+        #[schemars(extend("x-example" = "\"camera.yaml\""))]
+        file: String,
+        /// Whether the coefficients are those of `cv2.fisheye`, if the file does not say so by `fisheye_model`.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        fisheye: bool,
+    },
+}
+
+/// Sampled intrinsics.
+pub(super) struct Intrinsics {
+    /// Focal lengths, pixels.
+    pub(super) focal: [f64; 2],
+    /// Optical axis, pixels.
+    pub(super) centre: [f64; 2],
+    /// Focal length in millimetres, if the scene file gives it.
+    pub(super) focal_mm: Option<f64>,
+    /// Lens of a calibration file.
+    pub(super) lens: Option<Lens>,
+}
+
+impl Intrinsics {
+    fn new(focal: [f64; 2], centre: [f64; 2]) -> Self {
+        Self { focal, centre, focal_mm: None, lens: None }
+    }
 }
 
 impl IntrinsicsDesc {
-    /// Samples focal lengths and centre in pixels, and the focal length in millimetres if the scene file gives it.
-    pub(super) fn draw(&self, size: (u32, u32), stream: &mut Stream) -> Result<([f64; 2], [f64; 2], Option<f64>)> {
+    /// Samples the intrinsics of images of `size` pixels. `open` reads a calibration file.
+    pub(super) fn draw(
+        &self,
+        size: (u32, u32),
+        stream: &mut Stream,
+        open: &mut dyn FnMut(&str) -> Result<Calibration>,
+    ) -> Result<Intrinsics> {
         let middle = middle(size);
         Ok(match self {
             Self::Pixels { fx, fy, cx, cy } => {
-                ([fx.draw(stream), fy.draw(stream)], [cx.draw(stream), cy.draw(stream)], None)
+                Intrinsics::new([fx.draw(stream), fy.draw(stream)], [cx.draw(stream), cy.draw(stream)])
             }
             Self::Millimetres { focal_mm, pixel_um } => {
                 let focal = focal_mm.draw(stream);
-                ([focal * 1e3 / pixel_um.draw(stream); 2], middle, Some(focal))
+                let pixels = focal * 1e3 / pixel_um.draw(stream);
+                Intrinsics { focal_mm: Some(focal), ..Intrinsics::new([pixels; 2], middle) }
             }
             Self::FieldOfView { horizontal_deg } => {
                 let angle = horizontal_deg.draw(stream);
@@ -63,7 +100,11 @@ impl IntrinsicsDesc {
                     ))
                     .help("write an angle of view such as 60"));
                 }
-                ([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle, None)
+                Intrinsics::new([middle[0] / (angle / 2.0).to_radians().tan(); 2], middle)
+            }
+            Self::Calibration { file, fisheye } => {
+                let (focal, centre, lens) = open(file)?.lens(size, *fisheye)?;
+                Intrinsics { lens: Some(lens), ..Intrinsics::new(focal, centre) }
             }
         })
     }

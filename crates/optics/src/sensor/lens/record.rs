@@ -1,6 +1,9 @@
 //! Record of a sampled camera, for measurements in its images.
 
 use super::camera::Camera;
+use super::fisheye::Fisheye;
+use super::model::Lens;
+use super::opencv::OpenCv;
 use serde::{Deserialize, Serialize};
 
 /// Camera in OpenCV's conventions: x right, y down, z forward. A world point X (metres; x east, y north, z up) has the
@@ -32,6 +35,9 @@ pub struct CameraRecord {
     pub p2: f64,
     /// Distortion, radial, r⁶.
     pub k3: f64,
+    /// Other terms of the lens; none if k1 to k3, p1 and p2 are all. For a fisheye, those are 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<LensRecord>,
     /// Position of the lens's centre in world space.
     pub position_m: [f64; 3],
     /// R, row by row: the camera's axes right, down, forward in world space.
@@ -51,6 +57,26 @@ impl CameraRecord {
         let along = self.position_m[2] / down;
         (along.is_finite() && along > 0.0 && down > 0.0).then(|| along / self.fx_px)
     }
+}
+
+/// Terms of a lens beyond those of Brown and Conrady, with OpenCV's names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "model", rename_all = "lowercase")]
+pub enum LensRecord {
+    /// Further coefficients of OpenCV's model, which follow k1, k2, p1, p2, k3.
+    OpenCv {
+        /// Radial, denominator: k4, k5, k6.
+        k4_k6: [f64; 3],
+        /// Thin prism: s1 to s4.
+        s: [f64; 4],
+        /// Tilts of the sensor about x and y, radians.
+        tilt: [f64; 2],
+    },
+    /// OpenCV's fisheye model.
+    Fisheye {
+        /// k1 to k4.
+        k: [f64; 4],
+    },
 }
 
 /// Motion of a sampled camera: row y of h is in the middle of its exposure at (y/h − ½) · readout.
@@ -77,7 +103,13 @@ impl Camera {
     /// Returns the complete record of the camera.
     pub fn record(&self) -> CameraRecord {
         let [fx_px, fy_px, cx_px, cy_px] = self.intrinsics();
-        let lens = self.distortion();
+        let (k, [p1, p2], lens) = match self.distortion() {
+            Lens::BrownConrady(of) => ([of.k1, of.k2, of.k3], [of.p1, of.p2], None),
+            Lens::OpenCv(OpenCv { k: [k1, k2, k3, k4, k5, k6], p, s, tilt }) => {
+                ([k1, k2, k3], p, Some(LensRecord::OpenCv { k4_k6: [k4, k5, k6], s, tilt }))
+            }
+            Lens::Fisheye(Fisheye { k }) => ([0.0; 3], [0.0; 2], Some(LensRecord::Fisheye { k })),
+        };
         let pose = self.pose();
         let motion = self.motion();
         let moves = self.blurs() || self.rolls();
@@ -88,11 +120,12 @@ impl Camera {
             fy_px,
             cx_px,
             cy_px,
-            k1: lens.k1,
-            k2: lens.k2,
-            p1: lens.p1,
-            p2: lens.p2,
-            k3: lens.k3,
+            k1: k[0],
+            k2: k[1],
+            p1,
+            p2,
+            k3: k[2],
+            lens,
             position_m: pose.position.to_array().map(f64::from),
             world_to_camera: pose.axes.to_cols_array_2d().map(|axis| axis.map(f64::from)),
             aperture: self.aperture().map(|a| ApertureRecord { radius_m: a.radius, focus_m: a.focus }),

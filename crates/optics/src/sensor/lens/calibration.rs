@@ -1,0 +1,340 @@
+//! Calibration of a camera: intrinsics and lens from a file of OpenCV.
+//!
+//! OpenCV puts the first pixel's centre at (0, 0), this program at (0.5, 0.5), so the optical axis moves by half a pixel.
+
+use super::distortion::Distortion;
+use super::file_storage::{self, Entry};
+use super::fisheye::Fisheye;
+use super::model::Lens;
+use super::opencv::OpenCv;
+use furrow_base::math::RoundTo;
+use furrow_base::{Error, Result};
+
+/// Names of the camera matrix: those of OpenCV's samples, of ROS, and of scripts.
+const MATRIX: [&str; 5] = ["camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx"];
+/// Names of the distortion coefficients.
+const COEFFICIENTS: [&str; 6] =
+    ["distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "dist"];
+/// Names of the image's width and height.
+const SIZE: [[&str; 2]; 2] = [["image_width", "image_Width"], ["image_height", "image_Height"]];
+/// Largest relative difference between the aspect ratios of the calibration and of the image.
+const SAME_SHAPE: f64 = 2e-3;
+
+/// Calibration of a camera, in this program's pixel coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// Width and height of the calibrated images, if the file has them.
+    size: Option<[f64; 2]>,
+    focal: [f64; 2],
+    centre: [f64; 2],
+    coefficients: Vec<f64>,
+    /// Whether the file says that the lens is a fisheye; `None` if it does not say.
+    fisheye: Option<bool>,
+    /// Line of the distortion coefficients.
+    line: usize,
+}
+
+impl Calibration {
+    /// Reads a file that `cv2.FileStorage` has written, as YAML or XML. Errors name the line.
+    pub fn read(text: &str) -> Result<Self> {
+        let all = file_storage::read(text)?;
+        let find = |names: &[&str]| all.iter().find(|entry| names.contains(&entry.key.as_str()));
+        let need = |names: &[&str], what: &str| {
+            find(names).ok_or_else(|| {
+                Error::input(format!("the file has no {}", names[0]))
+                    .help(format!("write the {what} with fs.write(\"{}\", …)", names[0]))
+            })
+        };
+        let entry = need(&MATRIX, "camera matrix")?;
+        let matrix = entry.matrix()?;
+        let &[fx, skew, cx, zero, fy, cy, p, q, one] = matrix.as_slice() else {
+            return Err(entry
+                .fault(format_args!("has {} numbers, not 3 × 3", matrix.len()))
+                .help("it is cv2's 3 × 3 camera matrix"));
+        };
+        if skew != 0.0 || [zero, p, q] != [0.0; 3] || one != 1.0 {
+            return Err(entry.fault("is not of the form fx 0 cx 0 fy cy 0 0 1").help("calibrate without skew"));
+        }
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err(entry.fault("has focal lengths that are not above 0").help("calibrate again"));
+        }
+        let entry = need(&COEFFICIENTS, "distortion coefficients")?;
+        let coefficients = entry.matrix()?;
+        let line = entry.line;
+        let [width, height] = SIZE.map(|names| find(&names).map(Entry::number).transpose());
+        let size = if let (Some(width), Some(height)) = (width?, height?) { Some([width, height]) } else { None };
+        if size.is_some_and(|size| size.iter().any(|side| *side < 1.0)) {
+            return Err(Error::input("the image size in the file is not above 0")
+                .help("write image_width and image_height in pixels"));
+        }
+        let fisheye = match find(&["distortion_model"]) {
+            Some(entry) => Some(named(entry)?),
+            None => find(&["fisheye_model"]).map(Entry::number).transpose()?.map(|flag| flag != 0.0),
+        };
+        Ok(Self { size, focal: [fx, fy], centre: [cx + 0.5, cy + 0.5], coefficients, fisheye, line })
+    }
+
+    /// Returns focal lengths, optical axis and lens for images of `size` pixels. `fisheye` is the model of a file that
+    /// does not say which it has.
+    pub(super) fn lens(&self, size: (u32, u32), fisheye: bool) -> Result<([f64; 2], [f64; 2], Lens)> {
+        let image = [f64::from(size.0), f64::from(size.1)];
+        let own = self.size.unwrap_or(image);
+        if (own[0] / own[1] / (image[0] / image[1]) - 1.0).abs() > SAME_SHAPE {
+            let [w, h] = own.map(RoundTo::round_to::<u32>);
+            let words = format!(
+                "the camera was calibrated with images of {w} × {h} pixels, not of the shape of {} × {}",
+                size.0, size.1
+            );
+            return Err(Error::input(words).help(format!("write size: ({w}, {h}), or a multiple of it")));
+        }
+        let scaled = |of: [f64; 2]| [0, 1].map(|axis| of[axis] * (image[axis] / own[axis]));
+        let model = if self.fisheye.unwrap_or(fisheye) { self.fisheye()? } else { self.polynomials()? };
+        Ok((scaled(self.focal), scaled(self.centre), model))
+    }
+
+    fn fisheye(&self) -> Result<Lens> {
+        let k: [f64; 4] = self.coefficients.as_slice().try_into().map_err(|_| self.count("4 of cv2.fisheye"))?;
+        Ok(Lens::Fisheye(Fisheye { k }))
+    }
+
+    fn polynomials(&self) -> Result<Lens> {
+        if ![4, 5, 8, 12, 14].contains(&self.coefficients.len()) {
+            return Err(self.count("4, 5, 8, 12 or 14"));
+        }
+        let all: [f64; 14] = std::array::from_fn(|i| self.coefficients.get(i).copied().unwrap_or(0.0));
+        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tx, ty] = all;
+        let more = all[5..].iter().any(|c| *c != 0.0);
+        if !more {
+            return Ok(Lens::BrownConrady(Distortion { k1, k2, p1, p2, k3 }));
+        }
+        Ok(Lens::OpenCv(OpenCv { k: [k1, k2, k3, k4, k5, k6], p: [p1, p2], s: [s1, s2, s3, s4], tilt: [tx, ty] }))
+    }
+
+    fn count(&self, expected: &str) -> Error {
+        let words = format!("line {}: {} distortion coefficients, not {expected}", self.line, self.coefficients.len());
+        Error::input(words).help("write all coefficients that cv2.calibrateCamera or cv2.fisheye.calibrate returns")
+    }
+}
+
+/// Returns whether the model that ROS names is a fisheye.
+fn named(entry: &Entry) -> Result<bool> {
+    match entry.text.as_str() {
+        "plumb_bob" | "rational_polynomial" | "thin_prism" => Ok(false),
+        "equidistant" | "fisheye" => Ok(true),
+        other => Err(entry
+            .fault(format_args!("is `{other}`, which is not known"))
+            .help("known are plumb_bob, rational_polynomial, equidistant and fisheye")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Camera, Pose};
+    use super::*;
+    use furrow_base::math::Vec3;
+
+    /// Points of the camera frame.
+    const POINTS: [[f64; 3]; 6] =
+        [[0.0, 0.0, 1.0], [0.3, -0.2, 1.0], [-0.45, 0.3, 1.2], [0.55, 0.42, 1.0], [-0.5, -0.4, 0.9], [0.1, 0.6, 1.5]];
+    const ALL: [f64; 14] =
+        [0.35, -0.12, 8e-4, -6e-4, 0.02, 0.52, -0.09, 0.015, 0.0012, -4e-4, -9e-4, 3e-4, 0.02, -0.03];
+    const FIVE: [f64; 5] = [-0.21, 0.06, 0.0015, -0.001, -0.01];
+    const FISHEYE: [f64; 4] = [-0.031, 0.012, -0.0045, 7e-4];
+
+    /// Number of coefficients, and pixels of the points. OpenCV 5.0.0, Python, with K = [[500, 0, 322.5], [0, 510, 238.25],
+    /// [0, 0, 1]]: `cv2.projectPoints(POINTS, zeros(3), zeros(3), K, D)`.
+    const PROJECTED: [(usize, [[f64; 2]; 6]); 5] = [
+        (
+            4,
+            [
+                [322.5, 238.25],
+                [468.3121, 139.153022],
+                [142.151062012, 360.973605957],
+                [573.432270965, 434.256295339],
+                [69.7874307778, 32.6302842554],
+                [354.689639506, 435.879593778],
+            ],
+        ),
+        (
+            5,
+            [
+                [322.5, 238.25],
+                [468.3088045, 139.15526294],
+                [142.16677618, 360.962920322],
+                [573.130229057, 434.021032151],
+                [70.1476725022, 32.9242415025],
+                [354.688157205, 435.870522096],
+            ],
+        ),
+        (
+            8,
+            [
+                [322.5, 238.25],
+                [469.179782063, 138.534268197],
+                [140.858282356, 361.807805498],
+                [577.742575881, 437.36805981],
+                [65.4004085171, 28.7871629796],
+                [354.918063471, 437.017561774],
+            ],
+        ),
+        (
+            12,
+            [
+                [322.5, 238.25],
+                [469.254402063, 138.477183897],
+                [140.971905403, 361.720883867],
+                [577.984046839, 437.183334527],
+                [65.6528700321, 28.5940299206],
+                [355.011321742, 436.946219196],
+            ],
+        ),
+        (
+            14,
+            [
+                [322.5, 238.25],
+                [470.042908295, 138.056482349],
+                [141.983125192, 360.891904309],
+                [584.153472668, 442.096364699],
+                [71.4719098614, 33.2415277211],
+                [355.346032145, 438.961746928],
+            ],
+        ),
+    ];
+    /// The same of `cv2.fisheye.projectPoints(POINTS, zeros(3), zeros(3), K, FISHEYE)`.
+    const PROJECTED_FISHEYE: [[f64; 2]; 6] = [
+        [322.5, 238.25],
+        [465.953482069, 140.701632193],
+        [147.257717308, 357.414752231],
+        [560.662686266, 423.757081448],
+        [83.5606979209, 43.2755295034],
+        [354.029877299, 431.212849068],
+    ];
+
+    /// Returns a file as OpenCV writes it.
+    fn yaml(coefficients: &[f64], more: &str) -> String {
+        let data: Vec<String> = coefficients.iter().map(ToString::to_string).collect();
+        format!(
+            "%YAML 1.2\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   \
+             dt: d\n   data: [ 500., 0., 322.5, 0., 510., 238.25, 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   \
+             rows: 1\n   cols: {}\n   dt: d\n   data: [ {} ]\n{more}",
+            data.len(),
+            data.join(",\n       ")
+        )
+    }
+
+    const XML: &str = r#"<?xml version="1.0"?>
+<opencv_storage>
+<!-- by hand -->
+<image_width>640</image_width>
+<image_height>480</image_height>
+<camera_matrix type_id="opencv-matrix">
+  <rows>3</rows>
+  <cols>3</cols>
+  <dt>d</dt>
+  <data>
+    500. 0. 322.5 0. 510. 238.25 0. 0. 1.</data></camera_matrix>
+<distortion_coefficients type_id="opencv-matrix">
+  <rows>1</rows>
+  <cols>5</cols>
+  <dt>d</dt>
+  <data>
+    -0.21 0.06 0.0015 -0.001
+    -0.01</data></distortion_coefficients>
+<image_points type_id="opencv-matrix">
+  <rows>1</rows>
+  <cols>2</cols>
+  <dt>"2f"</dt>
+  <data>
+    0. 0. 0. 0.</data></image_points>
+</opencv_storage>
+"#;
+
+    fn camera(text: &str, fisheye: bool) -> Result<Camera> {
+        let (focal, centre, lens) = Calibration::read(text)?.lens((640, 480), fisheye)?;
+        Camera::new(
+            (640, 480),
+            focal,
+            centre,
+            lens,
+            Pose { position: Vec3::Z, axes: furrow_base::math::Mat3::IDENTITY },
+        )
+    }
+
+    fn check(camera: &Camera, expected: &[[f64; 2]; 6]) {
+        for (point, [x, y]) in POINTS.iter().zip(expected) {
+            let got = camera.project_camera(*point).expect("within the horizon");
+            // The centre of the first pixel is at 0.5 here and at 0 there.
+            assert!((got[0] - x - 0.5).abs() < 1e-9 && (got[1] - y - 0.5).abs() < 1e-9, "{got:?} for {x} {y}");
+            let back = camera.unproject(got);
+            assert!((back[0] - point[0] / point[2]).abs() < 1e-9 && (back[1] - point[1] / point[2]).abs() < 1e-9);
+        }
+    }
+
+    /// Expected: the pixels of OpenCV's own functions, and the inverse. Source: `cv2.projectPoints`.
+    #[test]
+    fn points_are_projected_as_opencv_projects_them() {
+        for (count, expected) in &PROJECTED {
+            let coefficients = if *count < 8 { &FIVE[..*count] } else { &ALL[..*count] };
+            check(&camera(&yaml(coefficients, ""), false).unwrap(), expected);
+        }
+        check(&camera(&yaml(&FISHEYE, ""), true).unwrap(), &PROJECTED_FISHEYE);
+        check(&camera(&yaml(&FISHEYE, "fisheye_model: 1\n"), false).unwrap(), &PROJECTED_FISHEYE);
+    }
+
+    /// Expected: YAML, XML and the file of ROS give the same camera; half the size halves the intrinsics.
+    #[test]
+    fn all_forms_of_a_file_give_the_same_camera() {
+        let expected = Calibration::read(&yaml(&FIVE, "rms: 0.25\nimage_points:\n   - [ 1., 2. ]\n")).unwrap();
+        let same =
+            |text: &str| assert_eq!(Calibration { line: expected.line, ..Calibration::read(text).unwrap() }, expected);
+        same(XML);
+        same(&yaml(&FIVE, "").replace('\n', "\r\n"));
+        let ros = yaml(&FIVE, "").replace(" !!opencv-matrix", "");
+        same(&ros);
+        let named = Calibration::read(&format!("{ros}distortion_model: plumb_bob\n")).unwrap();
+        assert_eq!(named.fisheye, Some(false));
+        let (focal, centre, _) = expected.lens((320, 240), false).unwrap();
+        assert_eq!((focal, centre), ([250.0, 255.0], [161.5, 119.375]));
+    }
+
+    #[test]
+    fn files_that_are_no_calibration_are_refused_with_their_line() {
+        let good = yaml(&FIVE, "");
+        for (text, why) in [
+            (String::new(), "the file is empty"),
+            ("{}".into(), "JSON"),
+            (good.replace("camera_matrix", "matrix"), "the file has no camera_matrix"),
+            (good.replace("322.5", "nan"), "line 5: camera_matrix contains `nan`"),
+            (good.replace("322.5, 0.", "322.5"), "line 5: camera_matrix has 8 numbers, not 3 × 3"),
+            (good.replace("500., 0.,", "500., 0.1,"), "line 5: camera_matrix is not of the form"),
+            (good.replace("500.", "-500."), "focal lengths"),
+            (
+                good.replace("data: [ -0.21", "data: [ -0.21, 1"),
+                "line 10: distortion_coefficients has 6 numbers, not 1 × 5",
+            ),
+            (yaml(&[0.1; 6], ""), "line 10: 6 distortion coefficients, not 4, 5, 8, 12 or 14"),
+            (good.replace(']', ""), "line 9: the list has no `]`"),
+            (format!("{good}distortion_model: omni\n"), "`omni`"),
+            (yaml(&FIVE, "fisheye_model: 1\n"), "5 distortion coefficients, not 4 of cv2.fisheye"),
+            (good.replace("640", "480"), "images of 480 × 480 pixels"),
+            (XML.replace("</data></camera_matrix>", "</camera_matrix>"), "line 11: </camera_matrix> closes no tag"),
+            (XML.replace("</opencv_storage>", ""), "<opencv_storage> is not closed"),
+            (
+                yaml(&[0.3, 0.0, 0.0, 0.0], "fisheye_model: 1\n")
+                    .replace("500., 0.", "100., 0.")
+                    .replace("510.", "100."),
+                "85°",
+            ),
+        ] {
+            let error = camera(&text, false).map(|_| ()).unwrap_err().to_string();
+            assert!(error.contains(why) && error.contains("help: "), "{why}: {error}");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn random_text_never_panics(text in "[-a-z_:<>/!\\[\\]{}. 0-9,\n]{0,120}") {
+            let _ = Calibration::read(&text);
+        }
+    }
+}
