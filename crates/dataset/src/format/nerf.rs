@@ -104,7 +104,7 @@ mod tests {
         assert!(plain["camera_model"] == "OPENCV" && plain["k1"] == 0.5 && plain["p2"] == 0.0);
         let fisheye = intrinsics(&camera(json!({ "model": "fisheye", "k": [0.1, 0.2, 0.3, 0.4] }))).unwrap();
         assert!(fisheye["camera_model"] == "OPENCV_FISHEYE" && fisheye["k4"] == 0.4 && !fisheye.contains_key("p1"));
-        let tilted = json!({ "model": "opencv", "k4_k6": [0.0; 3], "s": [0.0; 4], "tilt": [0.1, 0.0] });
+        let tilted = json!({ "model": "opencv", "k4_k6": [0.0, 0.0, 0.0], "s": [0.0, 0.0, 0.0, 0.0], "tilt": [0.1, 0.0] });
         assert!(intrinsics(&camera(tilted)).unwrap_err().to_string().contains("tilted sensor"));
     }
 }
