@@ -1,6 +1,7 @@
 //! Builds the ground of a field: the surface with its stones, then clods and litter, then scene parts.
 
 use super::contents::Contents;
+use super::detail::MeshDetail;
 use super::drawn::{Drawn, Floor};
 use super::earth::{BakedGrounds, BareGround, GroundAndStones, Soil};
 use super::ground_view::{Viewpoint, from_view};
@@ -11,7 +12,6 @@ use super::view::View;
 use super::view::VisibleGround;
 use super::{plausibility, sow, view};
 use crate::PartKind;
-use crate::desc::Detail;
 use crate::layer::Layer;
 use crate::library::Library;
 use furrow_base::geometry::{Cost, Mesh};
@@ -122,7 +122,7 @@ pub(super) fn soil(drawn: &Drawn<'_>, library: &mut Library, desc: &SoilDesc, vi
     let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
     let (site, texel, of) = (site(drawn, view), texel(drawn, view), (drawn.seed, drawn.index));
     let (desc, viewpoints) = (weathered(drawn, desc), view::viewpoints(drawn, view));
-    Ok(Soil { desc, detail: drawn.desc.detail, colors, maps, site, texel, viewpoints, of })
+    Ok(Soil { desc, detail: drawn.detail, colors, maps, site, texel, viewpoints, of })
 }
 
 /// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
@@ -150,9 +150,9 @@ fn break_ground(drawn: &Drawn<'_>, Soil { desc, colors, maps, site, .. }: &Soil)
 pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
     let pixel = soil_pixel(drawn);
     let [cells, _, things] = coarser(view);
-    let (coarsest, smallest_mm) = match drawn.desc.detail {
-        Detail::Full => (soil::FULL_CELL_M, 0.0),
-        Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
+    let (coarsest, smallest_mm) = match drawn.detail {
+        MeshDetail::Full => (soil::FULL_CELL_M, 0.0),
+        MeshDetail::ByPixel | MeshDetail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
     };
     Site {
         area: view.near.grown(GROUND_MARGIN),
@@ -167,14 +167,14 @@ pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
 
 /// Returns the texel size of the ground's maps, metres.
 pub(super) fn texel(drawn: &Drawn<'_>, view: View) -> f32 {
-    let coarsest = if drawn.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
+    let coarsest = if drawn.detail == MeshDetail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
     let [_, texels, _] = coarser(view);
     (0.9 * texels * soil_pixel(drawn)).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
 }
 
 /// Returns the pixel footprint on the ground that sets its resolution, metres.
 fn soil_pixel(drawn: &Drawn<'_>) -> f32 {
-    if drawn.desc.detail == Detail::Full { drawn.ground_pixel() } else { drawn.finest_pixel() }
+    if drawn.detail == MeshDetail::Full { drawn.ground_pixel() } else { drawn.finest_pixel() }
 }
 
 /// Estimates the cost of the ground, and of each kind of debris and clods on it, before they are built.
@@ -239,8 +239,8 @@ fn in_view(viewpoints: &[Viewpoint], area: Rect, height: impl Fn(Vec2) -> f32 + 
 fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
     let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
     let seen = match detail {
-        Detail::Full => maps.clone(),
-        Detail::ByPixel | Detail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
+        MeshDetail::Full => maps.clone(),
+        MeshDetail::ByPixel | MeshDetail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
     };
     BakedGrounds {
         ground: Arc::new(BakedGround::bake(&ground.bake(&seen, *texel))),

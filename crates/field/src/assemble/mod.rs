@@ -4,6 +4,7 @@ mod bank;
 mod census;
 mod condition;
 mod contents;
+mod detail;
 mod drawn;
 mod earth;
 mod estimate;
@@ -11,6 +12,7 @@ mod expected;
 mod extent;
 mod field;
 mod field_day;
+mod footprint;
 mod ground;
 mod ground_view;
 mod grown;
@@ -177,8 +179,7 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
         let mut library = held().clone();
-        let desc = lidar::grown(&self.desc, options.scan.as_ref());
-        let mut field = self.located(build(self.page(), &desc, options, &mut library))?;
+        let mut field = self.located(build(self.page(), &self.desc, options, &mut library))?;
         field.assigned = self.assigned.iter().map(Assignment::to_string).collect();
         *held() = library;
         Ok(field)
@@ -225,6 +226,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         crops: known::crop_records(&drawn, library)?,
         weeds: known::weed_records(&drawn, library)?,
         season: drawn.season,
+        detail: drawn.detail.record(desc, !drawn.scanners.is_empty()),
     };
     warnings.extend(library.warnings());
     let Contents { parts, kinds, materials } = parts;
