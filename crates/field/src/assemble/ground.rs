@@ -14,6 +14,7 @@ use super::{plausibility, sow, view};
 use crate::PartKind;
 use crate::layer::Layer;
 use crate::library::Library;
+use crate::profile::Phase;
 use furrow_base::geometry::{Cost, Mesh};
 use furrow_base::math::{Spectrum, ToInt, Vec2};
 use furrow_base::ron_file::{Step, Vary};
@@ -66,8 +67,10 @@ pub(super) fn cultivate(
     desc: &SoilDesc,
     sight: &VisibleGround,
 ) -> Result<(PlantsAndModels, SoilRecord)> {
-    let soil = soil(drawn, library, desc, sight.view)?;
     let options = drawn.options;
+    let profiler = &options.profiler;
+    profiler.enter(Phase::Soil);
+    let soil = soil(drawn, library, desc, sight.view)?;
     let preview = options.preview.as_ref();
     let known = preview.and_then(|preview| preview.bed(&soil));
     let mut earth = match &known {
@@ -81,27 +84,32 @@ pub(super) fn cultivate(
     let record = soil_record(drawn, desc, &ground);
     warnings.extend(plausibility::burial(drawn, floor));
     let seen = in_view(&soil.viewpoints, ground.area(), |p| floor.height(p.x, p.y));
-    // Baking takes about as long as everything else, and the two are independent.
-    let (baked, rest) = rayon::join(
-        || match &known {
+    let textures = || {
+        profiler.enter(Phase::Textures);
+        match &known {
             _ if options.unlit || options.records_only => None,
             Some(bed) => Some(bed.baked.clone()),
             None => Some(Arc::new(bake(&ground, &soil))),
-        },
-        || {
-            let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-            let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
-            // Plants first: they push the clods aside, not the other way round.
-            let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
-            let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
-            let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));
-            let uncovered = same.is_some() || options.records_only;
-            let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
-            Ok::<_, Error>((stocked, same, cover))
-        },
-    );
+        }
+    };
+    let mut covered = || {
+        profiler.enter(Phase::Plants);
+        let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+        let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
+        // Plants first: they push the clods aside, not the other way round.
+        let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
+        profiler.enter(Phase::Clods);
+        let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
+        let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));
+        let uncovered = same.is_some() || options.records_only;
+        let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
+        Ok::<_, Error>((stocked, same, cover))
+    };
+    // Baking takes about as long as everything else, and the two are independent. A profile needs one phase at a time.
+    let (baked, rest) = if profiler.is_on() { (textures(), covered()) } else { rayon::join(textures, covered) };
     let (mut stocked, same, clods) = rest?;
     drawn.options.wanted()?;
+    profiler.enter(Phase::Clods);
     let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
     if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
         let bed = known.unwrap_or_else(|| Arc::new(BareGround { soil, earth, baked }));

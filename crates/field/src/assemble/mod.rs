@@ -42,6 +42,7 @@ mod view;
 use super::desc::FieldDesc;
 use super::estimate::Estimate;
 use super::library::Library;
+use super::profile::Phase;
 pub use super::scene_edit::SceneEdit;
 use contents::Contents;
 use drawn::{Asked, Drawn};
@@ -196,15 +197,20 @@ impl Source {
 
 /// Builds a field: draws what it is, plans its ground, checks its cost, places ground, plants and models, and records it.
 fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Library) -> Result<Field> {
+    let profiler = &options.profiler;
+    profiler.enter(Phase::Other);
     let (drawn, lit, mut warnings) = Drawn::draw(page, desc, options, library)?;
     options.progress.enter(Stage::Estimate);
+    profiler.enter(Phase::Estimate);
     let sight = sight::sight(&drawn, &mut warnings)?;
     let estimate = estimate::estimate(&drawn, library, &sight)?;
     estimate.check(drawn.memory()).map_err(|(at, error)| page.blame(&at, error))?;
+    profiler.enter(Phase::Other);
     warnings.extend(plausibility::camera(&drawn));
     warnings.extend(plausibility::plants(&drawn, library)?);
     let (PlantsAndModels { parts, mut plants }, soil) = match &desc.soil {
         None => {
+            profiler.enter(Phase::Plants);
             let (seedlings, _) = sow::seedlings(&drawn, library, &sight, &[])?;
             (populate::populate(&drawn, library, &seedlings, None, &sight)?, None)
         }
@@ -214,6 +220,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
             (stocked, Some(record))
         }
     };
+    profiler.enter(Phase::Other);
     let (species, models) = (known::species(&drawn, library)?, models::names(&drawn)?);
     known::number_kinds(&mut plants, &species);
     warnings.extend(plausibility::view(&drawn, &plants, sight.shown(&drawn)));
