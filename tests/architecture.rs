@@ -112,7 +112,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("parquet", "dataset/index/table.rs"),
     ("pollster", "raster/gpu.rs"),
     // Core time and memory of the process, memory of the machine.
-    ("procfs", "dataset/make/meter.rs field/estimate.rs"),
+    ("procfs", "dataset/make/meter.rs field/estimate.rs field/profile.rs"),
     // ONNX files.
     ("prost", "train/deploy/onnx/ train/fit/log/events.rs"),
     // Mitsuba scene documents.

@@ -168,6 +168,6 @@ fn implausible_values_are_warned_of() {
     assert!(words.contains("stands 16 m apart in its rows; in_row_m is in metres"), "{words}");
     let words = warnings(low, "growth: Bbch(11), rows: (spacing_m: 75, offset_m: 30)");
     assert!(words.contains("no crop is in the camera's view"), "{words}");
-    let words = warnings("JaiAd130(height_m: 8), sensor: Phone", &format!("growth: Bbch(14), {rows}"));
+    let words = warnings("JaiAd130(height_m: 8), detail: Full, sensor: Phone", &format!("growth: Bbch(14), {rows}"));
     assert!(words.contains("the camera is 8.0 m above the ground") && words.contains("sensor: JaiAd130"), "{words}");
 }

@@ -184,9 +184,10 @@ fn beets_cover_what_their_stage_says() {
 }
 
 /// Builds a sown field under a camera.
-fn under(camera: &str) -> furrow_base::Result<Field> {
+fn under(camera: &str, detail: &str) -> furrow_base::Result<Field> {
     let text = format!(
         r#"Field(
+            detail: {detail},
             camera: Pinhole(size: (16, 12), {camera}),
             lights: [Constant(radiance: (1, 1, 1, 1))],
             crops: [(species: "scenes/species/sugar_beet.ron", growth: Bbch(10), rows: (spacing_m: 0.5, in_row_m: 0.5, emergence: 1))],
@@ -197,15 +198,15 @@ fn under(camera: &str) -> furrow_base::Result<Field> {
 
 /// Rationale: a high or oblique camera saw bare margins, which labels called soil. Expected: a plant within 0.6 m of
 /// every visible ground point, and no warning of bare ground. If the horizon is visible, a warning says so and suggests
-/// a remedy, and the field is planted up to 6 m; a view that would be more than half bare is refused. Source: rows of
-/// 0.5 m by 0.5 m.
+/// a remedy, and the field is planted up to 6 m; a second warning advises against full detail, unless the field chooses
+/// the detail itself. A view that would be more than half bare is refused. Source: rows of 0.5 m by 0.5 m.
 #[test]
 fn all_ground_in_view_is_planted_or_reported_as_bare() {
     for camera in [
         "intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 8)",
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 1.8, 0))",
     ] {
-        let field = under(camera).unwrap();
+        let field = under(camera, "Auto").unwrap();
         assert!(!field.warnings.iter().any(|words| words.contains("stays bare")), "{camera}: {:?}", field.warnings);
         let mut farthest = 0.0_f32;
         for (x, y) in [(0.0, 0.0), (16.0, 0.0), (0.0, 12.0), (16.0, 12.0), (8.0, 0.0), (0.0, 6.0)] {
@@ -219,13 +220,15 @@ fn all_ground_in_view_is_planted_or_reported_as_bare() {
     }
     let level =
         "intrinsics: FieldOfView(horizontal_deg: 40), pose: LookAt(position_m: (0, 0, 1.2), target_m: (0, 4, 0.5))";
-    let field = under(level).unwrap();
+    let field = under(level, "Full").unwrap();
     let [coarser, warning] = field.warnings.as_slice() else { panic!("{:?}", field.warnings) };
     assert!(coarser.contains("to the horizon") && coarser.contains("detail: ByPixel"), "{coarser}");
     assert!(warning.contains("to the horizon") && warning.contains("turn it down"), "{warning}");
     assert!(field.plants.iter().any(|p| p.position.y > 5.4));
-    let refused =
-        under("intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 30)").err().unwrap().to_string();
+    let chosen = under(level, "Auto").unwrap();
+    assert_eq!(chosen.warnings, std::slice::from_ref(warning));
+    let high = "intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 30)";
+    let refused = under(high, "Auto").err().unwrap().to_string();
     assert!(refused.contains("m away") && refused.contains("lower the camera"), "{refused}");
 }
 

@@ -79,6 +79,7 @@ mod pages;
 mod photo;
 #[cfg(feature = "train")]
 mod pixel_size;
+mod profile;
 mod python;
 #[cfg(feature = "raster")]
 mod raster;

@@ -57,8 +57,8 @@ pub struct FieldDesc {
     /// Sensor: conversion of the film to an image.
     #[serde(default)]
     pub sensor: SensorDesc,
-    /// Level of geometric detail.
-    #[serde(default, skip_serializing_if = "Detail::is_full")]
+    /// Level of geometric detail; by default the field chooses between `Full` and `ByPixel`.
+    #[serde(default, skip_serializing_if = "Detail::is_auto")]
     pub detail: Detail,
     /// Planted distance to the east, north, west and south of the point below each camera (for a scan, below the LiDAR), metres; at
     /// most 100.
@@ -91,6 +91,13 @@ pub struct FieldDesc {
     pub models: Vec<ModelDesc>,
 }
 
+impl FieldDesc {
+    /// Returns `true` if the scene has ground, crops or weeds, so that its extent depends on the view.
+    pub(crate) fn has_ground(&self) -> bool {
+        self.soil.is_some() || !self.crops.is_empty() || !self.weeds.is_empty()
+    }
+}
+
 /// Level of geometric detail of a field.
 ///
 /// From a drone, most details that a field camera resolves are smaller than a pixel. With `ByPixel`, the cells of leaves, of the ground and
@@ -106,8 +113,12 @@ pub struct FieldDesc {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Detail {
-    /// The detail that a field camera 1 m above the ground needs, whatever the camera: images of all sizes show the same field.
+    /// `ByPixel` if an image shows more than 12 m² of planted ground, otherwise `Full`. The area is that of the rectangle around the view with
+    /// sides to north and east. It depends on the cameras, not on the image size. The record of an image has `detail: ByPixel` where it was
+    /// chosen.
     #[default]
+    Auto,
+    /// The detail that a field camera 1 m above the ground needs, whatever the camera: images of all sizes show the same field.
     Full,
     /// The detail that the pixels need, for cameras high above the ground: builds 144 m² in seconds.
     ByPixel,
@@ -120,8 +131,8 @@ pub enum Detail {
 
 impl Detail {
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
-    fn is_full(&self) -> bool {
-        *self == Self::Full
+    fn is_auto(&self) -> bool {
+        *self == Self::Auto
     }
 }
 

@@ -12,6 +12,7 @@ mod layer;
 mod library;
 mod part_kind;
 mod poses;
+pub mod profile;
 mod scene_edit;
 pub mod shipped;
 pub mod species_file;

@@ -6,6 +6,7 @@ use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::Edit;
 use furrow_field::assemble::{Options, Stage};
+use furrow_field::profile::{Phase, Profiler};
 use furrow_optics::sensor::Lidar;
 use furrow_render::accel::{EmbreeAccel, PreviousBuild};
 use furrow_render::integrator::World;
@@ -66,6 +67,11 @@ impl PreparedField {
         &self.threads
     }
 
+    /// Returns the profiler of the field's phases; it is off unless [`SceneFile::profiled`](super::SceneFile::profiled) set it.
+    pub fn profiler(&self) -> &Profiler {
+        &self.options.profiler
+    }
+
     /// Returns the time that building the scene took, and the time of building the BVH, or zero if it is not built yet.
     pub fn times(&self) -> (Duration, Duration) {
         (self.grow, self.geometry.get().map_or(Duration::ZERO, |(_, build)| *build))
@@ -76,6 +82,7 @@ impl PreparedField {
         if self.geometry.get().is_none() {
             let begin = Instant::now();
             self.options.progress.enter(Stage::Bvh);
+            self.profiler().enter(Phase::Bvh);
             let (scene, count) = (&self.grown.scene, self.threads.count().to_u32());
             let build = |before: Option<&PreviousBuild<'_>>| {
                 EmbreeAccel::build_until(&scene.surfaces(), count, self.options.stop.as_deref(), before)
@@ -89,6 +96,7 @@ impl PreparedField {
                 Some(preview) => preview.geometry(&scene.parts, build),
             })?;
             self.options.progress.leave();
+            self.profiler().enter(Phase::Other);
             let _ = self.geometry.set((built, begin.elapsed()));
         }
         self.geometry.get().map(|(built, _)| built.as_ref()).ok_or_else(|| Error::failed("the scene was not built"))
@@ -99,6 +107,7 @@ impl PreparedField {
     pub fn label(&self) -> Result<LabelMap> {
         let (scene, geometry) = (&self.grown.scene, self.geometry()?);
         let window = Window::full(scene.camera.width(), scene.camera.height());
+        self.profiler().enter(Phase::Labels);
         Ok(self.threads.install(|| render::label(geometry, &scene.parts, &scene.camera, window)))
     }
 

@@ -2,6 +2,7 @@
 
 use super::field::PreparedField;
 use furrow_base::{Error, Result};
+use furrow_field::profile::Phase;
 use furrow_optics::sensor::Photograph;
 use furrow_output::Provenance;
 use furrow_render::film::Film;
@@ -83,18 +84,25 @@ impl<'f> Image<'f> {
     pub fn write(&self, folder: impl AsRef<Path>) -> Result<Vec<PathBuf>> {
         let Self { film, labels, provenance, .. } = self;
         let folder = folder.as_ref();
+        let profiler = self.field.profiler();
         self.field.threads().install(|| {
-            let mut files = furrow_output::image_files(film, labels, &self.expose(film), provenance)?;
+            let photograph = self.expose(film);
+            profiler.enter(Phase::Files);
+            let mut files = furrow_output::image_files(film, labels, &photograph, provenance)?;
             if let Some(clean) = &self.denoised {
-                files.extend(furrow_output::denoised_files(clean, &self.expose(clean), provenance)?);
+                let photograph = self.expose(clean);
+                profiler.enter(Phase::Files);
+                files.extend(furrow_output::denoised_files(clean, &photograph, provenance)?);
             }
             let paths = furrow_output::write_files(folder, &files)?;
+            profiler.enter(Phase::Other);
             self.check_denoised()?;
             Ok(paths)
         })
     }
 
     fn expose(&self, film: &Film) -> Photograph {
+        self.field.profiler().enter(Phase::Sensor);
         self.field.threads().install(|| self.field.edit().photograph(self.field.grown(), film))
     }
 }

@@ -8,6 +8,7 @@ use furrow_base::geometry::Window;
 use furrow_base::sampling::Points;
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
+use furrow_field::profile::Phase;
 use furrow_output::{Denoiser, Provenance, Spp};
 use furrow_render::accel;
 use furrow_render::film::Film;
@@ -141,10 +142,13 @@ impl Renderer {
         let world = field.world()?;
         let camera = &world.scene.camera;
         let window = request.window.unwrap_or(Window::full(camera.width(), camera.height()));
+        let profiler = field.profiler();
         // Label first, so that the time limit need not predict how long it takes.
+        profiler.enter(Phase::Labels);
         let start = Instant::now();
         let labels = render::label(field.geometry()?, &world.scene.parts, camera, window);
         let label = start.elapsed();
+        profiler.enter(Phase::Rays);
         let start = Instant::now();
         let quality = &self.options.quality;
         let settings = self.settings(field, window);
@@ -152,6 +156,7 @@ impl Renderer {
         let deadline = deadline(quality, begin, window);
         let film = sample(quality, &world, integrator.as_ref(), &settings, deadline, &request.watch)?;
         let sampled = start.elapsed();
+        profiler.enter(Phase::Denoise);
         let denoised = denoiser.map(|d| d.denoise(&film, field.threads().count()));
         let spp = match quality.target_error {
             Some(target) => Spp::Adaptive { samples: film.samples(), target },
@@ -159,6 +164,7 @@ impl Renderer {
         };
         let provenance = self.provenance(field, spp, request.view.name(), None);
         let times = Times { sample: sampled, draw: start.elapsed(), label };
+        profiler.enter(Phase::Other);
         Ok(Image::new(field, film, denoised, labels, provenance, times))
     }
 

@@ -9,6 +9,7 @@ use furrow_base::ron_file::Assignment;
 use furrow_field::ablation::{Edit, FULL};
 use furrow_field::assemble::{BuildProgress, Options, Preview, Scanner, Source};
 use furrow_field::estimate::Estimate;
+use furrow_field::profile::Profiler;
 use furrow_optics::sensor::CameraRecord;
 use std::path::Path;
 use std::sync::Arc;
@@ -124,6 +125,13 @@ impl SceneFile {
     #[must_use]
     pub fn progress(mut self, progress: &Arc<BuildProgress>) -> Self {
         self.options.progress = Arc::clone(progress);
+        self
+    }
+
+    /// Measures the CPU time of the phases of fields and of their images.
+    #[must_use]
+    pub fn profiled(mut self, profiler: &Profiler) -> Self {
+        self.options.profiler = profiler.clone();
         self
     }
 

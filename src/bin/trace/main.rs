@@ -25,6 +25,7 @@ mod letters;
 mod list;
 mod pages;
 mod preview;
+mod profile;
 mod quality;
 mod render;
 mod scan;

@@ -2,6 +2,7 @@
 
 use crate::field::FieldArgs;
 use crate::growing::Line;
+use crate::profile::{self, ProfileArgs};
 use crate::quality::{QualityArgs, TechniqueArgs, threads};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use furrow_base::geometry::Window;
@@ -57,6 +58,8 @@ pub(crate) struct Args {
     /// Print nothing but errors, warnings and the paths of the files.
     #[arg(long)]
     quiet: bool,
+    #[command(flatten)]
+    profile: ProfileArgs,
 }
 
 fn views() -> impl TypedValueParser<Value = View> {
@@ -67,6 +70,7 @@ fn views() -> impl TypedValueParser<Value = View> {
 /// Renders one field, or explains one of its pixels. Returns the paths of the files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let begin = Instant::now();
+    let profiler = args.profile.profiler();
     args.field.check()?;
     let edit = args.edit()?;
     let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
@@ -85,7 +89,11 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let growing = Line::begin(args.quiet);
     let note = |words: &str| growing.pause(|| args.say(words));
     let warn = |words: &str| growing.pause(|| furrow_cli::message!("warning: {words}"));
-    let field = args.field.grow_as(edit, |scene| scene.threads(&threads).progress(growing.progress()), warn)?;
+    let field = args.field.grow_as(
+        edit,
+        |scene| scene.threads(&threads).progress(growing.progress()).profiled(&profiler),
+        warn,
+    )?;
     if let Some(warning) = renderer.warning(&field) {
         warn(warning);
     }
@@ -98,6 +106,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let words = renderer.explain(&field, args.integrator, pixel)?;
         growing.end();
         cli::print(&format!("{words}\n"))?;
+        profile::print(&profiler);
         return Ok(Vec::new());
     }
     if options.engine == Engine::Trace {
@@ -117,6 +126,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     bar.finish_and_clear();
     let paths = image.write(&out)?;
     let taken = begin.elapsed();
+    profile::print(&profiler);
     if options.engine == Engine::Raster {
         args.say(&format!("{}, rendered on {}", grown(args.field.path(), &field), renderer.kernels()));
     }

@@ -23,6 +23,7 @@ use furrow_base::math::{RoundTo, ToFloat};
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
+use furrow_field::profile::{Phase, Profiler};
 use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
 use furrow_render::render::RenderMonitor;
 use rayon::prelude::*;
@@ -78,12 +79,23 @@ pub struct Work<'a> {
     pub progress: Option<&'a Arc<BuildProgress>>,
     /// Receives the time that each image takes.
     pub time_left: Option<&'a TimeLeft>,
+    /// Measures the CPU time of the phases of images. Images are then made one after another, since phases must not overlap.
+    pub profiler: Option<&'a Profiler>,
 }
 
 impl Default for Work<'_> {
     /// All images, on all cores, without pushing and progress.
     fn default() -> Self {
-        Self { shard: Shard::ALL, threads: 0, at_once: 0, memory: None, push: None, progress: None, time_left: None }
+        Self {
+            shard: Shard::ALL,
+            threads: 0,
+            at_once: 0,
+            memory: None,
+            push: None,
+            progress: None,
+            time_left: None,
+            profiler: None,
+        }
     }
 }
 
@@ -178,6 +190,10 @@ pub(crate) fn generate_for(
                 Some(progress) => scene.progress(progress),
                 None => scene,
             };
+            let scene = match work.profiler {
+                Some(profiler) => scene.profiled(profiler),
+                None => scene,
+            };
             Some((scene, index, renderer))
         }
         _ => None,
@@ -185,7 +201,12 @@ pub(crate) fn generate_for(
     let most = source
         .as_ref()
         .map_or(MOST_AT_ONCE, |(scene, index, _)| fitting(scene, set.recipe.field_of(*index).0, work.memory));
-    let at_once = if work.at_once == 0 { threads.min(most) } else { work.at_once }.min(fields.len()).max(1);
+    let at_once = match work.at_once {
+        _ if work.profiler.is_some() => 1,
+        0 => threads.min(most),
+        at_once => at_once,
+    };
+    let at_once = at_once.min(fields.len()).max(1);
     let workers = Threads::divided(threads, at_once)?;
     let run = Run {
         set,
@@ -195,6 +216,7 @@ pub(crate) fn generate_for(
         at_once,
         timing_log: TimingLog::new(delivery.home, &format!("{}-of-{}", shard.number, shard.of)),
         time_left: work.time_left,
+        profiler: work.profiler.cloned().unwrap_or_default(),
     };
     let cpu_before = meter::cpu();
     if !tasks.is_empty() {
@@ -335,6 +357,7 @@ struct Run<'a> {
     at_once: usize,
     timing_log: TimingLog,
     time_left: Option<&'a TimeLeft>,
+    profiler: Profiler,
 }
 
 impl Run<'_> {
@@ -353,6 +376,7 @@ impl Run<'_> {
             let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
             let watch = RenderMonitor { done: &|_| (), stop: self.callbacks.now };
             let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
+            self.profiler.enter(Phase::Files);
             crate::model::invariants::check(recipe, &made.sample)?;
             let mut files = native::files(recipe, &made.sample, &made.text)?;
             files.extend(formatted(self.set, &made.sample)?);
@@ -375,6 +399,7 @@ impl Run<'_> {
             checksums.files.extend(before.files.into_iter().filter(|(path, _)| kept(path)));
         }
         checksums.write(folder)?;
+        self.profiler.enter(Phase::Other);
         let seconds = self.tell_time(begin, times.grow);
         let hash = checksums.image_hash()?;
         self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
@@ -399,6 +424,7 @@ impl Run<'_> {
             end,
             cpu_s: taken.map(|taken| taken.as_secs_f64()),
             peak_bytes: meter::peak_memory(),
+            profile: self.profiler.times(),
         }))
     }
 }

@@ -1,13 +1,7 @@
-//! Core time and memory of this process, from Linux's `/proc/self`; `None` if they cannot be read.
+//! CPU time and memory of this process, from Linux's `/proc/self`; `None` if they cannot be read.
 
+pub use furrow_field::profile::cpu;
 use procfs::process::Process;
-use std::time::Duration;
-
-/// Returns the CPU time of all threads, including ended ones, with a resolution of 10 ms.
-pub fn cpu() -> Option<Duration> {
-    let stat = Process::myself().and_then(|process| process.stat()).ok()?;
-    Some(Duration::from_millis((stat.utime + stat.stime) * 1000 / procfs::ticks_per_second()))
-}
 
 /// Returns the current resident memory of the process, bytes.
 pub fn memory() -> Option<u64> {
@@ -22,6 +16,7 @@ pub fn peak_memory() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     /// Rationale: 20 ms of work are at least two ticks. Expected: CPU time advances by 20 ms, and peak memory is at
     /// least the current one.

@@ -14,6 +14,7 @@ use furrow_base::math::{ToInt, Vec3};
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
+use furrow_field::profile::Phase;
 use furrow_field::traits::{PlantTraits, Traits};
 use furrow_job::{Image, PreparedField, Renderer, Request, SceneFile};
 use furrow_render::render::{self, LabelMap, RenderMonitor};
@@ -166,6 +167,7 @@ fn label(
 ) -> Result<RenderedSample> {
     let begin = Instant::now();
     let labels = field.label()?;
+    field.profiler().enter(Phase::Records);
     let sample = field.threads().install(|| labelled(&set.recipe, index, field, (labels, traits)))?;
     let text = format!("{}\nlabels: without light\nkernels: {}", field.grown().provenance(), renderer.kernels());
     Ok(RenderedSample { sample, text, times: Times { grow, draw: Duration::ZERO, label: begin.elapsed() } })
@@ -175,6 +177,7 @@ fn label(
 pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field();
+    field.profiler().enter(Phase::Records);
     let Image { film, labels, denoised, .. } = image;
     let mut sample = labelled(recipe, index, field, (labels, traits))?;
     sample.record.exposure = Some(Exposure {
@@ -188,7 +191,9 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
     if recipe.keeps(OptionalMap::Nir) {
         sample.nir = photograph.nir;
     }
+    field.profiler().enter(Phase::Files);
     sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
+    field.profiler().enter(Phase::Records);
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
     // Class statistics include the coverage, so they are computed again now that it is known.
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);

@@ -396,7 +396,13 @@ mod tests {
         assert_eq!(state(vec![began(100.0)], 401.0), State::Silent);
         let slow = vec![began(100.0), image(0, 100.0, Some(200.0))];
         assert_eq!((state(slow.clone(), 1199.0), state(slow, 1201.0)), (State::Working, State::Silent));
-        let ended = Row::RunEnd(RunEnd { ended_s: 120.0, end: End::Stopped, cpu_s: None, peak_bytes: None });
+        let ended = Row::RunEnd(RunEnd {
+            ended_s: 120.0,
+            end: End::Stopped,
+            cpu_s: None,
+            peak_bytes: None,
+            profile: Vec::new(),
+        });
         assert_eq!(state(vec![began(100.0), ended], 1e6), State::Stopped);
     }
 

@@ -9,6 +9,7 @@ use crate::make::render::Times;
 use furrow_base::input::refuse_links;
 use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
+use furrow_field::profile::PhaseTime;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -111,6 +112,9 @@ pub struct RunEnd {
     /// Peak memory of the process, bytes; `None` if the system does not report it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub peak_bytes: Option<u64>,
+    /// CPU time of the phases of all images, if they were measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub profile: Vec<PhaseTime>,
 }
 
 /// Why a run ended.
@@ -230,7 +234,13 @@ mod tests {
             Row::RunStart(RunStart { began_s: 1.5, images: 2, at_once: 1, threads: 2 }),
             Row::Image(ImageTiming::new(4, "ab".into(), 0.5, &Times::default(), 1, 2)),
             Row::Failure(ImageFailure { index: 7, error: "no sun\n help: wait".into(), failed_s: 2.0 }),
-            Row::RunEnd(RunEnd { ended_s: 3.0, end: End::Failed, cpu_s: Some(2.5), peak_bytes: None }),
+            Row::RunEnd(RunEnd {
+                ended_s: 3.0,
+                end: End::Failed,
+                cpu_s: Some(2.5),
+                peak_bytes: None,
+                profile: Vec::new(),
+            }),
         ];
         for row in &rows {
             log.add(row).unwrap();

@@ -12,13 +12,13 @@
 //! The product is the organ's colour on this plant. Near infrared and transmittance are derived from it during shading and never sum to
 //! more than 0.99 with it ([`furrow_optics::optics::LeafOptics::at`]). Damage is that of the bank plant.
 
+use super::detail::MeshDetail;
 use super::drawn::Drawn;
 use super::grown::GrownOrgan;
 use super::member::Member;
 use super::progress::Stage;
 use super::seedling::{PlantSite, Seedling, greenness, grow};
 use crate::PlantRecord;
-use crate::desc::Detail;
 use furrow_base::Result;
 use furrow_base::geometry::Placement;
 use furrow_base::math::{Frame, Mat3, Spectrum, Vec2, Vec3};
@@ -82,7 +82,7 @@ fn placed(axis: &LeafAxis, at: &Placement) -> LeafAxis {
 /// Returns the bank plant that the plant at `at` is an instance of; `None` if the plant has its own shape.
 pub(super) fn member(drawn: &Drawn<'_>, population: u64, stream: &Stream, at: Vec2) -> Option<Member> {
     let whole = drawn.options.preview.is_some() || drawn.options.rigged;
-    let shared = drawn.desc.detail == Detail::Instanced && !whole && drawn.camera_pixel_at(at) >= COARSE;
+    let shared = drawn.detail == MeshDetail::Instanced && !whole && drawn.camera_pixel_at(at) >= COARSE;
     shared.then(|| Member::of(population, stream, drawn.cell(at)))
 }
 

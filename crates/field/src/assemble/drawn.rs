@@ -1,12 +1,13 @@
 //! Values that a field draws from its scene file before anything is built: the input of every later step.
 
+use super::detail::MeshDetail;
 use super::extent::PLANT_MARGIN;
 use super::field_day::FieldDay;
 use super::lighting::{Lighting, SceneLight};
 use super::options::Options;
 use super::season::Season;
 use super::{lidar, rig};
-use crate::desc::{Detail, FieldDesc};
+use crate::desc::FieldDesc;
 use crate::drive::Capture;
 use crate::estimate::usual_memory;
 use crate::layer::Layer;
@@ -45,6 +46,8 @@ pub(super) struct Drawn<'a> {
     pub(super) sown: std::ops::Range<usize>,
     /// Camera of the first image.
     pub(super) camera: Camera,
+    /// Level of geometric detail.
+    pub(super) detail: MeshDetail,
     /// Images to be taken of the field.
     pub(super) captures: Vec<Capture>,
     /// LiDAR at each frame of a scan; empty for images.
@@ -113,8 +116,9 @@ impl<'a> Drawn<'a> {
             }
         }
         let scanners = lidar::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
+        let detail = MeshDetail::of(desc, options.scan.is_some(), &captures);
         let camera = captures.first().map_or(camera, |first| first.camera);
-        let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, captures, scanners };
+        let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, detail, captures, scanners };
         Ok((drawn, DrawnLights { lights, records, lighting }, warnings))
     }
 
@@ -146,10 +150,10 @@ impl<'a> Drawn<'a> {
     /// cell has to the pixels of a field camera.
     pub(super) fn cell(&self, at: Vec2) -> f32 {
         let usual = GrowOptions::default().cell;
-        let by_pixel = match self.desc.detail {
+        let by_pixel = match self.detail {
             _ if self.options.preview.is_some() => 4.0 * self.ground_pixel(),
-            Detail::ByPixel | Detail::Instanced => 1.5 * self.pixel_at(at),
-            Detail::Full => 0.0,
+            MeshDetail::ByPixel | MeshDetail::Instanced => 1.5 * self.pixel_at(at),
+            MeshDetail::Full => 0.0,
         };
         usual.max(by_pixel)
     }
@@ -182,11 +186,6 @@ impl<'a> Drawn<'a> {
             sides.map(|(origin, direction)| origin.z / -direction.z * camera.pixel_angle()).reduce(f32::min)
         };
         self.captures.iter().filter_map(|capture| finest(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
-    }
-
-    /// Returns `true` if the scene has ground, crops or weeds, so that its extent depends on the view.
-    pub(super) fn has_ground(&self) -> bool {
-        self.desc.soil.is_some() || !self.desc.crops.is_empty() || !self.desc.weeds.is_empty()
     }
 
     /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.

@@ -1,7 +1,7 @@
 //! Data of a field's ground during construction.
 
+use super::detail::MeshDetail;
 use super::ground_view::Viewpoint;
-use crate::desc::Detail;
 use crate::layer::Layer;
 use furrow_base::math::Spectrum;
 use furrow_grow::soil::{Debris, Ground, MOISTURE_LEVELS, Pile, Site, SoilDesc};
@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, PartialEq)]
 pub(super) struct Soil {
     pub(super) desc: SoilDesc,
-    pub(super) detail: Detail,
+    pub(super) detail: MeshDetail,
     /// Reflectances of the soil's `colors`; the textures of its layers are in `maps`.
     pub(super) colors: Vec<Spectrum>,
     pub(super) maps: Vec<Arc<Layer>>,

@@ -1,13 +1,13 @@
 //! Estimates the cost of a field before it is built: film, LiDAR echoes, ground, debris, plants, models, images.
 
 use super::census::Population;
+use super::detail::MeshDetail;
 use super::drawn::Drawn;
 use super::member::Member;
 use super::preview::CountedPlant;
 use super::seedling::{PlantSite, Seedling, grow};
 use super::view::VisibleGround;
 use super::{ground, sow};
-use crate::desc::Detail;
 use crate::estimate::{Estimate, Share};
 use crate::library::Library;
 use furrow_base::Result;
@@ -50,7 +50,7 @@ pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Visible
     let camera = &drawn.camera;
     let pixels = f64::from(camera.width()) * f64::from(camera.height());
     let film = Cost::work(pixels * (size_of::<Pixel>().to_f64() + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
-    let coarser = if drawn.desc.detail == Detail::Full {
+    let coarser = if drawn.detail == MeshDetail::Full {
         ", or lower the camera, or set detail: ByPixel"
     } else {
         ", or lower the camera"

@@ -1,7 +1,7 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
 use super::drawn::{Asked, Drawn};
-use super::{Options, Source, ground, lidar, plausibility, sight};
+use super::{Options, Source, ground, plausibility, sight};
 use furrow_base::Result;
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::Purpose;
@@ -42,8 +42,7 @@ impl Source {
     pub(super) fn query<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         let mut library = held().clone();
-        let desc = lidar::grown(&self.desc, options.scan.as_ref());
-        let drawn = Drawn::draw(self.page(), &desc, options, &mut library);
+        let drawn = Drawn::draw(self.page(), &self.desc, options, &mut library);
         let answer = self.located(drawn.and_then(|(drawn, _, mut warnings)| {
             question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
         }))?;

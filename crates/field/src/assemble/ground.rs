@@ -1,6 +1,7 @@
 //! Builds the ground of a field: the surface with its stones, then clods and litter, then scene parts.
 
 use super::contents::Contents;
+use super::detail::MeshDetail;
 use super::drawn::{Drawn, Floor};
 use super::earth::{BakedGrounds, BareGround, GroundAndStones, Soil};
 use super::ground_view::{Viewpoint, from_view};
@@ -11,9 +12,9 @@ use super::view::View;
 use super::view::VisibleGround;
 use super::{plausibility, sow, view};
 use crate::PartKind;
-use crate::desc::Detail;
 use crate::layer::Layer;
 use crate::library::Library;
+use crate::profile::Phase;
 use furrow_base::geometry::{Cost, Mesh};
 use furrow_base::math::{Spectrum, ToInt, Vec2};
 use furrow_base::ron_file::{Step, Vary};
@@ -66,8 +67,10 @@ pub(super) fn cultivate(
     desc: &SoilDesc,
     sight: &VisibleGround,
 ) -> Result<(PlantsAndModels, SoilRecord)> {
-    let soil = soil(drawn, library, desc, sight.view)?;
     let options = drawn.options;
+    let profiler = &options.profiler;
+    profiler.enter(Phase::Soil);
+    let soil = soil(drawn, library, desc, sight.view)?;
     let preview = options.preview.as_ref();
     let known = preview.and_then(|preview| preview.bed(&soil));
     let mut earth = match &known {
@@ -81,27 +84,32 @@ pub(super) fn cultivate(
     let record = soil_record(drawn, desc, &ground);
     warnings.extend(plausibility::burial(drawn, floor));
     let seen = in_view(&soil.viewpoints, ground.area(), |p| floor.height(p.x, p.y));
-    // Baking takes about as long as everything else, and the two are independent.
-    let (baked, rest) = rayon::join(
-        || match &known {
+    let textures = || {
+        profiler.enter(Phase::Textures);
+        match &known {
             _ if options.unlit || options.records_only => None,
             Some(bed) => Some(bed.baked.clone()),
             None => Some(Arc::new(bake(&ground, &soil))),
-        },
-        || {
-            let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
-            let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
-            // Plants first: they push the clods aside, not the other way round.
-            let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
-            let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
-            let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));
-            let uncovered = same.is_some() || options.records_only;
-            let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
-            Ok::<_, Error>((stocked, same, cover))
-        },
-    );
+        }
+    };
+    let mut covered = || {
+        profiler.enter(Phase::Plants);
+        let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
+        let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
+        // Plants first: they push the clods aside, not the other way round.
+        let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
+        profiler.enter(Phase::Clods);
+        let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
+        let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));
+        let uncovered = same.is_some() || options.records_only;
+        let cover = if uncovered { Vec::new() } else { cover(drawn, &stocked.parts, desc, &mut earth, &seen) };
+        Ok::<_, Error>((stocked, same, cover))
+    };
+    // Baking takes about as long as everything else, and the two are independent. A profile needs one phase at a time.
+    let (baked, rest) = if profiler.is_on() { (textures(), covered()) } else { rayon::join(textures, covered) };
     let (mut stocked, same, clods) = rest?;
     drawn.options.wanted()?;
+    profiler.enter(Phase::Clods);
     let laid = same.unwrap_or_else(|| Arc::new(lay(floor, clods, earth.stones, baked.as_deref(), &seen)));
     if let (Some(preview), Some(earth), Some(baked)) = (preview, bare, baked) {
         let bed = known.unwrap_or_else(|| Arc::new(BareGround { soil, earth, baked }));
@@ -122,7 +130,7 @@ pub(super) fn soil(drawn: &Drawn<'_>, library: &mut Library, desc: &SoilDesc, vi
     let colors = desc.colors.iter().map(|color| color.reflectance(&mut read)).collect::<Result<Vec<Spectrum>>>()?;
     let (site, texel, of) = (site(drawn, view), texel(drawn, view), (drawn.seed, drawn.index));
     let (desc, viewpoints) = (weathered(drawn, desc), view::viewpoints(drawn, view));
-    Ok(Soil { desc, detail: drawn.desc.detail, colors, maps, site, texel, viewpoints, of })
+    Ok(Soil { desc, detail: drawn.detail, colors, maps, site, texel, viewpoints, of })
 }
 
 /// Returns the soil description for the field's day: with the moisture drawn for that day and the degree of crusting.
@@ -150,9 +158,9 @@ fn break_ground(drawn: &Drawn<'_>, Soil { desc, colors, maps, site, .. }: &Soil)
 pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
     let pixel = soil_pixel(drawn);
     let [cells, _, things] = coarser(view);
-    let (coarsest, smallest_mm) = match drawn.desc.detail {
-        Detail::Full => (soil::FULL_CELL_M, 0.0),
-        Detail::ByPixel | Detail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
+    let (coarsest, smallest_mm) = match drawn.detail {
+        MeshDetail::Full => (soil::FULL_CELL_M, 0.0),
+        MeshDetail::ByPixel | MeshDetail::Instanced => (f32::INFINITY, 1e3 * things * pixel),
     };
     Site {
         area: view.near.grown(GROUND_MARGIN),
@@ -167,14 +175,14 @@ pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
 
 /// Returns the texel size of the ground's maps, metres.
 pub(super) fn texel(drawn: &Drawn<'_>, view: View) -> f32 {
-    let coarsest = if drawn.desc.detail == Detail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
+    let coarsest = if drawn.detail == MeshDetail::Full { soil::FULL_TEXEL_M } else { f32::INFINITY };
     let [_, texels, _] = coarser(view);
     (0.9 * texels * soil_pixel(drawn)).clamp(2e-4, coarsest).max((view.near.area() / MOST_TEXELS).sqrt())
 }
 
 /// Returns the pixel footprint on the ground that sets its resolution, metres.
 fn soil_pixel(drawn: &Drawn<'_>) -> f32 {
-    if drawn.desc.detail == Detail::Full { drawn.ground_pixel() } else { drawn.finest_pixel() }
+    if drawn.detail == MeshDetail::Full { drawn.ground_pixel() } else { drawn.finest_pixel() }
 }
 
 /// Estimates the cost of the ground, and of each kind of debris and clods on it, before they are built.
@@ -239,8 +247,8 @@ fn in_view(viewpoints: &[Viewpoint], area: Rect, height: impl Fn(Vec2) -> f32 + 
 fn bake(ground: &Ground, Soil { desc, detail, maps, texel, .. }: &Soil) -> BakedGrounds {
     let coarser = |(map, layer): (&Arc<Layer>, &LayerDesc)| Arc::new(map.coarser(texel / layer.size_m.f32()));
     let seen = match detail {
-        Detail::Full => maps.clone(),
-        Detail::ByPixel | Detail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
+        MeshDetail::Full => maps.clone(),
+        MeshDetail::ByPixel | MeshDetail::Instanced => maps.iter().zip(&desc.layers).map(coarser).collect(),
     };
     BakedGrounds {
         ground: Arc::new(BakedGround::bake(&ground.bake(&seen, *texel))),

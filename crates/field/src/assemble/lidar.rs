@@ -4,14 +4,13 @@ use super::extent::{FARTHEST, PLANT_MARGIN};
 use super::ground_view::meets;
 use super::options::Scanner;
 use super::terrain::ViewRay;
-use crate::desc::{Detail, FieldDesc};
+use crate::desc::FieldDesc;
 use crate::drive::{Capture, FIRST};
 use furrow_base::math::{ToInt, Vec2, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_optics::sensor::{Camera, LIDARS, Lidar, LidarDesc};
-use std::borrow::Cow;
 
 /// Random stream address of the LiDAR, beyond those of cameras and drives.
 const LIDAR: u64 = 5 << 32;
@@ -20,15 +19,6 @@ const LOOKED_AT: u32 = 120;
 
 /// Field of the scene file that errors about the LiDAR point at.
 const AT: [Step<'static>; 1] = [Step::Field("lidar")];
-
-/// Returns the description that a field is built from: for a scan, `detail: Full` is replaced by `ByPixel`, with the spacing of the
-/// LiDAR's rays as pixel size.
-pub(super) fn grown<'a>(desc: &'a FieldDesc, scan: Option<&Scanner>) -> Cow<'a, FieldDesc> {
-    match desc.detail {
-        Detail::Full if scan.is_some() => Cow::Owned(FieldDesc { detail: Detail::ByPixel, ..desc.clone() }),
-        _ => Cow::Borrowed(desc),
-    }
-}
 
 /// Returns the LiDAR at each frame of a field's drive; empty unless the field is scanned. `first` is the first camera at the start pose.
 pub(super) fn at_frames(

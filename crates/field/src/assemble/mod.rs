@@ -4,6 +4,7 @@ mod bank;
 mod census;
 mod condition;
 mod contents;
+mod detail;
 mod drawn;
 mod earth;
 mod estimate;
@@ -11,6 +12,7 @@ mod expected;
 mod extent;
 mod field;
 mod field_day;
+mod footprint;
 mod ground;
 mod ground_view;
 mod grown;
@@ -40,6 +42,7 @@ mod view;
 use super::desc::FieldDesc;
 use super::estimate::Estimate;
 use super::library::Library;
+use super::profile::Phase;
 pub use super::scene_edit::SceneEdit;
 use contents::Contents;
 use drawn::{Asked, Drawn};
@@ -177,8 +180,7 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
         let mut library = held().clone();
-        let desc = lidar::grown(&self.desc, options.scan.as_ref());
-        let mut field = self.located(build(self.page(), &desc, options, &mut library))?;
+        let mut field = self.located(build(self.page(), &self.desc, options, &mut library))?;
         field.assigned = self.assigned.iter().map(Assignment::to_string).collect();
         *held() = library;
         Ok(field)
@@ -195,15 +197,20 @@ impl Source {
 
 /// Builds a field: draws what it is, plans its ground, checks its cost, places ground, plants and models, and records it.
 fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Library) -> Result<Field> {
+    let profiler = &options.profiler;
+    profiler.enter(Phase::Other);
     let (drawn, lit, mut warnings) = Drawn::draw(page, desc, options, library)?;
     options.progress.enter(Stage::Estimate);
+    profiler.enter(Phase::Estimate);
     let sight = sight::sight(&drawn, &mut warnings)?;
     let estimate = estimate::estimate(&drawn, library, &sight)?;
     estimate.check(drawn.memory()).map_err(|(at, error)| page.blame(&at, error))?;
+    profiler.enter(Phase::Other);
     warnings.extend(plausibility::camera(&drawn));
     warnings.extend(plausibility::plants(&drawn, library)?);
     let (PlantsAndModels { parts, mut plants }, soil) = match &desc.soil {
         None => {
+            profiler.enter(Phase::Plants);
             let (seedlings, _) = sow::seedlings(&drawn, library, &sight, &[])?;
             (populate::populate(&drawn, library, &seedlings, None, &sight)?, None)
         }
@@ -213,6 +220,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
             (stocked, Some(record))
         }
     };
+    profiler.enter(Phase::Other);
     let (species, models) = (known::species(&drawn, library)?, models::names(&drawn)?);
     known::number_kinds(&mut plants, &species);
     warnings.extend(plausibility::view(&drawn, &plants, sight.shown(&drawn)));
@@ -225,6 +233,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         crops: known::crop_records(&drawn, library)?,
         weeds: known::weed_records(&drawn, library)?,
         season: drawn.season,
+        detail: drawn.detail.record(desc, !drawn.scanners.is_empty()),
     };
     warnings.extend(library.warnings());
     let Contents { parts, kinds, materials } = parts;

@@ -2,6 +2,7 @@
 
 use super::preview::Preview;
 use super::progress::BuildProgress;
+use crate::profile::Profiler;
 use furrow_base::{Error, Result};
 use furrow_optics::sensor::LidarDesc;
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub struct Options {
     pub stop: Option<Arc<AtomicBool>>,
     /// Receiver of the construction's progress.
     pub progress: Arc<BuildProgress>,
+    /// Measures the CPU time of the construction's phases, if it is on.
+    pub profiler: Profiler,
     /// Cache for a preview: meshes are only as fine as the pixels, and unchanged parts of the previous field are reused.
     pub preview: Option<Preview>,
     /// Whether the field is built for labels only: the ground's textures are not baked, so it is black. Shapes and all records stay the

@@ -2,6 +2,7 @@
 
 use super::lighting::Lighting;
 use super::season::Season;
+use crate::desc::Detail;
 use furrow_grow::scatter::{RowsRecord, WeedsRecord};
 use furrow_grow::soil::SoilRecord;
 use furrow_optics::light::LightRecord;
@@ -42,6 +43,9 @@ pub struct Conditions {
     pub weeds: Vec<WeedRecord>,
     /// Index into the scene file's `Either` lists of growths that applies to all plants.
     pub season: Season,
+    /// Level of geometric detail that `detail: Auto` chose; left out if it is `Full`, and if the scene file sets the level.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detail: Option<Detail>,
 }
 
 /// One crop of a field.

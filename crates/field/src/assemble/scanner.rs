@@ -1,10 +1,11 @@
 //! Ground that the LiDAR of a scanned field sees.
 
 use super::drawn::Drawn;
+use super::extent::LONGEST_REACH;
 use super::ground_view::{GroundView, meets};
 use super::lidar::{slant, view_rays};
 use super::terrain::{Seen, ViewLimits, ViewRay};
-use super::view::{self, LONGEST_REACH, View, VisibleGround};
+use super::view::{self, View, VisibleGround};
 use furrow_base::math::Vec2;
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};

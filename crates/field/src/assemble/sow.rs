@@ -1,13 +1,14 @@
 //! Chooses the plants of a field: species, place and individual properties, before they grow.
 
 use super::census::{Census, Members, Population};
+use super::detail::MeshDetail;
 use super::drawn::Drawn;
 use super::extent::PLANT_MARGIN;
 use super::individual::Individual;
 use super::seedling::Seedling;
 use super::view::{self, VisibleGround};
 use super::{bank, identity};
-use crate::desc::{Detail, Growth};
+use crate::desc::Growth;
 use crate::library::{Library, Species};
 use furrow_base::Result;
 use furrow_base::math::{RoundTo, ToInt, vec2};
@@ -28,7 +29,7 @@ pub(super) fn seedlings(
     let mut all = Vec::new();
     let area = sight.view.area.grown(PLANT_MARGIN).corners();
     let (desc, page) = (drawn.desc, drawn.page);
-    let mut census = Census::new(page, desc.detail != Detail::Full, drawn.memory());
+    let mut census = Census::new(page, drawn.detail != MeshDetail::Full, drawn.memory());
     for k in drawn.sown.clone() {
         let crop = &desc.crops[k];
         let species = library.species(page, &crop.species)?;

@@ -4,8 +4,10 @@
 //! camera that sees the horizon, or ground farther away, gets bare ground there, with pixels labelled soil. The field then has a
 //! warning with the bare share of the ground in view. If that share is more than half, the scene is refused.
 
+use super::detail::MeshDetail;
 use super::drawn::Drawn;
-use super::extent::FARTHEST;
+use super::extent::{FARTHEST, LONGEST_REACH};
+use super::footprint::{Footprint, HORIZON};
 use super::ground_view::{GroundView, Viewpoint, meets};
 use super::terrain::{Near, Seen, ViewLimits, ViewRay};
 use crate::desc::Detail;
@@ -16,10 +18,6 @@ use furrow_base::{Error, Result};
 use furrow_grow::soil::Rect;
 use furrow_optics::sensor::Camera;
 
-/// Maximum value of `reach_m`, metres.
-pub(super) const LONGEST_REACH: f32 = 100.0;
-/// Sine of the angle below the horizontal; rays that are flatter count as seeing the horizon.
-const HORIZON: f32 = 0.05;
 /// Number of intervals per side of the raster of rays that estimates the share of bare ground.
 const RAYS: usize = 24;
 /// Share of bare ground above which a scene is refused.
@@ -42,7 +40,7 @@ pub(super) struct VisibleGround {
 impl VisibleGround {
     /// Returns the area that plants or their shadows must reach to be part of the scene; `None` if all are.
     pub(super) fn shown(&self, drawn: &Drawn<'_>) -> Option<Rect> {
-        drawn.has_ground().then_some(self.view.area)
+        drawn.desc.has_ground().then_some(self.view.area)
     }
 }
 
@@ -159,7 +157,6 @@ fn view_of(
     warnings: &mut Vec<String>,
 ) -> Result<View> {
     let (camera, reach) = (&capture.camera, reach(drawn)?);
-    let (w, h) = (camera.width().to_f32(), camera.height().to_f32());
     let below = camera.pose().position.truncate();
     if camera.pose().position.abs().max_element() > FARTHEST {
         let words = format!("{} is more than {FARTHEST} m from the field's origin", which(drawn, capture));
@@ -167,26 +164,10 @@ fn view_of(
             .help("move it near the origin: the field is unbounded and alike everywhere; heights are in metres");
         return Err(blame_capture(drawn, capture, error));
     }
-    let mut seen: Vec<Vec2> = Vec::new();
-    let mut level: Vec<Vec2> = Vec::new();
-    let mut view_rays: Vec<ViewRay> = Vec::new();
-    // Corners and midpoints of the sides: barrel distortion makes the sides bulge.
-    for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
-        let (origin, direction) = camera.ray(vec2(w * x.to_f32() / 2.0, h * y.to_f32() / 2.0), [0.5; 2]);
-        if direction.z < -HORIZON && origin.z > 0.0 {
-            seen.extend(meets(origin, direction));
-            view_rays.push((origin, direction));
-        } else {
-            level.push(below + direction.truncate().normalize_or_zero() * reach);
-        }
-    }
+    let Footprint { seen, level, view_rays, whole, planted: [lo, hi] } = Footprint::of(camera, reach);
     if seen.is_empty() {
         return Err(blame_capture(drawn, capture, blind(&which(drawn, capture), camera)));
     }
-    // If part of the image shows the horizon, the area ends at the reach.
-    let hull = seen.iter().chain(&level).copied();
-    let all = [hull.clone().fold(Vec2::INFINITY, Vec2::min), hull.fold(Vec2::NEG_INFINITY, Vec2::max)];
-    let (lo, hi) = (all[0].max(below - Vec2::splat(reach)), all[1].min(below + Vec2::splat(reach)));
     // Rays are those of the middle of each row's exposure, so widen the area by the distance travelled.
     let area = Rect::new(lo.x, lo.y, hi.x, hi.y).grown(camera.travel());
     let near = nearest(drawn, raster(camera), area);
@@ -195,7 +176,7 @@ fn view_of(
     // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
     let points = seen.iter().chain(&level).chain(&met).copied();
     each.push(GroundView::around(points.chain([below])));
-    if level.is_empty() && [lo, hi] == all && !farther {
+    if level.is_empty() && [lo, hi] == whole && !farther {
         return Ok(View { area, near, open: false });
     }
     let (bare, farthest) = beyond(raster(camera).filter_map(|look| terrain.meets(look, 0.0)), area, below);
@@ -228,7 +209,7 @@ fn view_of(
 
 /// Returns the part of the ground in view that gets uniform cells; `None` if all of it does.
 pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = ViewRay>, area: Rect) -> Option<Near> {
-    if drawn.desc.detail == Detail::Full {
+    if drawn.detail == MeshDetail::Full {
         return None;
     }
     let seen: Vec<(Vec2, f32, ViewRay)> = rays
@@ -248,7 +229,7 @@ pub(super) fn nearest(drawn: &Drawn<'_>, rays: impl Iterator<Item = ViewRay>, ar
 /// Returns `true` if a plant at `at` may be visible or cast a shadow into the view. Always `true` with `detail: Full`, where only
 /// the rectangle around the view limits the plants.
 pub(super) fn may_be_seen(drawn: &Drawn<'_>, sight: &VisibleGround, at: Vec2) -> bool {
-    drawn.desc.detail == Detail::Full
+    drawn.detail == MeshDetail::Full
         || sight.each.is_empty()
         || sight.each.iter().any(|view| view.distance(at) <= SIDEWAYS)
 }

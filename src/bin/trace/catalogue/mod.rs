@@ -171,7 +171,7 @@ impl Args {
             let far = if view.distance > FAR {
                 format!("reach_m: {}, detail: ByPixel,", (3.0 * view.distance).min(100.0))
             } else {
-                String::new()
+                "detail: Full,".to_owned()
             };
             (view.angle_deg, view.pose(), format!("{far} soil: (layers: [{layer}], {bare}),"))
         });

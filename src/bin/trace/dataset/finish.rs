@@ -1,13 +1,13 @@
 //! Dataset-wide files: `trace dataset finish`.
 
 use super::order::{LabelArgs, formats};
-use super::render::{PushArgs, WorkArgs, generate_and_push};
+use super::render::{PushArgs, WorkArgs, generate_in};
 use furrow_base::Result;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Set;
 use furrow_dataset::format::labels::LeftOut;
 use furrow_dataset::make::finish;
-use furrow_dataset::make::generate::Shard;
+use furrow_dataset::make::generate::{Shard, Work};
 use furrow_dataset::make::plan;
 use furrow_dataset::make::push;
 use furrow_job::Threads;
@@ -41,7 +41,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         for warning in plan::add_formats(&mut set, &args.format, &labelling)? {
             furrow_cli::message!("warning: {warning}");
         }
-        generate_and_push(&set, &args.work, Shard::ALL, None, push.as_ref(), signals)?;
+        let work = Work { push: push.as_ref(), ..args.work.of(Shard::ALL, None) };
+        generate_in(&set, None, &work, args.work.quiet, signals)?;
     }
     let threads = Threads::new(args.work.threads)?;
     let files = threads.install(|| {

@@ -10,10 +10,12 @@ pub(crate) mod render;
 mod status;
 mod verify;
 
+use crate::profile::ProfileArgs;
 use crate::quality::threads;
 use clap::{Parser, Subcommand};
-use furrow_base::Result;
+use furrow_base::{Error, Result};
 use furrow_cli::cli::signal::Signals;
+use furrow_dataset::make::generate::Work;
 use std::path::PathBuf;
 
 /// Creates or continues a dataset of a scene file: `plan`, `render` and `finish` in one command.
@@ -87,6 +89,8 @@ struct MakeArgs {
     push: render::PushArgs,
     #[command(flatten)]
     dry: cost_estimate::DryRunArgs,
+    #[command(flatten)]
+    profile: ProfileArgs,
 }
 
 /// Runs a dataset command. Returns the paths of the main files.
@@ -106,17 +110,23 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Status(args)) => status::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
         Some(Verb::Emit(args)) => emit::run(args),
+        None if cli.make.dry.dry_run && cli.make.profile.profile => {
+            Err(Error::misuse("--profile has no effect with --dry-run").help("leave one of them out"))
+        }
         None if cli.make.dry.dry_run => {
             let MakeArgs { order, work, dry, .. } = &cli.make;
             cost_estimate::run(order.images.folder(), order.order()?, work.threads, work.quiet, dry.price, signals)
         }
         None => {
+            let profiler = cli.make.profile.profiler();
             let push = cli.make.push.push()?;
             let set = order::run(&cli.make.order, cli.make.work.quiet, signals)?;
             order::print_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;
             let all = furrow_dataset::make::generate::Shard::ALL;
-            render::generate_and_push(&set, &cli.make.work, all, memory, push.as_ref(), signals)?;
+            let work = cli.make.work.of(all, memory);
+            let work = Work { push: push.as_ref(), profiler: Some(&profiler).filter(|p| p.is_on()), ..work };
+            render::generate_in(&set, None, &work, cli.make.work.quiet, signals)?;
             if cli.make.push.frees() {
                 furrow_cli::message!(
                     "all images are pushed: run `trace dataset finish` in the folder that they were pushed to"
@@ -128,7 +138,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
                 if !cli.make.work.quiet {
                     finish::print_left_out(&set)?;
                 }
-                Ok::<_, furrow_base::Error>(files)
+                Ok::<_, Error>(files)
             })?;
             if let Some(push) = &push {
                 furrow_dataset::make::push::whole(&set, push, signals.catch())?;

@@ -2,6 +2,7 @@
 
 use super::progress::Progress;
 use crate::field::MemoryArgs;
+use crate::profile::{self, ProfileArgs};
 use crate::quality::threads;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
@@ -33,6 +34,8 @@ pub(crate) struct Args {
     work: WorkArgs,
     #[command(flatten)]
     push: PushArgs,
+    #[command(flatten)]
+    profile: ProfileArgs,
 }
 
 /// Transfer of finished images to another place.
@@ -107,26 +110,16 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let help = "give --scratch a folder on a disk of this machine; it is created if it does not exist";
         cli::check_folder(scratch).map_err(|e| e.help(help))?;
     }
-    let work = Work { push: push.as_ref(), ..args.work.of(args.shard, args.memory.bytes) };
+    let profiler = args.profile.profiler();
+    let of_shard = args.work.of(args.shard, args.memory.bytes);
+    let work = Work { push: push.as_ref(), profiler: Some(&profiler).filter(|p| p.is_on()), ..of_shard };
     generate_in(&set, args.scratch.as_deref(), &work, args.work.quiet, signals)?;
     Ok(Vec::new())
 }
 
 /// Renders the missing images of a dataset.
 pub(crate) fn generate(set: &Set, args: &WorkArgs, shard: Shard, memory: Option<u64>, signals: &Signals) -> Result<()> {
-    generate_and_push(set, args, shard, memory, None, signals)
-}
-
-/// Like `generate`, and pushes finished images.
-pub(super) fn generate_and_push(
-    set: &Set,
-    args: &WorkArgs,
-    shard: Shard,
-    memory: Option<u64>,
-    push: Option<&Push>,
-    signals: &Signals,
-) -> Result<()> {
-    generate_in(set, None, &Work { push, ..args.of(shard, memory) }, args.quiet, signals)
+    generate_in(set, None, &args.of(shard, memory), args.quiet, signals)
 }
 
 /// Returns an error for a folder with unexpanded shell variables, or inside the dataset.
@@ -145,7 +138,13 @@ fn check_scratch(scratch: &Path, dir: &Path) -> Result<()> {
 }
 
 /// Renders images in the dataset's folder, or in a scratch folder and moves them there.
-fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, signals: &Signals) -> Result<()> {
+pub(super) fn generate_in(
+    set: &Set,
+    scratch: Option<&Path>,
+    work: &Work<'_>,
+    quiet: bool,
+    signals: &Signals,
+) -> Result<()> {
     let begin = Instant::now();
     let (soon, now) = signals.catch_graceful();
     let (growing, time_left) = (Arc::default(), Arc::default());
@@ -168,5 +167,6 @@ fn generate_in(set: &Set, scratch: Option<&Path>, work: &Work<'_>, quiet: bool, 
             begin.elapsed().as_secs_f64()
         );
     }
+    work.profiler.into_iter().for_each(profile::print);
     made.map_err(|error| set.blame(error))
 }
