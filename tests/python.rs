@@ -111,6 +111,15 @@ fn pytorch_loads_batches_of_a_dataset() {
     done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
 }
 
+/// Expected: tensors and targets equal the files, and a detector of torchvision takes them.
+#[test]
+fn pytorch_trains_on_targets_of_a_dataset() {
+    let Some(python) = torch_with("PIL, torchvision") else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_torch.py");
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
+}
+
 /// Expected: a misspelt keyword is an error of type checkers, and the right one is not.
 #[test]
 fn a_misspelt_keyword_is_an_error_of_types() {
