@@ -120,6 +120,17 @@ fn pytorch_trains_on_targets_of_a_dataset() {
     done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
 }
 
+/// Expected: CVAT's reader and Label Studio's decoder find the predicted classes of every pixel.
+#[test]
+fn predictions_are_read_as_annotations() {
+    let Some(python) = python("import datumaro, numpy, PIL") else { return };
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_annotate.py");
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).envs(quiet));
+}
+
 /// Expected: a misspelt keyword is an error of type checkers, and the right one is not.
 #[test]
 fn a_misspelt_keyword_is_an_error_of_types() {
