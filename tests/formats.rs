@@ -132,6 +132,21 @@ fn joints_of_leaves_lie_between_base_and_tip() {
 }
 
 #[test]
+fn whole_masks_contain_the_visible_ones() {
+    ask("check_amodal.py", "import pycocotools");
+}
+
+#[test]
+fn boxes_contain_the_points_of_their_plants() {
+    ask("check_kitti.py", "import numpy, plyfile, PIL");
+}
+
+#[test]
+fn poses_place_boxes_on_the_points_of_their_plants() {
+    ask("check_bop.py", "import numpy, plyfile, PIL");
+}
+
+#[test]
 fn plyfile_reads_points_that_the_camera_sees_where_they_came_from() {
     ask("check_ply.py", "import numpy, plyfile");
 }

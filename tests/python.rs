@@ -111,6 +111,39 @@ fn pytorch_loads_batches_of_a_dataset() {
     done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
 }
 
+/// Expected: tensors and targets equal the files, and a detector of torchvision takes them.
+#[test]
+fn pytorch_trains_on_targets_of_a_dataset() {
+    let Some(python) = torch_with("PIL, torchvision") else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_torch.py");
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
+}
+
+/// Expected: CVAT's reader and Label Studio's decoder find the predicted classes of every pixel.
+#[test]
+fn predictions_are_read_as_annotations() {
+    let Some(python) = python("import datumaro, numpy, PIL") else { return };
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_annotate.py");
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).envs(quiet));
+}
+
+/// Rationale: a notebook that stops in its third cell is worse than none. Expected: all code cells run, with small images.
+#[test]
+fn the_notebook_runs_from_the_first_cell_to_the_last() {
+    let Some(python) = python("import matplotlib, numpy, PIL") else { return };
+    let (_keep, folder) = scratch();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut run = Command::new(python);
+    run.arg(root.join("tests/python/check_notebook.py")).arg(root.join("docs/guide/notebook.ipynb"));
+    run.env("PYTHONPATH", source()).env("FURROW_TRACE", env!("CARGO_BIN_EXE_trace"));
+    run.env("MPLCONFIGDIR", &folder).env("TMPDIR", env!("CARGO_TARGET_TMPDIR")).env("PYTHONDONTWRITEBYTECODE", "1");
+    done(&mut run);
+}
+
 /// Expected: a misspelt keyword is an error of type checkers, and the right one is not.
 #[test]
 fn a_misspelt_keyword_is_an_error_of_types() {

@@ -20,9 +20,11 @@ use furrow_train::table::{Experiment, ExperimentDesc};
 use proptest::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{LazyLock, Mutex};
 
 /// Returns the `.ron` files of a folder and its subfolders, sorted, relative to the repository.
 fn pages(folder: &str) -> Vec<PathBuf> {
@@ -146,8 +148,20 @@ fn the_papers_four_sets_differ_in_their_weeds_and_seeds_alone() {
     assert_eq!(species(&all[3]).len(), 5);
 }
 
+/// Messages of the invalid files, which several tests look at.
+static MESSAGES: LazyLock<Mutex<BTreeMap<PathBuf, String>>> = LazyLock::new(Mutex::default);
+
 /// Returns the error for an invalid file, as the program prints it.
 fn message_of(path: &Path) -> String {
+    if let Some(known) = MESSAGES.lock().unwrap().get(path) {
+        return known.clone();
+    }
+    let words = fresh_message_of(path);
+    MESSAGES.lock().unwrap().insert(path.into(), words.clone());
+    words
+}
+
+fn fresh_message_of(path: &Path) -> String {
     match assemble::field(path, &Options { width: Some(16), ..Options::default() }) {
         Ok(_) => panic!("{}: it builds", path.display()),
         Err(e) => format!("error: {e}\n").replace('\\', "/"),
@@ -174,6 +188,46 @@ fn every_mistake_gets_exactly_the_words_beside_it() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Rationale: a scene file with several mistakes would otherwise take one run for each. Expected: `trace check`, and every
+/// command that reads the file, prints all of them with place and help, then their number; exit code 2; nothing is written.
+/// The message is stored beside the file like those of single mistakes, and reviewed by hand.
+#[test]
+fn all_mistakes_of_a_page_are_reported_at_once() {
+    let (page, beside) = (Path::new("tests/bad/several/field.ron"), Path::new("tests/bad/several/field.txt"));
+    let run = |args: &[&str]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_trace")).args(args).output().unwrap();
+        assert_eq!((done.status.code(), done.stdout.len()), (Some(2), 0), "{args:?}");
+        String::from_utf8(done.stderr).unwrap()
+    };
+    let words = run(&["check", page.to_str().unwrap()]);
+    if std::env::var_os("FURROW_BLESS").is_some_and(|v| v == "1") {
+        std::fs::write(beside, &words).unwrap();
+    }
+    assert_eq!(words, std::fs::read_to_string(beside).unwrap_or_default());
+    assert_eq!(words.matches("error: ").count(), words.matches("\n help: ").count(), "{words}");
+    assert!(words.ends_with("\n10 mistakes in tests/bad/several/field.ron\n"), "{words}");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let render = run(&["--scene", page.to_str().unwrap(), "--spp", "1", "--out", out.to_str().unwrap()]);
+    assert_eq!(render, words);
+    assert!(!out.exists());
+}
+
+/// Expected: a single mistake is printed as before, without a number; a file without mistakes gives exit code 0.
+#[test]
+fn a_page_with_one_mistake_or_none_is_not_counted() {
+    let run = |args: &[&str]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_trace")).arg("check").args(args).output().unwrap();
+        (done.status.code(), String::from_utf8(done.stderr).unwrap())
+    };
+    let one = std::fs::read_to_string("tests/bad/unknown_field.txt").unwrap();
+    assert_eq!(run(&["tests/bad/unknown_field.ron"]), (Some(2), one));
+    assert_eq!(run(&["tests/ref/small.ron"]), (Some(0), "tests/ref/small.ron: no mistakes\n".to_owned()));
+    // Mistakes in the file and in assigned values are reported together, each in its own text.
+    let (code, words) = run(&["tests/ref/small.ron", "--set", "camera.pose.height_m=-1", "--set", "seed=-1"]);
+    assert!(code == Some(2) && words.contains("2 mistakes in tests/ref/small.ron") && words.contains("-1"), "{words}");
 }
 
 /// Line, column and underlined characters of a message.

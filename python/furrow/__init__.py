@@ -15,6 +15,7 @@
     print(len(data), data[0].plants.max(), data[0].record["conditions"]["camera"])
 
 Requires numpy and Pillow. A `Dataset` can be passed to PyTorch's `DataLoader`; `transform` selects the contents of a batch.
+`furrow.torch` returns tensors and the targets of torchvision's detectors.
 """
 
 from ._dataset import Dataset

@@ -62,7 +62,7 @@ pub struct Place {
 /// Reason for a failure, for users and for the calling program.
 ///
 /// Displayed as `FILE: MESSAGE`, or, with a position in the file, as the source line with a caret below it. The help
-/// follows on a line of its own.
+/// follows on a line of its own. [Further mistakes](Self::others) of the same file are displayed in the same way after it.
 #[derive(Debug)]
 pub struct Error(Box<Inner>);
 
@@ -78,6 +78,8 @@ struct Inner {
     source: Option<std::io::Error>,
     /// `true` if the cause persists for every field that is built.
     lasting: bool,
+    /// Further mistakes of the same file, and that file.
+    others: Option<(Vec<Error>, PathBuf)>,
 }
 
 impl Error {
@@ -90,6 +92,7 @@ impl Error {
             place: None,
             source: None,
             lasting: false,
+            others: None,
         }))
     }
 
@@ -205,6 +208,18 @@ impl Error {
         self
     }
 
+    /// Adds the further mistakes that were found in `file`. They are displayed after this one, followed by their number.
+    #[must_use]
+    pub fn with_others(mut self, others: Vec<Self>, file: &Path) -> Self {
+        self.0.others = (!others.is_empty()).then(|| (others, file.to_path_buf()));
+        self
+    }
+
+    /// Further mistakes that were found in the same file.
+    pub fn others(&self) -> &[Self] {
+        self.0.others.as_ref().map_or(&[], |(others, _)| others)
+    }
+
     /// Kind of failure.
     pub fn kind(&self) -> Kind {
         self.0.kind
@@ -313,7 +328,14 @@ impl fmt::Display for Error {
             }
             Some(help) => write!(f, "\n help: {help}")?,
         }
-        self.0.see.as_ref().map_or(Ok(()), |command| write!(f, "\n see:  {command}"))
+        if let Some(command) = &self.0.see {
+            write!(f, "\n see:  {command}")?;
+        }
+        let Some((others, file)) = &self.0.others else { return Ok(()) };
+        for other in others {
+            write!(f, "\nerror: {other}")?;
+        }
+        write!(f, "\n{} mistakes in {}", others.len() + 1, file.display())
     }
 }
 
@@ -402,6 +424,9 @@ mod tests {
         assert_eq!(error.to_string(), shown);
         assert_eq!(error.place().and_then(|place| place.span.as_ref()), Some(&span));
         assert_eq!(Error::input("a").help("").advice(), None);
+        let all = Error::input("a").with_others(vec![Error::input("b").help("c")], Path::new("d.ron"));
+        assert_eq!(all.to_string(), "a\nerror: b\n help: c\n2 mistakes in d.ron");
+        assert_eq!(Error::input("a").with_others(Vec::new(), Path::new("d.ron")).to_string(), "a");
         let error = Error::missing("no x").in_file("c").help("get x").within("image 3");
         assert_eq!(error.to_string(), "image 3: c: no x\n help: get x");
         assert_eq!((error.kind(), error.place()), (Kind::Missing, None));

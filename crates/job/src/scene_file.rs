@@ -193,6 +193,14 @@ impl SceneFile {
         self.source.expected_warnings(&Options { index, ..self.options.clone() })
     }
 
+    /// Checks the scene file and the files that it names without building field `index`. Returns the warnings; an error contains all mistakes
+    /// that are found.
+    pub fn check(&self, index: u64) -> Result<Vec<String>> {
+        let day = self.options.day.or(self.seen_days().last().copied());
+        let options = Options { index, day, ..self.options.clone() };
+        self.threads.install(|| self.source.check(&options))
+    }
+
     /// Returns the cameras of field `index`, one for each image of a day in the order of the images, without building the field.
     pub fn cameras(&self, index: u64) -> Result<Vec<CameraRecord>> {
         let day = self.options.day.or(self.seen_days().first().copied());

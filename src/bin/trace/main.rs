@@ -5,6 +5,7 @@
 #[cfg(feature = "datasets")]
 mod ablate;
 mod catalogue;
+mod check;
 #[cfg(feature = "datasets")]
 mod compare;
 #[cfg(feature = "datasets")]
@@ -70,6 +71,7 @@ Examples:
   trace --scene scenes/field.ron --engine raster        the same field, rasterized like a game engine (feature `raster`)
   trace --scene scenes/field.ron --integrator ids       the part of each pixel, in false colours
   trace --scene scenes/field.ron --pixel 648,483        a description of that pixel
+  trace check scenes/field.ron                          all mistakes of a scene file at once
   trace watch scenes/field.ron                          a web page that renders the field whenever the file is saved
   trace preview scenes/field.ron --indices 0..12 --out sheet.png   twelve fields on one sheet
   trace dataset --scene scenes/field.ron --count 100 --out data   a labelled dataset of 100 images, resumable
@@ -111,6 +113,8 @@ enum Verb {
     Datasets(datasets::Verb),
     /// Scan a field with a rotating LiDAR: points with ranges, intensities and labels.
     Scan(scan::Args),
+    /// Check a scene file and the files that it names, and report all mistakes at once.
+    Check(check::Args),
     /// Export a field as a scene of another program.
     Export(export::Args),
     /// Render several fields of a scene file on one sheet, each with its index.
@@ -156,6 +160,7 @@ fn main() -> ExitCode {
         Some(Verb::Datasets(verb)) => datasets::run(&verb, &signals),
         #[cfg(not(all(feature = "datasets", feature = "watch")))]
         Some(Verb::LeftOut(verb)) => left_out::run(&verb),
+        Some(Verb::Check(args)) => check::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Scan(args)) => scan::run(&args),
         Some(Verb::Texture(args)) => texture::run(&args),

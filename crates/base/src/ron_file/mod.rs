@@ -9,6 +9,8 @@
 //!
 //! [`Assignment`] replaces or adds one value of a text by its path.
 //!
+//! [`Repair`] changes a text at the place of an error, so that further mistakes are found.
+//!
 //! [`to_json`] and [`from_json`] convert texts for programs that edit them as nested tables.
 //!
 //! `quantities` lists the numbers and distributions of a text with their positions, for programs that show or replace
@@ -25,6 +27,7 @@ mod json;
 mod num;
 mod place;
 mod quantities;
+mod repair;
 mod schema;
 mod spliced;
 mod suggest;
@@ -39,6 +42,7 @@ pub use json::{from_json, to_json};
 pub use num::Num;
 pub use place::{Step, place};
 pub use quantities::{Quantity, Value, quantities};
+pub use repair::Repair;
 pub use schema::{DEFAULT, DRAWN, FIXED, KIND, PICKED, RANGE};
 pub use spliced::Spliced;
 pub use suggest::{choose, nearest};

@@ -109,6 +109,13 @@ impl Spliced {
         out
     }
 
+    /// Replaces the bytes `at` by `text`. Errors about `text` are shown at the old text.
+    #[must_use]
+    pub(super) fn replaced(&self, at: Range<usize>, text: &str) -> Self {
+        let (source, from) = (self.source_at(at.start), self.origin(at.clone()));
+        self.with(at, &[(text.to_owned(), source, from)])
+    }
+
     /// Prepends `folder` to each relative path that is written as the value of one of `fields`.
     #[must_use]
     pub fn moved(&self, folder: &Path, fields: &[&str]) -> Self {
@@ -186,18 +193,22 @@ impl Spliced {
     /// Moves an error about this text to the place where the faulty part was written.
     #[must_use]
     pub fn locate(&self, error: Error) -> Error {
-        let Some(Place { file, span: Some(span) }) = error.place() else { return error };
-        if *file != self.page.path {
-            return error;
+        match error.place().and_then(|place| self.written(place)) {
+            Some(place) => error.at(place),
+            None => error,
         }
+    }
+
+    /// Returns where the text at a place of this text was written; `None` for a place elsewhere.
+    pub fn written(&self, Place { file, span }: &Place) -> Option<Place> {
+        let span = span.as_ref().filter(|_| *file == self.page.path)?;
         let start = offset_of(&self.page.text, span.line, span.column);
         let piece = self.piece(start);
         let source = &self.sources[piece.source];
         let under =
             self.page.text[start..].char_indices().nth(span.width).map_or(self.page.text.len(), |(i, _)| start + i);
         let at = if piece.copied { self.origin(start..under) } else { piece.from.clone() };
-        let place = source.place_of(at.start, at.end);
-        error.at(place)
+        Some(source.place_of(at.start, at.end))
     }
 
     fn empty(&self) -> Self {
@@ -278,7 +289,7 @@ impl<'t> Fields<'t> {
 }
 
 /// Start offset of a slice of `text`.
-fn offset_in(text: &str, part: &str) -> usize {
+pub(super) fn offset_in(text: &str, part: &str) -> usize {
     part.as_ptr().addr() - text.as_ptr().addr()
 }
 

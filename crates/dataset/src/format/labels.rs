@@ -60,6 +60,14 @@ impl<'a> Labels<'a> {
         record.seen().filter(|plant| self.labelling.lists(&plant.seen)).filter_map(|p| Some((p, self.class(p)?)))
     }
 
+    /// Returns the plants that formats of whole plants list, each with its class: those of [`Self::plants`], and fully
+    /// hidden ones unless small or occluded plants are left out.
+    pub fn whole_plants<'r>(&self, record: &'r Record) -> impl Iterator<Item = (&'r Plant, u8)> {
+        let hidden = self.labelling.min_pixels.is_none() && self.labelling.min_visible.is_none();
+        let listed = move |plant: &&Plant| self.labelling.lists(&plant.seen) || (hidden && plant.seen.pixels == 0);
+        record.plants.iter().filter(listed).filter_map(|p| Some((p, self.class(p)?)))
+    }
+
     /// Returns the leaves of a plant that formats list, whether they list the plant or not.
     pub fn leaves<'r>(&self, plant: &'r Plant) -> impl Iterator<Item = &'r Leaf> {
         plant.leaves.iter().filter(|leaf| self.labelling.lists(&leaf.seen))

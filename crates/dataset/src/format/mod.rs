@@ -72,6 +72,12 @@ pub trait Format: Sync {
         false
     }
 
+    /// Returns whether the format contains [`Rendered::boxes`](crate::model::sample::Rendered::boxes), which are computed
+    /// only if needed.
+    fn needs_boxes(&self) -> bool {
+        false
+    }
+
     /// Returns a sentence about each loss of information, and about each property that readers of the format do not
     /// expect. Each is printed once.
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
@@ -108,6 +114,10 @@ macro_rules! formats {
 }
 
 formats! {
+    "amodal" => amodal: "COCO masks of whole plants, also where others hide them, with visible and hidden parts",
+        r#"COCO("amodal/annotations/instances_train.json")"#;
+    "bop" => bop: "BOP 6D poses: boxes of plants in the camera's frame, masks, depth, for `bop_toolkit_lib`",
+        r#"json.load(open("bop/train_pbr/000000/scene_gt.json"))["0"]"#;
     "cityscapes" => cityscapes: "Cityscapes layout: label and instance maps by split and city",
         r#"datumaro.Dataset.import_from("cityscapes", "cityscapes")"#;
     "coco" => coco: "COCO instances and keypoints of plants, and of leaves in separate files, for `pycocotools`",
@@ -122,6 +132,8 @@ formats! {
         r#"OpenEXR.File("flow/000000.exr").channels()["next.x"].pixels"#;
     "imagefolder" => imagefolder: "Hugging Face ImageFolder: images, masks, metadata and card for `datasets`",
         r#"datasets.load_dataset("imagefolder")["train"][0]["plants"]"#;
+    "kitti" => kitti: "KITTI 3-D boxes of plants, calibration and images, for detectors such as those of `mmdet3d`",
+        r#"open("kitti/training/label_2/000000.txt").read().split("\n")"#;
     "layers" => layers: "OpenEXR: radiance, variance, ids, coverage and Cryptomattes in one file per image",
         r#"OpenEXR.File("layers/train/000000.exr").channels()"#;
     "mots" => mots: "MOTS: masks of plants with the same numbers over a drive, one text file per camera",

@@ -9,6 +9,7 @@ pub mod generate;
 pub mod meter;
 pub mod pack;
 pub mod plan;
+pub mod plant_boxes;
 pub mod push;
 pub mod render;
 pub mod scene_files;

@@ -3,6 +3,7 @@
 use crate::format;
 use crate::make::damage;
 use crate::make::flow;
+use crate::make::plant_boxes;
 use crate::model::annotate::{self, keypoint, of_255};
 use crate::model::optional_maps::{self, OptionalMap};
 use crate::model::photo;
@@ -17,7 +18,7 @@ use furrow_field::drive::Capture;
 use furrow_field::profile::Phase;
 use furrow_field::traits::{PlantTraits, Traits};
 use furrow_job::{Image, PreparedField, Renderer, Request, SceneFile};
-use furrow_render::render::{self, LabelMap, RenderMonitor};
+use furrow_render::render::{self, Extent, LabelMap, RenderMonitor, WholePlants};
 use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -225,6 +226,7 @@ fn labelled(
     } else {
         Vec::new()
     };
+    let WholePlants { extents, masks } = render::whole_plants(&field.scene, &labels);
     let tags = field.scene.tags();
     let kinds: BTreeMap<u32, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u32| kinds.get(&plant).copied().unwrap_or(0);
@@ -264,7 +266,12 @@ fn labelled(
     let before = known.take().unwrap_or_default();
     let traits = known.insert(before.of_next_image(field));
     sample.record.canopy = traits.canopy;
-    sample.record.plants = plants(field, traits, &labels, &sample);
+    sample.record.plants = plants(field, traits, &extents, &sample);
+    let boxes = if formats.iter().any(|(_, format)| format.needs_boxes()) {
+        plant_boxes::boxes(field, sample.record.plants.iter().map(|plant| plant.number))
+    } else {
+        BTreeMap::new()
+    };
     sample.film = Some(Rendered {
         film: None,
         labels,
@@ -274,6 +281,8 @@ fn labelled(
         camera: field.scene.camera,
         flows,
         damage,
+        masks,
+        boxes,
     });
     Ok(sample)
 }
@@ -294,15 +303,19 @@ fn taken(recipe: &Recipe, field: &furrow_field::Field) -> CaptureRecord {
 }
 
 /// Returns the plants of a field in the image's view, including fully occluded ones, by ascending number.
-fn plants(field: &furrow_field::Field, traits: &Traits, labels: &LabelMap, sample: &Sample) -> Vec<Plant> {
-    let extents = render::extents(&field.scene, labels);
+fn plants(
+    field: &furrow_field::Field,
+    traits: &Traits,
+    extents: &BTreeMap<(u32, u16), Extent>,
+    sample: &Sample,
+) -> Vec<Plant> {
     let camera = &field.scene.camera;
     let mut shown: BTreeMap<u32, Plant> = annotate::plants(sample).into_iter().map(|p| (p.number, p)).collect();
     let mut all = Vec::new();
     for grown in &field.plants {
         let Some(extent) = extents.get(&(grown.number, 0)).filter(|e| e.unoccluded > 0) else { continue };
         let mut plant = shown.remove(&grown.number).unwrap_or_else(|| hidden(grown));
-        let known = |seen: &mut Seen, extent: &render::Extent| {
+        let known = |seen: &mut Seen, extent: &Extent| {
             (seen.unoccluded, seen.whole) = (Some(extent.unoccluded), Some(extent.whole));
         };
         known(&mut plant.seen, extent);

@@ -1,6 +1,7 @@
 //! The data model: recipe, classes, one image with its labels and record, and the rules that each image satisfies.
 
 pub mod annotate;
+pub mod box3;
 pub mod classes;
 pub mod image_files;
 pub mod invariants;

@@ -29,6 +29,13 @@ impl Box2 {
         Self([x, y, 1, 1])
     }
 
+    /// Returns the box of pixels (x, y); `None` without pixels.
+    pub fn around(pixels: impl Iterator<Item = (u32, u32)>) -> Option<Self> {
+        let mut all = None::<Self>;
+        pixels.for_each(|(x, y)| all.get_or_insert(Self::of(x, y)).add(x, y));
+        all
+    }
+
     /// Extends the box to contain a pixel.
     pub fn add(&mut self, x: u32, y: u32) {
         let [x0, y0, w, h] = self.0;

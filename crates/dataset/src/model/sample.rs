@@ -1,11 +1,12 @@
 //! One image with all its labels and metadata, in memory: the source of every format.
 
+use crate::model::box3::UprightBox;
 use crate::model::photo::Jpegs;
 use crate::model::record::Record;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_render::film::Film;
-use furrow_render::render::LabelMap;
+use furrow_render::render::{LabelMap, WholeMask};
 use std::collections::BTreeMap;
 
 /// One image of a dataset. Maps contain one value per pixel, row by row from the top; a map that is not available is
@@ -70,6 +71,19 @@ pub struct Rendered {
     pub flows: Vec<Flow>,
     /// Damage of the leaf at each pixel's centre; empty unless a format needs it.
     pub damage: Vec<furrow_render::material::Damage>,
+    /// Pixels that each plant would cover without occlusion, by its number.
+    pub masks: BTreeMap<u32, WholeMask>,
+    /// Boxes around each plant, by its number; empty unless a format needs them.
+    pub boxes: BTreeMap<u32, PlantBoxes>,
+}
+
+/// Boxes around all vertices of a plant, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlantBoxes {
+    /// Upright in world space: x east, y north, z up.
+    pub world: UprightBox,
+    /// Upright in the image, in the camera's frame with the axes right, forward, down.
+    pub camera: UprightBox,
 }
 
 /// Optical flow from one image to another of the same field.

@@ -1,7 +1,8 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
 use super::drawn::{Asked, Drawn};
-use super::{Options, Source, ground, plausibility, sight};
+use super::{Options, Source, estimate, ground, known, plausibility, sight};
+use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::Purpose;
@@ -18,19 +19,41 @@ impl Source {
 
     /// Returns the warnings of field `options.index` that can be found without building it.
     pub fn expected_warnings(&self, options: &Options) -> Result<Vec<String>> {
-        self.query(options, |Asked { drawn, library, warnings }| {
-            // Load soil and models first, so that unusable files are reported as errors.
-            let sight = sight::sight(drawn, warnings)?;
-            if let Some(soil) = &self.desc.soil {
-                ground::soil(drawn, library, soil, sight.view)?;
-            }
-            for model in &self.desc.models {
-                library.model(self.page(), model)?;
-            }
-            warnings.extend(plausibility::camera(drawn));
-            warnings.extend(plausibility::plants(drawn, library)?);
-            Ok(std::mem::take(warnings))
-        })
+        self.query(options, |asked| self.warnings(asked))
+    }
+
+    /// Checks everything about field `options.index` that can be checked without building it. Returns the same warnings as
+    /// [`Self::expected_warnings`].
+    pub fn check(&self, options: &Options) -> Result<Vec<String>> {
+        self.query(options, |asked| self.checked(asked))
+    }
+
+    /// Like [`Self::check`] for one reading of several: the error is about the first mistake. Also returns the files that were read.
+    pub(super) fn tried(&self, options: &Options) -> (Result<Vec<String>>, Library) {
+        self.asked(options, |asked| self.checked(asked))
+    }
+
+    fn warnings(&self, Asked { drawn, library, warnings }: Asked<'_>) -> Result<Vec<String>> {
+        // Load soil and models first, so that unusable files are reported as errors.
+        let sight = sight::sight(drawn, warnings)?;
+        if let Some(soil) = &self.desc.soil {
+            ground::soil(drawn, library, soil, sight.view)?;
+        }
+        for model in &self.desc.models {
+            library.model(self.page(), model)?;
+        }
+        warnings.extend(plausibility::camera(drawn));
+        warnings.extend(plausibility::plants(drawn, library)?);
+        Ok(std::mem::take(warnings))
+    }
+
+    fn checked(&self, Asked { drawn, library, warnings }: Asked<'_>) -> Result<Vec<String>> {
+        let found = self.warnings(Asked { drawn, library, warnings })?;
+        known::species(drawn, library)?;
+        let sight = sight::sight(drawn, warnings)?;
+        let estimate = estimate::estimate(drawn, library, &sight)?;
+        estimate.check(drawn.memory()).map_err(|(at, error)| self.page().blame(&at, error))?;
+        Ok(found)
     }
 
     /// Returns the cameras of field `options.index`, one for each image of a day, in the order of the images.
@@ -40,15 +63,21 @@ impl Source {
 
     /// Answers a query about a field without building it.
     pub(super) fn query<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
-        let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut library = held().clone();
-        let drawn = Drawn::draw(self.page(), &self.desc, options, &mut library);
-        let answer = self.located(drawn.and_then(|(drawn, _, mut warnings)| {
-            question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
-        }))?;
+        let (answer, library) = self.asked(options, question);
+        let answer = self.located(answer, &library, options)?;
         // Keep the files that were read for the next field.
-        *held() = library;
+        *self.library.lock().unwrap_or_else(PoisonError::into_inner) = library;
         Ok(answer)
+    }
+
+    /// Answers a query. Also returns the files that were read for it.
+    fn asked<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> (Result<T>, Library) {
+        let mut library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let drawn = Drawn::draw(self.page(), &self.desc, options, &mut library);
+        let answer = drawn.and_then(|(drawn, _, mut warnings)| {
+            question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
+        });
+        (answer, library)
     }
 }
 

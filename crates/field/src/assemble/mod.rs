@@ -22,6 +22,7 @@ mod known;
 mod lidar;
 mod lighting;
 mod member;
+mod mistakes;
 mod models;
 mod options;
 mod plausibility;
@@ -71,7 +72,7 @@ pub fn field(path: &Path, options: &Options) -> Result<Field> {
 
 /// Builds a field from the text of a scene file. Paths are relative to the working directory.
 pub fn field_of(text: &str, options: &Options) -> Result<Field> {
-    Source::of(Spliced::of(RonFile::of(text)), Library::default())?.field(options)
+    Source::of(&Spliced::of(RonFile::of(text)), Library::default())?.field(options)
 }
 
 /// A scene file with a cache of the files that its fields have read, so that the next field does not read them again. Several fields may
@@ -96,14 +97,14 @@ impl Source {
         let path = scope.check(path.into())?;
         let mut library = Library::within(scope);
         let page = library.page(&path)?;
-        Self::of(Spliced::of(page), library)
+        Self::of(&Spliced::of(page), library)
     }
 
     /// Takes `text` as the scene file at `path`, which need not exist and may name files anywhere.
     pub fn of_text(path: &Path, text: &str) -> Result<Self> {
         let mut library = Library::default();
         let page = library.page_of(path, text);
-        Self::of(Spliced::of(page), library)
+        Self::of(&Spliced::of(page), library)
     }
 
     /// Returns the scene file with these values instead of its own.
@@ -132,10 +133,18 @@ impl Source {
         // The hash of the scene is that of the text with these values.
         library.page_of(&self.page().path, &text.page.text);
         let growing = library.growing;
-        Ok(Self { assigned: values.to_vec(), ..Self::of(text, library)? }.growing(growing))
+        Ok(Self { assigned: values.to_vec(), ..Self::of(&text, library)? }.growing(growing))
     }
 
-    fn of(text: Spliced, library: Library) -> Result<Self> {
+    /// Parses the text of a scene file. Errors contain all its mistakes.
+    fn of(text: &Spliced, library: Library) -> Result<Self> {
+        let known = library.clone();
+        Self::parsed(text.clone(), library)
+            .map_err(|error| Self::all_mistakes(error, text, &known, &Options::default()))
+    }
+
+    /// Parses the text of a scene file. Errors are about its first mistake.
+    fn parsed(text: Spliced, library: Library) -> Result<Self> {
         let page = &text.page;
         let desc: FieldDesc = page.parse_all().map_err(|e| text.locate(e))?;
         let days = match &desc.days {
@@ -149,9 +158,13 @@ impl Source {
         &self.text.page
     }
 
-    /// Moves an error about the text to the place where the faulty part was written, in the scene file or in an assigned value.
-    fn located<T>(&self, done: Result<T>) -> Result<T> {
-        if self.assigned.is_empty() { done } else { done.map_err(|error| self.text.locate(error)) }
+    /// Moves an error about the text to the place where the faulty part was written, in the scene file or in an assigned value, and adds
+    /// the other mistakes of the scene file.
+    fn located<T>(&self, done: Result<T>, library: &Library, options: &Options) -> Result<T> {
+        done.map_err(|error| {
+            let error = if self.assigned.is_empty() { error } else { self.text.locate(error) };
+            Self::all_mistakes(error, &self.text, library, options)
+        })
     }
 
     /// Applies an experiment's changes to the descriptions of field and species.
@@ -180,7 +193,8 @@ impl Source {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
         let mut library = held().clone();
-        let mut field = self.located(build(self.page(), &self.desc, options, &mut library))?;
+        let built = build(self.page(), &self.desc, options, &mut library);
+        let mut field = self.located(built, &library, options)?;
         field.assigned = self.assigned.iter().map(Assignment::to_string).collect();
         *held() = library;
         Ok(field)

@@ -43,6 +43,46 @@ impl Extent {
 /// leaves. Plants that would cover no pixel centre of the window even without occlusion are left out, and so are leaves
 /// that cover no pixel centre at all. Call it inside a pool.
 pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent> {
+    whole_plants(scene, labels).extents
+}
+
+/// Extents of plants and leaves, and the pixels that each plant would cover without occlusion.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WholePlants {
+    /// Extents by (plant, leaf), see [`extents`].
+    pub extents: BTreeMap<(u32, u16), Extent>,
+    /// Masks of the same plants.
+    pub masks: BTreeMap<u32, WholeMask>,
+}
+
+/// The pixels of the labels' window that a plant would cover without any other plant or soil: [`Extent::unoccluded`] of
+/// them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WholeMask {
+    /// Area that contains them.
+    pub window: Window,
+    /// Whether each pixel of the area is covered, row by row.
+    pub covered: Vec<bool>,
+}
+
+impl WholeMask {
+    /// Returns whether the plant would cover the pixel (x, y) of the image.
+    pub fn contains(&self, x: u32, y: u32) -> bool {
+        let Window { x0, y0, x1, y1 } = self.window;
+        let inside = (x0..x1).contains(&x) && (y0..y1).contains(&y);
+        inside && self.covered[((y - y0) * (x1 - x0) + x - x0).to_usize()]
+    }
+
+    /// Returns the pixels (x, y) of the image that the plant would cover, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let Window { x0, y0, x1, y1 } = self.window;
+        let all = (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)));
+        all.zip(&self.covered).filter_map(|(pixel, covered)| covered.then_some(pixel))
+    }
+}
+
+/// Returns the [`extents`] of all plants together with their masks. Call it inside a pool.
+pub fn whole_plants(scene: &Scene, labels: &LabelMap) -> WholePlants {
     let window = Area::of(labels.window);
     let seen = visible(labels);
     let reach = reach(&scene.camera);
@@ -70,7 +110,7 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
     let masks: Vec<Mask> = near.par_iter().map(|(key, thing)| thing.mask(**key, scene, &brute, labels)).collect();
 
     let visible = |key| seen.get(&key).map_or(0, |(count, _)| *count);
-    let mut extents = BTreeMap::new();
+    let (mut extents, mut whole) = (BTreeMap::new(), BTreeMap::new());
     for group in near.iter().zip(&masks).collect::<Vec<_>>().chunk_by(|a, b| a.0.0.0 == b.0.0.0) {
         let plant = group[0].0.0.0;
         let mut all = Mask::new(plants[&plant]);
@@ -88,9 +128,10 @@ pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent>
         if extent.unoccluded > 0 {
             extents.insert((plant, 0), extent);
             extents.extend(leaves);
+            whole.insert(plant, all.within(window));
         }
     }
-    extents
+    WholePlants { extents, masks: whole }
 }
 
 /// Returns the number of pixels of each (plant, leaf), where leaf 0 is everything of the plant that is not a leaf, and
@@ -253,6 +294,18 @@ impl Mask {
                 *to |= *set;
             }
         }
+    }
+
+    /// Returns the part of the mask inside the window.
+    fn within(&self, window: Area) -> WholeMask {
+        let part = self.area.meet(window);
+        let row = |y: i32| {
+            let from = (y - self.area.y0).to_usize() * self.area.width() + (part.x0 - self.area.x0).to_usize();
+            &self.set[from..from + part.width()]
+        };
+        let covered = (part.y0..part.y1).flat_map(row).copied().collect();
+        let [x0, y0, x1, y1] = [part.x0, part.y0, part.x1, part.y1].map(ToInt::to_u32);
+        WholeMask { window: Window { x0, y0, x1, y1 }, covered }
     }
 
     /// Counts the pixels inside the window and in total.

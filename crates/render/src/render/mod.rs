@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub use adaptive::adaptive;
 pub use coverage::coverage;
 pub use explain::explain;
-pub use extent::{Extent, extents};
+pub use extent::{Extent, WholeMask, WholePlants, extents, whole_plants};
 pub use label::{LabelMap, label};
 pub use progressive::{Progressive, timed};
 pub use scan::{Echo, scan};

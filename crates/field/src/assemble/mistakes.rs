@@ -1,0 +1,147 @@
+//! Finds all independent mistakes of a scene file and of the files that it names.
+//!
+//! Reading stops at the first mistake. The search repairs the text there and reads it again, until it can be read or no
+//! repair helps. A mistake that a repair may have caused is not reported, so some mistakes may remain for the next run.
+
+use super::{Options, SceneEdit, Source};
+use crate::library::Library;
+use furrow_base::Error;
+use furrow_base::error::Kind;
+use furrow_base::ron_file::{Repair, RonFile, Spliced};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Maximum number of mistakes reported at once.
+const MOST: usize = 40;
+/// Maximum number of readings of the files.
+const MOST_READINGS: usize = 150;
+
+impl Source {
+    /// Adds to `first`, an error about the scene file `text`, the other mistakes that are found with the same options.
+    /// Returns `first` unchanged if it is not about a place in a file, or if the file cannot be parsed at all.
+    pub(super) fn all_mistakes(first: Error, text: &Spliced, library: &Library, options: &Options) -> Error {
+        let positioned = first.place().is_some_and(|place| place.span.is_some());
+        if first.kind() != Kind::Input || !positioned || text.page.check_syntax().is_err() {
+            return first;
+        }
+        let mut search = Search::new(text, library, options);
+        let found = search.mistakes();
+        let others = found.into_iter().filter(|error| !same(error, &first)).collect();
+        first.with_others(others, &text.page.path)
+    }
+}
+
+/// Returns `true` for two errors with the same message at the same place.
+fn same(a: &Error, b: &Error) -> bool {
+    a.message() == b.message() && a.place() == b.place()
+}
+
+/// Texts with the repairs made so far.
+struct Search<'a> {
+    scene: PathBuf,
+    /// The scene file and every other file with a mistake.
+    texts: BTreeMap<PathBuf, Spliced>,
+    /// Files read so far, whose decoded images are used again.
+    library: Library,
+    growing: SceneEdit,
+    options: &'a Options,
+    readings: usize,
+}
+
+impl<'a> Search<'a> {
+    fn new(text: &Spliced, library: &Library, options: &'a Options) -> Self {
+        let scene = text.page.path.clone();
+        let texts = BTreeMap::from([(scene.clone(), text.clone())]);
+        Self { scene, texts, library: library.clone(), growing: library.growing, options, readings: 0 }
+    }
+
+    /// Returns the mistakes in the order in which they are found, each at its place in the files as written.
+    fn mistakes(&mut self) -> Vec<Error> {
+        let (mut found, mut made): (Vec<Error>, Vec<Repair>) = (Vec::new(), Vec::new());
+        let mut next = self.read();
+        while let Some(error) = next {
+            self.open(&error);
+            let written = error.place().and_then(|place| self.texts.get(&place.file)?.written(place));
+            let follows = made.iter().any(|repair| self.causes(repair, &error));
+            let repaired = self.repair(&error);
+            let error = match written {
+                Some(place) => error.at(place),
+                None => error,
+            };
+            if !follows && !found.iter().any(|known| same(known, &error)) {
+                found.push(error);
+            }
+            let Some((repair, after)) = repaired.filter(|_| found.len() < MOST) else { break };
+            made.push(repair);
+            next = after;
+        }
+        found
+    }
+
+    /// Makes the text of an error's file available for repairs, unless it cannot be parsed at all.
+    fn open(&mut self, error: &Error) {
+        let Some(file) = error.place().map(|place| &place.file).filter(|file| !self.texts.contains_key(*file)) else {
+            return;
+        };
+        let page = RonFile::read(file).ok().filter(|page| page.check_syntax().is_ok());
+        self.texts.extend(page.map(|page| (file.clone(), Spliced::of(page))));
+    }
+
+    /// Makes the first repair that leads to no error or to another one. Returns it with that error; `None` if no repair
+    /// helps.
+    fn repair(&mut self, error: &Error) -> Option<(Repair, Option<Error>)> {
+        let file = &error.place()?.file;
+        let own = self.texts.get(file).map_or_else(Vec::new, |text| Repair::all(text, error));
+        let naming = if *file == self.scene { Vec::new() } else { self.without_file(file) };
+        for repair in own.into_iter().chain(naming) {
+            let before = self.texts.insert(repair.text.page.path.clone(), repair.text.clone());
+            let next = self.read();
+            if self.readings > MOST_READINGS {
+                return None;
+            }
+            if next.as_ref().is_none_or(|next| !same(next, error) && !self.causes(&repair, next)) {
+                return Some((repair, next));
+            }
+            self.texts.extend(before.map(|text| (text.page.path.clone(), text)));
+        }
+        None
+    }
+
+    /// Returns `true` if an error about the texts may follow from a repair.
+    fn causes(&self, repair: &Repair, error: &Error) -> bool {
+        let text = self.texts.get(&repair.text.page.path);
+        text.is_some_and(|text| repair.causes(error, text))
+    }
+
+    /// Returns the repairs of the scene file that remove what names `file`, which cannot be repaired itself.
+    fn without_file(&self, file: &Path) -> Vec<Repair> {
+        let Some(scene) = self.texts.get(&self.scene) else { return Vec::new() };
+        let stem = file.file_stem();
+        let mut name = None;
+        // Changes nothing; it only looks at the quoted strings.
+        let _ = scene.page.replace_quoted(|written| {
+            name = name.take().or_else(|| (Path::new(written).file_stem() == stem).then(|| written.to_owned()));
+            None
+        });
+        name.map_or_else(Vec::new, |name| Repair::all(scene, &scene.page.about(&name, "", "")))
+    }
+
+    /// Reads the repaired files, and returns the first error.
+    fn read(&mut self) -> Option<Error> {
+        self.readings += 1;
+        let texts = self.texts.iter().map(|(path, text)| (path.clone(), text.page.text.clone())).collect();
+        let mut library = self.library.clone().renewed();
+        library.replaced = texts;
+        let page = library.page(&self.scene).ok()?;
+        let source = match Source::parsed(Spliced::of(page), library) {
+            Ok(source) => source.growing(self.growing),
+            Err(error) => return Some(error),
+        };
+        let (done, library) = source.tried(self.options);
+        // A reading that failed early has decoded less than one before it.
+        if library.files().len() >= self.library.files().len() {
+            self.library = library;
+        }
+        done.err()
+    }
+}
