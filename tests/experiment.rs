@@ -107,6 +107,7 @@ impl Players {
             pixel_mm: None,
             classes: plan.classes.clone(),
             crops: Vec::new(),
+            species: Vec::new(),
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&values),
             plan_sha256: identity.hash()?,

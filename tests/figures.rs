@@ -81,7 +81,7 @@ fn the_worst_images_are_kept_and_some_spread_over_the_set() {
             let predicted: Vec<u8> =
                 labels.iter().enumerate().map(|(at, class)| if at < *wrong { 1 - class } else { *class }).collect();
             let planes = vec![vec![9; 100]];
-            let example = Example { name: k.to_string(), planes, labels, plants: Vec::new() };
+            let example = Example { name: k.to_string(), planes, labels, plants: Vec::new(), species: Vec::new() };
             thumbnails.see(&example, (10, 10), &predicted).unwrap();
         }
         thumbnails.kept().into_iter().map(|thumbnail| thumbnail.name).collect::<Vec<_>>()

@@ -388,7 +388,7 @@ fn batches_do_not_depend_on_threads_or_on_where_a_training_goes_on() {
     };
     let (seed, batch, crop_size) = (3, 3, (32, 24));
     let (augment, normalization) = (Augment::default(), Normalization::Image);
-    let order = BatchSettings { seed, batch, crop_size, rare: 0.5, augment, pixels: None, normalization };
+    let order = BatchSettings { seed, batch, crop_size, rare: 0.5, augment, pixels: None, naming: None, normalization };
     let batches = |memory, from, threads| -> Vec<_> {
         Loader::start(&store(memory), &order, from, 12, threads).unwrap().map(|b| b.unwrap()).collect()
     };

@@ -72,6 +72,8 @@ mod measure;
 mod mitsuba;
 mod models;
 #[cfg(feature = "train")]
+mod named;
+#[cfg(feature = "train")]
 mod networks;
 mod output;
 mod packs;

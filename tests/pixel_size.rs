@@ -137,6 +137,7 @@ fn crops_are_scaled_by_the_pixels_of_their_own_image() {
         rare: 0.0,
         augment,
         pixels,
+        naming: None,
         normalization: normalization.clone(),
     };
     let batches: Vec<Batch> = Loader::start(&store, &order, 0, 2, 1).unwrap().collect::<Result<_, _>>().unwrap();

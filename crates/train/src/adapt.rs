@@ -65,6 +65,7 @@ impl AdaptOptions<'_> {
             class_weights: ClassWeights::None,
             calibrate: 0,
             logit_adjustment: 0.0,
+            name_crops: 0.0,
             pretrained: Pretrained::None,
             freeze: 0,
             encoder_rate: if hyper.encoder_rate > 0.0 { hyper.encoder_rate } else { 1.0 },

@@ -3,6 +3,7 @@
 //! Predictions that a network is unsure of depend on its seed; predictions on which networks agree do not. Source:
 //! Lakshminarayanan, Pritzel & Blundell 2017, "Simple and scalable predictive uncertainty estimation using deep ensembles".
 
+use super::net::film;
 use super::run::{self, ModelCard, TrainedModel};
 #[cfg(feature = "torch")]
 use super::torch::{Model, Placement};
@@ -47,6 +48,14 @@ impl Ensemble {
             members.push(other.values);
         }
         Ok(Self { card: ModelCard { weights_sha256: weights::hash_together(&hashes), ..card }, members })
+    }
+
+    /// Returns the ordinary networks that answer as these do if these species, indices of the card's, are the crops; see
+    /// [`TrainedModel::of_crops`].
+    pub fn of_crops(&self, crops: &[usize]) -> Result<Self> {
+        let ModelCard { network, input, classes, .. } = &self.card;
+        let folded = |values: &Vec<Array>| film::folded(*network, input.bands.len(), classes.len(), values, crops);
+        Ok(Self { card: self.card.of_crops(crops), members: self.members.iter().map(folded).collect::<Result<_>>()? })
     }
 
     /// Returns the number of models.

@@ -12,7 +12,7 @@ use super::data::{Band, Normalization, Resize, Shape, Store, ground};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
-use super::net::{Network, Parameter, Pretrained, parameters};
+use super::net::{Network, Pretrained, film, parameters};
 use super::refine::Refine;
 use super::weights::{self, Array, Stored};
 use furrow_base::input::{below, shipped};
@@ -35,6 +35,9 @@ pub const MODEL: &str = "model.json";
 pub const RESULT: &str = "result.json";
 /// Valid range of a model card's pixel size on the ground, millimetres.
 pub const PIXEL_MM: RangeInclusive<f64> = ground::PIXEL_MM;
+
+/// Largest number of species that a network can take as the crop.
+pub const MOST_SPECIES: usize = 250;
 
 /// Largest number of crops of a model card.
 const MOST_CROPS: usize = 64;
@@ -135,6 +138,9 @@ pub struct ModelCard {
     /// English names of the crops that the network was trained for; empty if it was trained for crops of any kind.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub crops: Vec<String>,
+    /// English names of the species that the network takes as the crop, in the order of its embeddings; empty for an ordinary network.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub species: Vec<String>,
     /// File name of the weights, in the folder of the card.
     pub weights: String,
     /// SHA-256 over names, shapes and values of the weights.
@@ -144,6 +150,25 @@ pub struct ModelCard {
 }
 
 impl ModelCard {
+    /// Returns the number of parameters that are trained in such a network.
+    fn trainable(&self) -> usize {
+        let (bands, classes) = (self.input.bands.len(), self.classes.len());
+        let film = film::film(self.network, bands, classes, self.species.len());
+        let all = parameters(self.network, bands, classes).into_iter().chain(film);
+        all.filter(|p| p.role.is_trainable()).map(|p| p.len()).sum()
+    }
+
+    /// Returns the card of the ordinary network that these species, indices of [`Self::species`], give. It knows which crop is sown, so a
+    /// vote of connected plants and rows must not overrule it: of the refinement, colour remains.
+    #[must_use]
+    pub fn of_crops(&self, crops: &[usize]) -> Self {
+        let names = crops.iter().filter_map(|crop| self.species.get(*crop)).cloned().collect();
+        let refine = Refine { colour: self.refine.colour, ..Refine::default() };
+        let mut card = Self { crops: names, species: Vec::new(), refine, ..self.clone() };
+        card.parameters = card.trainable();
+        card
+    }
+
     /// Checks the card. Returns a description of the first value that `train fit` would not accept: the sizes of an untrusted
     /// card decide how much memory is allocated.
     fn check(&self) -> Result<(), String> {
@@ -162,11 +187,13 @@ impl ModelCard {
         if self.crops.len() > MOST_CROPS || !self.crops.iter().all(is_name) {
             return Err(format!("its crops are not up to {MOST_CROPS} names"));
         }
+        if self.species.len() > MOST_SPECIES || !self.species.iter().all(is_name) {
+            return Err(format!("its species are not up to {MOST_SPECIES} names"));
+        }
         if [width, height].iter().any(|side| **side < self.network.least_side()) {
             return Err(format!("{} does not support {width} × {height} pixels", self.network.name()));
         }
-        let learnt = parameters(self.network, bands.len(), self.classes.len());
-        let trainable = learnt.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum::<usize>();
+        let trainable = self.trainable();
         if self.parameters != trainable {
             let words = "parameters: this network with these bands and classes has";
             return Err(format!("it lists {} {words} {trainable}", self.parameters));
@@ -264,6 +291,12 @@ impl TrainedModel {
             let what = format!("these are not the weights that {MODEL} in this folder describes");
             return Err(Error::damaged(what).in_file(path));
         }
+        let species = film::species(&values);
+        if species != card.species.len() {
+            let what =
+                format!("these weights are of a network for {species} species, {MODEL} lists {}", card.species.len());
+            return Err(Error::damaged(what).in_file(path));
+        }
         if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
             let what = format!("`{}` contains values that are not finite", array.name);
             return Err(Error::input(what).help("train again, with a lower --rate").in_file(path));
@@ -274,6 +307,14 @@ impl TrainedModel {
             return Err(Error::input(what).help("no training gives these: use weights that you trust").in_file(path));
         }
         Ok(Self { card, values })
+    }
+
+    /// Returns the ordinary network that answers as this one does if these species, indices of its card's, are the crops. The card keeps
+    /// the checksum of the weights that it was made from.
+    pub fn of_crops(&self, crops: &[usize]) -> Result<Self> {
+        let ModelCard { network, input, classes, .. } = &self.card;
+        let values = film::folded(*network, input.bands.len(), classes.len(), &self.values, crops)?;
+        Ok(Self { card: self.card.of_crops(crops), values })
     }
 
     /// Writes weights and card to a folder, either both or neither.

@@ -10,12 +10,13 @@ use super::fit::logits;
 use super::fit::warnings::warnings;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
-use super::net::{Parameter, fitting, parameters};
+use super::net::{Parameter, film, fitting, parameters};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
-use super::weights::{self, Array};
+use super::weights;
 use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
+use furrow_dataset::model::classes::Classes;
 use furrow_dataset::model::split::Split;
 use furrow_output::remove_unfinished;
 use std::borrow::Cow;
@@ -73,9 +74,8 @@ pub fn fit_crops(
     train(plan, crops, None, None, machine, folder, callbacks)
 }
 
-/// Returns the weights of the run to start from. Its network, normalization, and numbers of bands and classes must be those of
-/// the plan.
-fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
+/// Returns the run to start from. Its network, normalization, and numbers of bands and classes must be those of the plan.
+fn begun(plan: &Plan, run: &Path) -> Result<TrainedModel> {
     let TrainedModel { card, values } = TrainedModel::open(run)?;
     let normalization = NormalizationMode::of(&card.normalization).name();
     let is = [("network", card.network.name()), ("normalization", normalization)];
@@ -87,7 +87,31 @@ fn begun(plan: &Plan, run: &Path) -> Result<Vec<Array>> {
     let fit = fitting(plan.network, plan.shape.bands.len(), plan.classes.len(), &values);
     fit.map(drop)
         .map_err(|error| error.in_file(run).help("--bands and --classes must have the same number as in the run"))?;
-    Ok(values)
+    Ok(TrainedModel { card, values })
+}
+
+/// Returns the species that the network of a plan takes as the crop: those of the run that it starts from, then the others of its
+/// training set. None for an ordinary network.
+fn species(plan: &Plan, train: &Store, begin: Option<&TrainedModel>) -> Result<Vec<String>> {
+    if plan.hyper.name_crops == 0.0 {
+        return Ok(Vec::new());
+    }
+    if plan.classes != Classes::default() {
+        return Err(Error::misuse(format!("--name-crops: the classes are {}, not soil, crop and weed", plan.classes))
+            .help("leave out --classes or --name-crops"));
+    }
+    let mut species = begin.map_or_else(Vec::new, |begin| begin.card.species.clone());
+    let more = train.species().into_iter().filter(|name| !species.contains(name)).collect::<Vec<_>>();
+    species.extend(more);
+    match species.len() {
+        0 => Err(Error::misuse("--name-crops: the training images list no species")
+            .help("name rendered images with --set, or leave --name-crops out")),
+        1..=run::MOST_SPECIES => Ok(species),
+        n => {
+            Err(Error::misuse(format!("--name-crops: {n} species are too many: the maximum is {}", run::MOST_SPECIES))
+                .help("use fewer datasets"))
+        }
+    }
 }
 
 /// Like [`fit`]; `crops` are listed in the model card, and a self-training also takes the photographs without labels.
@@ -132,10 +156,22 @@ pub(super) fn train(
                 return Err(Error::misuse("a run to start from and pretrained weights exclude each other")
                     .help("--init starts from all weights of a run, --pretrained only sets the encoder: give one"));
             }
-            Some(run) => begun(plan, run)?,
-            None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, plan.classes.len(), plan.seed)?,
+            Some(run) => Some(begun(plan, run)?),
+            None => None,
         };
-        let plan = Plan { begin_with: (!begin.is_empty()).then(|| weights::hash(&begin)), ..plan.clone() };
+        let species = species(plan, &train, begin.as_ref())?;
+        let train = train.with_species(&species);
+        let (bands, classes) = (plan.shape.bands.len(), plan.classes.len());
+        let begin = match begin {
+            Some(begin) => begin.values,
+            None => plan.hyper.pretrained.begin(plan.network, &plan.shape.bands, classes, plan.seed)?,
+        };
+        let begin_with = (!begin.is_empty()).then(|| weights::hash(&begin));
+        let begin = match begin_with {
+            Some(_) => film::completed(plan.network, bands, classes, begin, species.len(), plan.seed),
+            None => begin,
+        };
+        let plan = Plan { begin_with, species, ..plan.clone() };
         let identity = Identity::of(&plan, &train, &val)?;
         // Reads one image, so that missing bands are reported before the folder is claimed.
         train.get(0)?;
@@ -167,7 +203,8 @@ pub(super) fn train(
         if plan.hyper.logit_adjustment > 0.0 {
             logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
         }
-        let list = parameters(plan.network, plan.shape.bands.len(), plan.classes.len());
+        let mut list = parameters(plan.network, bands, classes);
+        list.extend(film::film(plan.network, bands, classes, plan.species.len()));
         let card = ModelCard {
             furrow: env!("CARGO_PKG_VERSION").into(),
             network: plan.network,
@@ -179,6 +216,7 @@ pub(super) fn train(
             pixel_mm,
             classes: plan.classes.clone(),
             crops: crops.to_vec(),
+            species: plan.species.clone(),
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&outcome.values),
             plan_sha256: hash,

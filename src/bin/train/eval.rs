@@ -6,6 +6,7 @@ use crate::report;
 use furrow_base::Result;
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
+use furrow_train::crop::with_crops;
 use furrow_train::data::{Pick, Resize, Selection};
 use furrow_train::ensemble::Ensemble;
 use furrow_train::{session, zoo};
@@ -23,6 +24,9 @@ pub(crate) struct Args {
     /// ships.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Crop of the test set, by any name of its species; may be given several times. As for `train predict`.
+    #[arg(long = "crop", value_name = "NAME")]
+    crops: Vec<String>,
     #[command(flatten)]
     inference: InferenceArgs,
     #[command(flatten)]
@@ -31,7 +35,10 @@ pub(crate) struct Args {
 
 /// Evaluates, and writes the report.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let mut trained = Ensemble::open(&args.run)?;
+    let (mut trained, warnings) = with_crops(Ensemble::open(&args.run)?, &args.crops)?;
+    for warning in warnings {
+        furrow_cli::message!("warning: {warning}");
+    }
     args.inference.apply(&mut trained.card)?;
     let set = args.set.folder.file_name().unwrap_or_default();
     if args.out.is_none() {

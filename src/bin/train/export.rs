@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
+use furrow_train::crop::exported;
 use furrow_train::deploy::{onnx, torchscript};
 use furrow_train::fit::settings::parse_size;
 use furrow_train::run::{self, TrainedModel};
@@ -23,6 +24,10 @@ pub(crate) struct Args {
     /// Image size of a TorchScript export; by default the network's training size. ONNX exports take images of any size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
+    /// Crop that the exported network is for, by any name of its species; may be given several times. The network must take the crop as
+    /// an input. Without it, or with auto, the file has crops of any kind.
+    #[arg(long = "crop", value_name = "NAME")]
+    crops: Vec<String>,
 }
 
 /// Export format.
@@ -38,7 +43,7 @@ enum Format {
 
 /// Writes the network.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let trained = TrainedModel::open(&args.run)?;
+    let trained = exported(TrainedModel::open(&args.run)?, &args.crops)?;
     let usual = match args.format {
         Format::Onnx => "network.onnx",
         Format::Torchscript => "network.pt",

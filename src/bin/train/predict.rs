@@ -6,7 +6,7 @@ use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
-use furrow_train::crop::check_crop;
+use furrow_train::crop::with_crops;
 use furrow_train::data::Band;
 use furrow_train::deploy::guard::{self, Implausible};
 use furrow_train::deploy::input_images::{self, InputImage, Prediction};
@@ -33,10 +33,11 @@ pub(crate) struct Args {
     /// Batch size: images that are predicted at once.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
     batch: u16,
-    /// Crop that is sown in the images, by any name of its species. A network that `train make` trained for other crops is refused; for a
-    /// network that knows no crop, a warning is printed.
-    #[arg(long, value_name = "NAME")]
-    crop: Option<String>,
+    /// Crop that is sown in the images, by any name of its species; may be given several times. A network that takes the crop as an input
+    /// then labels this species as crop and all other plants as weeds; without it, or with auto, it has crops of any kind. A network
+    /// that was trained for other crops is refused; for a network that knows no crop, a warning is printed.
+    #[arg(long = "crop", value_name = "NAME")]
+    crops: Vec<String>,
     #[command(flatten)]
     inference: InferenceArgs,
     #[command(flatten)]
@@ -56,9 +57,8 @@ fn band(text: &str) -> Result<(Band, PathBuf), String> {
 
 /// Predicts the images; returns the paths of the files written.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
-    let mut trained = Ensemble::open(&args.run)?;
-    let unknown = args.crop.as_deref().map(|name| check_crop(&trained.card, name)).transpose()?.flatten();
-    if let Some(warning) = unknown {
+    let (mut trained, warnings) = with_crops(Ensemble::open(&args.run)?, &args.crops)?;
+    for warning in warnings {
         furrow_cli::message!("warning: {warning}");
     }
     args.inference.apply(&mut trained.card)?;

@@ -2,14 +2,17 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `species` | a species by name or file, and the check of a network's crops |
+//! | `species` | a species by name or file |
+//! | `named` | a trained network and the crops that a user names |
 //! | `scene` | `scenes/any-field.ron` reduced to some crops, with their relatives among the weeds |
 //! | `recipe` | images and hyper-parameters |
 
+pub mod named;
 pub mod recipe;
 pub mod scene;
 pub mod species;
 
+pub use named::{exported, with_crops};
 pub use recipe::Recipe;
 pub use scene::scene;
-pub use species::{Species, check_crop};
+pub use species::Species;

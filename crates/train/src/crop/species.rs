@@ -1,6 +1,5 @@
 //! Species that a user names as crops or weeds: by any name of a species that ships, or by the path of a species file.
 
-use crate::run::ModelCard;
 use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 use furrow_field::desc::{Role, SpeciesDesc};
@@ -98,33 +97,6 @@ fn unknown(name: &str) -> Result<Error> {
         crops()?
     );
     Ok(Error::misuse(format!("no species is called `{name}`")).help(help))
-}
-
-/// Checks that a network was trained for the crop that a user names. Returns a warning if it was trained for crops of any kind.
-///
-/// # Errors
-/// If it was trained for other crops, or if the name is unknown.
-pub fn check_crop(card: &ModelCard, name: &str) -> Result<Option<String>> {
-    let is = |own: &str| card.crops.iter().any(|crop| crop.eq_ignore_ascii_case(own));
-    if is(name) {
-        return Ok(None);
-    }
-    let found = Species::find(name)?;
-    if card.crops.is_empty() {
-        let name = found.desc.name;
-        return Ok(Some(format!(
-            "this network does not know which crop is sown: --crop {name} has no effect, and it separates crop from weed as for any field; `train make --crop {name}` trains one that knows"
-        )));
-    }
-    if is(&found.desc.name) {
-        return Ok(None);
-    }
-    Err(Error::misuse(format!(
-        "this network was trained for {}, not for {}",
-        card.crops.join(" and "),
-        found.desc.name
-    ))
-    .help(format!("`train make --crop {} --out DIR` trains one for it", found.written)))
 }
 
 #[cfg(test)]

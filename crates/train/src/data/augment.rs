@@ -329,7 +329,7 @@ mod tests {
         let pixel = |i: u32| if i % w > w / 2 { 200 } else { 40 };
         let plane: Vec<u8> = (0..w * h).map(pixel).collect();
         let labels = plane.iter().map(|v| u8::from(*v > 100)).collect();
-        Example { name: String::new(), planes: vec![plane; 3], labels, plants: Vec::new() }
+        Example { name: String::new(), planes: vec![plane; 3], labels, plants: Vec::new(), species: Vec::new() }
     }
 
     #[test]

@@ -199,7 +199,13 @@ mod tests {
         (0..3).for_each(|y| labels[at(0, y)..at(6, y)].fill(1));
         labels[at(140, 100)] = 2;
         labels[at(1, 149)] = IGNORE;
-        let picture = Example { name: String::new(), planes: vec![labels.clone()], labels, plants: Vec::new() };
+        let picture = Example {
+            name: String::new(),
+            planes: vec![labels.clone()],
+            labels,
+            plants: Vec::new(),
+            species: Vec::new(),
+        };
         let as_it_is = Normalization::Fixed { mean: vec![0.0], sd: vec![1.0] };
         for augment in [Augment::NONE, Augment { flip: true, crop: true, ..Augment::NONE }] {
             let crops = |rare: f64| {
@@ -229,8 +235,13 @@ mod tests {
     /// column number.
     fn widths(ground: Option<Ground>, draws: u64) -> Vec<(f64, Stream)> {
         let ramp: Vec<u8> = (0..256 * 8).map(|i| (i % 256).to_u8()).collect();
-        let picture =
-            Example { name: String::new(), labels: vec![0; ramp.len()], planes: vec![ramp], plants: Vec::new() };
+        let picture = Example {
+            name: String::new(),
+            labels: vec![0; ramp.len()],
+            planes: vec![ramp],
+            plants: Vec::new(),
+            species: Vec::new(),
+        };
         let as_it_is = Normalization::Fixed { mean: vec![0.0], sd: vec![1.0] };
         let augment = Augment { scale: true, ..Augment::NONE };
         let crop = Crop { image: (256, 8), size: (32, 8), rare: 0.0, ground };
@@ -280,8 +291,13 @@ mod tests {
     #[test]
     fn what_is_reduced_is_averaged() {
         let stripes: Vec<u8> = (0..240 * 180).map(|i| if i % 2 == 0 { 0 } else { 200 }).collect();
-        let picture =
-            Example { name: String::new(), labels: vec![0; stripes.len()], planes: vec![stripes], plants: Vec::new() };
+        let picture = Example {
+            name: String::new(),
+            labels: vec![0; stripes.len()],
+            planes: vec![stripes],
+            plants: Vec::new(),
+            species: Vec::new(),
+        };
         let ground = Some(Ground { pixel_mm: 0.5, range_mm: (3.0, 3.0) });
         let crop = Crop { image: (240, 180), size: (32, 24), rare: 0.0, ground };
         let as_it_is = Normalization::Fixed { mean: vec![0.0], sd: vec![1.0] };

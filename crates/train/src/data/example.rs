@@ -41,12 +41,24 @@ pub struct Example {
     pub labels: Vec<u8>,
     /// Plant number of each pixel, 0 for no plant; empty unless requested.
     pub plants: Vec<u32>,
+    /// Species of each pixel, as one more than its index in [`Wanted::species`]' numbering; 0 for none. Empty unless requested, and for
+    /// images of other programs.
+    pub species: Vec<u8>,
+}
+
+/// Label maps to read besides the classes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Plant numbers.
+    pub plants: bool,
+    /// Number of each species of the dataset in [`Example::species`]; empty if they are not wanted.
+    pub species: Vec<u8>,
 }
 
 impl Example {
     /// Reads an image of a dataset at a network's size. Its label masks are dilated by `margin` pixels of the image, see [`margin`].
-    pub fn read(set: &Set, number: u64, map: &Map, margin: f32, shape: &Shape, with_plants: bool) -> Result<Self> {
-        let (size, whole) = Self::read_whole(set, number, map, margin, &shape.bands, with_plants)?;
+    pub fn read(set: &Set, number: u64, map: &Map, margin: f32, shape: &Shape, wanted: &Wanted) -> Result<Self> {
+        let (size, whole) = Self::read_wanted(set, number, map, margin, &shape.bands, wanted)?;
         Ok(whole.resized(size, (shape.width, shape.height)))
     }
 
@@ -58,6 +70,18 @@ impl Example {
         margin: f32,
         of: &[Band],
         with_plants: bool,
+    ) -> Result<((u32, u32), Self)> {
+        Self::read_wanted(set, number, map, margin, of, &Wanted { plants: with_plants, species: Vec::new() })
+    }
+
+    /// Like [`Self::read_whole`], with the label maps that are wanted.
+    pub(super) fn read_wanted(
+        set: &Set,
+        number: u64,
+        map: &Map,
+        margin: f32,
+        of: &[Band],
+        wanted: &Wanted,
     ) -> Result<((u32, u32), Self)> {
         let name = Set::name(number);
         let image = Image::of(set, &name);
@@ -75,7 +99,7 @@ impl Example {
         let (lw, lh, semantics) = image.indexed(file)?;
         same(file, (lw, lh))?;
         let mut species = Vec::new();
-        if map.needs_species() {
+        if map.needs_species() || !wanted.species.is_empty() {
             let (lw, lh, numbers) = image.species((w, h), None)?;
             same("species.png", (lw, lh))?;
             species = numbers;
@@ -88,16 +112,24 @@ impl Example {
             parts = numbers;
         }
         let mut plants = Vec::new();
-        if with_plants {
+        if wanted.plants {
             let (lw, lh, numbers) = image.plants((w, h), None)?;
             same("plants.png", (lw, lh))?;
             plants = numbers;
         }
         let mut labels = map.labels(&semantics, &species, &parts);
+        if wanted.species.is_empty() {
+            species.clear();
+        }
+        let number = |own: &u8| usize::from(*own).checked_sub(1).and_then(|own| wanted.species.get(own)).copied();
+        for own in &mut species {
+            *own = number(own).unwrap_or(0);
+        }
         if margin != 0.0 {
             labels = margin::moved(&labels, (w, h), margin);
+            species = margin::moved(&species, (w, h), margin);
         }
-        Ok(((w, h), Self { name, planes, labels, plants }))
+        Ok(((w, h), Self { name, planes, labels, plants, species }))
     }
 
     /// Returns the example resized to another size.
@@ -106,13 +138,15 @@ impl Example {
             planes: self.planes.iter().map(|plane| furrow_output::resize_gray(w, h, plane, to)).collect(),
             labels: nearest((w, h), &self.labels, to),
             plants: if self.plants.is_empty() { Vec::new() } else { nearest((w, h), &self.plants, to) },
+            species: if self.species.is_empty() { Vec::new() } else { nearest((w, h), &self.species, to) },
             name: self.name,
         }
     }
 
     /// Returns its size in memory, bytes.
     pub fn bytes(&self) -> u64 {
-        (self.planes.iter().map(Vec::len).sum::<usize>() + self.labels.len() + 4 * self.plants.len()).to_u64()
+        let planes: usize = self.planes.iter().map(Vec::len).sum();
+        (planes + self.labels.len() + 4 * self.plants.len() + self.species.len()).to_u64()
     }
 
     /// Counts the pixels of each of `classes` classes.

@@ -190,6 +190,7 @@ mod tests {
             planes: vec![vec![value; (w * h).to_usize()]; 3],
             labels: vec![label; (w * h).to_usize()],
             plants: Vec::new(),
+            species: Vec::new(),
         };
         let mut changed = 0;
         for seed in 0..40 {

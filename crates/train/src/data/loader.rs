@@ -26,6 +26,8 @@ pub struct Batch {
     pub pixels: Vec<f32>,
     /// Class of each pixel, `images × height × width`; 255 for no label.
     pub labels: Vec<u8>,
+    /// Species named as the crops of each image, as indices in the network's list; empty for crops of any kind.
+    pub crops: Vec<Vec<u8>>,
 }
 
 /// Iterator over the inputs of steps (by default batches), in the order of the steps.
@@ -125,7 +127,7 @@ fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) ->
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
     let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare, ground: None };
-    let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new() };
+    let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new(), crops: Vec::new() };
     for slot in 0..order.batch.to_u64() {
         let place = step * order.batch.to_u64() + slot;
         let image = epochs.at(place, store.len());
@@ -136,6 +138,10 @@ fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) ->
             let restyled = fourier::restyled(&example, &other, crop.image, &mut stream);
             example = restyled.map_or(example, Cow::Owned);
         }
+        let named = order.naming.map_or_else(Vec::new, |naming| {
+            naming.name(example.to_mut(), &mut Stream::of(order.seed, place, Purpose::Training, 6))
+        });
+        batch.crops.push(named);
         let crop = Crop { ground: order.pixels.as_ref().map(|pixels| pixels.at(image)), ..crop };
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
         let (pixels, labels) = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);

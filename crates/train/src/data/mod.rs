@@ -13,6 +13,7 @@
 //! | `crop` | random crops, some placed around rare-class pixels |
 //! | `ground` | scale augmentation by the pixel size on the ground |
 //! | `normalise` | input normalization |
+//! | `naming` | species named as crops, and the labels that follow |
 //! | `order` | parameters of batch sampling |
 //! | `photos` | photographs without labels, for self-training |
 //! | `paste` | pastes plants of one batch over the images of another |
@@ -28,6 +29,7 @@ mod fourier;
 pub mod ground;
 pub mod loader;
 pub mod margin;
+mod naming;
 pub mod normalise;
 mod order;
 mod paste;
@@ -42,6 +44,7 @@ pub use crop::Crop;
 pub use example::{Example, Shape};
 pub use ground::{AugmentScale, Ground, PixelSizes};
 pub use loader::{Batch, Loader};
+pub use naming::Naming;
 pub use normalise::Normalization;
 pub use order::BatchSettings;
 pub use paste::paste;

@@ -2,6 +2,7 @@
 
 use super::augment::Augment;
 use super::ground::PixelSizes;
+use super::naming::Naming;
 use super::normalise::Normalization;
 
 /// Parameters that determine the batches of a training, together with the images.
@@ -19,6 +20,8 @@ pub struct BatchSettings {
     pub augment: Augment,
     /// Pixel sizes of the images on the ground, if crops are scaled by them.
     pub pixels: Option<PixelSizes>,
+    /// Naming of crops, if the network takes the crop as an input.
+    pub naming: Option<Naming>,
     /// Input normalization, applied after augmentation.
     pub normalization: Normalization,
 }

@@ -112,7 +112,7 @@ impl Photo {
         };
         let planes = self.planes.iter().map(plane).collect();
         let labels = vec![IGNORE; size.0.to_usize() * size.1.to_usize()];
-        (size, Example { name: String::new(), planes, labels, plants: Vec::new() })
+        (size, Example { name: String::new(), planes, labels, plants: Vec::new(), species: Vec::new() })
     }
 }
 
@@ -130,6 +130,7 @@ mod tests {
             rare: 0.0,
             augment: Augment::default(),
             pixels: None,
+            naming: None,
             normalization: Normalization::Fixed { mean: vec![0.0; 3], sd: vec![1.0; 3] },
         }
     }

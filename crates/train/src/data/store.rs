@@ -1,8 +1,9 @@
 //! The selected images of datasets, cached in memory within a budget.
 
-use super::example::{Example, Shape};
+use super::example::{Example, Shape, Wanted};
 use super::ground::PIXEL_MM;
 use super::select::{Pick, Selection};
+use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_dataset::Set;
 use furrow_dataset::model::classes::{Classes, Map};
@@ -20,7 +21,8 @@ pub struct Store {
     /// Dataset (index in `sets`) and number of each image.
     images: Vec<(usize, u64)>,
     shape: Shape,
-    with_plants: bool,
+    /// Label maps to read besides the classes, of each dataset.
+    wanted: Vec<Wanted>,
     kept: Vec<OnceLock<Example>>,
     /// Index of the first occurrence of each image: repeated images are cached once.
     same: Vec<usize>,
@@ -50,7 +52,26 @@ impl Store {
         let mut first = std::collections::BTreeMap::new();
         let same = images.iter().enumerate().map(|(i, image)| *first.entry(*image).or_insert(i)).collect();
         let kept = images.iter().map(|_| OnceLock::new()).collect();
-        Ok(Self { sets, images, shape: shape.clone(), with_plants, kept, same, free: AtomicU64::new(memory) })
+        let wanted = vec![Wanted { plants: with_plants, species: Vec::new() }; sets.len()];
+        Ok(Self { sets, images, shape: shape.clone(), wanted, kept, same, free: AtomicU64::new(memory) })
+    }
+
+    /// Returns the English names of all species of the datasets, sorted.
+    pub fn species(&self) -> Vec<String> {
+        let all = self.sets.iter().flat_map(|(set, ..)| &set.recipe.species);
+        let names: std::collections::BTreeSet<&String> = all.map(|species| &species.name).collect();
+        names.into_iter().cloned().collect()
+    }
+
+    /// Returns the store such that its images also have the species of each pixel, numbered by their places in `names`.
+    #[must_use]
+    pub fn with_species(mut self, names: &[String]) -> Self {
+        let number = |name: &String| names.iter().position(|own| own == name).map_or(0, |place| place.to_u8() + 1);
+        for (wanted, (set, ..)) in self.wanted.iter_mut().zip(&self.sets) {
+            wanted.species = set.recipe.species.iter().map(|species| number(&species.name)).collect();
+        }
+        self.kept = self.images.iter().map(|_| OnceLock::new()).collect();
+        self
     }
 
     /// Returns the number of images, including repetitions.
@@ -79,17 +100,17 @@ impl Store {
         if let Some(example) = self.kept[place].get() {
             return Ok(Cow::Borrowed(example));
         }
-        let (set, number) = self.images[place];
-        let (set, map, margin) = &self.sets[set];
-        let example = Example::read(set, number, map, *margin, &self.shape, self.with_plants)?;
+        let (of, number) = self.images[place];
+        let (set, map, margin) = &self.sets[of];
+        let example = Example::read(set, number, map, *margin, &self.shape, &self.wanted[of])?;
         Ok(self.keep(place, example))
     }
 
     /// Reads the image with the index `place` at its own size (width and height, pixels), without caching it.
     pub fn whole(&self, place: usize) -> Result<((u32, u32), Example)> {
-        let (set, number) = self.images[place];
-        let (set, map, margin) = &self.sets[set];
-        Example::read_whole(set, number, map, *margin, &self.shape.bands, self.with_plants)
+        let (of, number) = self.images[place];
+        let (set, map, margin) = &self.sets[of];
+        Example::read_wanted(set, number, map, *margin, &self.shape.bands, &self.wanted[of])
     }
 
     /// Returns the pixel size on the ground at the network's size, millimetres: the median over a sample of the images whose records

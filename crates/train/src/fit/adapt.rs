@@ -36,7 +36,7 @@ pub(super) fn batch(
 ) -> Result<(Batch, f64)> {
     let (mut labels, sure) = answers(teacher, &views.plain, plan)?;
     keep_surest(&mut labels, &sure, adaptation.keep);
-    let mut photos = Batch { images: rendered.images, pixels: views.changed, labels };
+    let mut photos = Batch { images: rendered.images, pixels: views.changed, labels, crops: Vec::new() };
     paste(rendered, &mut photos, &mut Stream::of(plan.seed, number, Purpose::Training, 4));
     let labelled = photos.labels.iter().filter(|label| **label != IGNORE).count();
     let share = labelled.to_f64() / photos.labels.len().max(1).to_f64();

@@ -184,6 +184,10 @@ pub struct Hyperparameters {
     /// the last step's. See `ema`.
     #[serde(default, skip_serializing_if = "is_nothing")]
     pub ema: f64,
+    /// Fraction of the training images in which a species is named as the crop, 0 to 1: the network takes the crop as an input. 0 for an
+    /// ordinary network. See [`crate::data::Naming`].
+    #[serde(default, skip_serializing_if = "is_nothing")]
+    pub name_crops: f64,
     /// Sizes that images are resized to for prediction and evaluation; no effect on training and validation.
     #[serde(default, skip_serializing_if = "Resize::is_stretch")]
     pub resize: Resize,
@@ -254,6 +258,7 @@ impl Default for Hyperparameters {
             freeze: 0,
             encoder_rate: 1.0,
             ema: 0.0,
+            name_crops: 0.0,
             resize: Resize::Stretch,
             refine: Refine::default(),
             augment: Augment::default(),
@@ -312,6 +317,7 @@ impl Hyperparameters {
         range("rate", self.rate > 0.0 && self.rate < 100.0, &self.rate, "write a number above 0 such as 0.001")?;
         let help = "write a fraction from 0 to 1";
         range("rare_crops", (0.0..=1.0).contains(&self.rare_crops), &self.rare_crops, help)?;
+        range("name_crops", (0.0..=1.0).contains(&self.name_crops), &self.name_crops, help)?;
         range("encoder_rate", (0.0..=1.0).contains(&self.encoder_rate), &self.encoder_rate, help)?;
         range("decay", (0.0..1.0).contains(&self.decay), &self.decay, "write a fraction from 0 to below 1")?;
         let help = "write a number from 0 to 2, such as 0.5";

@@ -30,6 +30,9 @@ pub struct Plan {
     pub threads: usize,
     /// SHA-256 of the initial weights, if they are another run's or pretrained.
     pub begin_with: Option<String>,
+    /// English names of the species that the network takes as the crop, in the order of its embeddings; empty for an ordinary network.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub species: Vec<String>,
     /// Time limit, seconds. With a limit, the last step depends on the speed of the machine.
     pub seconds: Option<u64>,
     /// Self-training on photographs without labels.
@@ -81,6 +84,7 @@ impl Default for Plan {
             precision: "f32".into(),
             threads: 1,
             begin_with: None,
+            species: Vec::new(),
             seconds: None,
             adaptation: None,
         }

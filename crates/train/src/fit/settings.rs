@@ -140,6 +140,13 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "0.99"))]
     pub ema: Option<f64>,
+    /// Fraction of the training images in which a species is named as the crop, 0 to 1; the network then takes the crop as an input
+    /// (`train predict --crop`). Any species of an image may be named, also a weed; all other plants are weeds. Needs rendered images
+    /// and the classes soil, crop and weed. 0 for an ordinary network.
+    #[arg(long, value_name = "SHARE", default_value = default_of("name_crops"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "0.75"))]
+    pub name_crops: Option<f64>,
     /// Sizes that images are resized to for prediction: stretch (to the training size), or lengths of the longer side, separated by
     /// commas. With lengths, the aspect ratio is kept and probabilities are averaged over the sizes.
     #[arg(long, value_name = "SIDES", default_value = default_of("resize"))]
@@ -216,6 +223,7 @@ pub fn defaults() -> Vec<(&'static str, String)> {
         ("freeze", hyper.freeze.to_string()),
         ("encoder_rate", hyper.encoder_rate.to_string()),
         ("ema", hyper.ema.to_string()),
+        ("name_crops", hyper.name_crops.to_string()),
         ("resize", hyper.resize.name()),
         ("refine", hyper.refine.name()),
         ("augment", hyper.augment.to_string()),
@@ -306,6 +314,7 @@ impl Settings {
         number(self.freeze, &mut hyper.freeze);
         number(self.encoder_rate, &mut hyper.encoder_rate);
         number(self.ema, &mut hyper.ema);
+        number(self.name_crops, &mut hyper.name_crops);
         number(self.accumulate, &mut hyper.accumulate);
         number(self.rare_crops, &mut hyper.rare_crops);
         number(self.steps, &mut hyper.steps);

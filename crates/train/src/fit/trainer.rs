@@ -10,7 +10,7 @@ use super::log::TrainingLog;
 use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
-use crate::data::{Batch, BatchSettings, Loader, Normalization, Photos, PixelSizes, Store, Views, augment};
+use crate::data::{Batch, BatchSettings, Loader, Naming, Normalization, Photos, PixelSizes, Store, Views, augment};
 use crate::figure::{Figure, Thumbnails, compose};
 use crate::measure::{Confusion, Scores};
 use crate::torch::{Model, Pass, Placement, classes, failed};
@@ -101,7 +101,8 @@ pub fn train(
         (_, NormalizationMode::Fixed) => Normalization::fixed(&data.train)?,
     };
     let mut at = Checkpoint::read(folder, hash)?.unwrap_or_default();
-    let mut model = Model::new(plan.network, plan.shape.bands.len(), classes, plan.seed, place);
+    let (bands, species) = (plan.shape.bands.len(), plan.species.len());
+    let mut model = Model::for_species(plan.network, bands, classes, species, plan.seed, place);
     if at.step > 0 {
         model.load(&at.values)?;
     } else if !begin.is_empty() {
@@ -118,6 +119,7 @@ pub fn train(
         rare: hyper.rare_crops,
         augment: hyper.augment,
         pixels: data.pixels.clone(),
+        naming: (species > 0).then_some(Naming { share: hyper.name_crops, species }),
         normalization: normalization.clone(),
     };
     let mut log = TrainingLog::begin(folder, &plan.classes.names(), &at.history, at.step)?;
@@ -263,7 +265,7 @@ fn step(
         }
         let x = model.images(&batch.pixels, size);
         let y = labels(model, &batch.labels, batch.images, size);
-        let loss = loss::loss(plan.hyper.loss, &model.forward(&x, pass), &y, weights) * weight;
+        let loss = loss::loss(plan.hyper.loss, &model.forward_named(&x, pass, &batch.crops), &y, weights) * weight;
         gradients.add(&loss);
         losses.push(f64::try_from(loss).map_err(|e| failed(&e))?);
     }

@@ -7,6 +7,7 @@
 //! To add a network, add one file and one line in the table below.
 
 mod basic_segnet;
+pub mod film;
 mod footprint;
 mod lite_unet;
 mod parameters;
@@ -17,7 +18,7 @@ mod unet;
 mod vit_unet;
 
 pub use footprint::{Footprint, MULTIPLIED_OUT};
-pub use parameters::{Parameter, Role, fitting, is_encoder, parameters};
+pub use parameters::{Parameter, Role, fitting, is_encoder, matching, parameters};
 pub use pretrained::Pretrained;
 
 use serde::{Deserialize, Serialize};

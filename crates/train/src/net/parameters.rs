@@ -88,21 +88,26 @@ pub fn parameters(network: Network, bands: usize, classes: usize) -> Vec<Paramet
 /// Finds the values of a network's parameters in `arrays` by name and returns them in the order of [`parameters()`]. Other arrays are
 /// ignored. An error names the array that is missing or has another shape.
 pub fn fitting(network: Network, bands: usize, classes: usize, arrays: &[Array]) -> Result<Vec<&Array>> {
+    let found = matching(&parameters(network, bands, classes), arrays);
+    found.map_err(|what| {
+        let network = network.name();
+        Error::input(format!(
+            "these weights are not those of {network} with {bands} bands and {classes} classes: {what}"
+        ))
+    })
+}
+
+/// Finds the values of these parameters in `arrays` by name, or describes the first that is missing or has another shape.
+pub fn matching<'a>(list: &[Parameter], arrays: &'a [Array]) -> Result<Vec<&'a Array>, String> {
     let fit = |parameter: &Parameter| {
-        let wrong = |what: String| {
-            Error::input(format!(
-                "these weights are not those of {} with {bands} bands and {classes} classes: {what}",
-                network.name(),
-            ))
-        };
         let array = arrays.iter().find(|a| a.name == parameter.name);
-        let array = array.ok_or_else(|| wrong(format!("`{}` is missing", parameter.name)))?;
+        let array = array.ok_or_else(|| format!("`{}` is missing", parameter.name))?;
         if array.shape != parameter.shape {
-            return Err(wrong(format!("`{}` is {:?}, not {:?}", array.name, array.shape, parameter.shape)));
+            return Err(format!("`{}` is {:?}, not {:?}", array.name, array.shape, parameter.shape));
         }
         Ok(array)
     };
-    parameters(network, bands, classes).iter().map(fit).collect()
+    list.iter().map(fit).collect()
 }
 
 /// Splits the name of an encoder parameter into the unit and the part in it, such as `enc0_1.depthwise` and `bn.bias`.

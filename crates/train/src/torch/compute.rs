@@ -1,7 +1,7 @@
 //! Implementation of [`Operations`] that computes a network with libtorch.
 
 use super::device::Precision;
-use crate::net::{Conv, MULTIPLIED_OUT, Norm, Operations, is_encoder};
+use crate::net::{Conv, MULTIPLIED_OUT, Norm, Operations, film, is_encoder};
 use furrow_base::math::{ToFloat, ToInt};
 use std::collections::BTreeMap;
 use tch::{Kind, Tensor};
@@ -27,9 +27,21 @@ pub(super) struct Compute<'a> {
     pub(super) pass: Pass,
     /// Encoder features by their number of halvings, if requested.
     pub(super) features: Option<BTreeMap<usize, Tensor>>,
+    /// Embedding of the crops of each image, images × width, if they are named; see [`film`].
+    pub(super) crops: Option<Tensor>,
 }
 
 impl Compute<'_> {
+    /// Modulates the output of a batch norm by the named crops: (1 + γ) y + β.
+    fn modulated(&self, y: Tensor, name: &str, channels: usize) -> Tensor {
+        let map = self.crops.as_ref().and_then(|crops| Some((crops, self.tensors.get(&film::map(name))?)));
+        let Some((crops, map)) = map else { return y };
+        let changes = crops.matmul(&map.tr()).to_kind(y.kind()).unsqueeze(-1).unsqueeze(-1);
+        let channels = channels.to_i64();
+        let (gamma, beta) = (changes.narrow(1, 0, channels), changes.narrow(1, channels, channels));
+        y * (gamma + 1.0) + beta
+    }
+
     fn rounded(&self, x: &Tensor) -> Tensor {
         match self.precision {
             Precision::Single => x.shallow_clone(),
@@ -63,7 +75,8 @@ impl Operations for Compute<'_> {
             Pass::Decoder => !is_encoder(name),
         };
         let momentum = if self.pass == Pass::Batch { 0.0 } else { 0.1 };
-        x.batch_norm(gain, shift, mean, variance, training, momentum, norm.epsilon, true)
+        let y = x.batch_norm(gain, shift, mean, variance, training, momentum, norm.epsilon, true);
+        self.modulated(y, name, norm.channels)
     }
 
     fn relu(&mut self, x: &Tensor) -> Tensor {

@@ -8,11 +8,11 @@ mod guard;
 mod memory;
 pub mod multiscale;
 
-use super::net::{Network, Parameter, fitting, parameters};
+use super::net::{Network, Parameter, film, matching, parameters};
 use super::refine::Features;
 use super::weights::Array;
 use compute::Compute;
-use furrow_base::math::ToInt;
+use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use std::collections::BTreeMap;
 /// The bindings of libtorch that networks are computed with.
@@ -43,23 +43,43 @@ pub struct Model {
 impl Model {
     /// Returns a network with random initial values, which depend only on the seed.
     pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Placement) -> Self {
-        let list = parameters(network, bands, classes);
+        Self::for_species(network, bands, classes, 0, seed, place)
+    }
+
+    /// Like [`Self::new`], for a network that takes one of `species` species as the crop; see [`film`].
+    pub fn for_species(
+        network: Network,
+        bands: usize,
+        classes: usize,
+        species: usize,
+        seed: u64,
+        place: Placement,
+    ) -> Self {
+        let mut list = parameters(network, bands, classes);
+        list.extend(film::film(network, bands, classes, species));
         let tensors =
             list.iter().enumerate().map(|(i, p)| (p.name.clone(), tensor(p, &p.begin(seed, i), place.device)));
         let tensors = tensors.collect();
         Self { network, bands, classes, place, list, tensors }
     }
 
-    /// Returns a network with these values. An error names the array that does not match.
+    /// Returns a network with these values, which takes the crop as an input if they do. An error names the array that does not match.
     pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Placement) -> Result<Self> {
-        let mut model = Self::new(network, bands, classes, 0, place);
+        let mut model = Self::for_species(network, bands, classes, film::species(arrays), 0, place);
         model.load(arrays)?;
         Ok(model)
     }
 
     /// Replaces the values by name. All parameters must be present in their shapes; other arrays are ignored.
     pub fn load(&mut self, arrays: &[Array]) -> Result<()> {
-        for (parameter, array) in self.list.iter().zip(fitting(self.network, self.bands, self.classes, arrays)?) {
+        let found = matching(&self.list, arrays).map_err(|what| {
+            let Self { bands, classes, .. } = self;
+            let network = self.network.name();
+            Error::input(format!(
+                "these weights are not those of {network} with {bands} bands and {classes} classes: {what}"
+            ))
+        })?;
+        for (parameter, array) in self.list.iter().zip(found) {
             self.tensors.insert(parameter.name.clone(), tensor(parameter, &array.values, self.place.device));
         }
         Ok(())
@@ -95,10 +115,35 @@ impl Model {
         self.walk(x, pass).to_kind(Kind::Float)
     }
 
+    /// Computes logits like [`Self::forward`], with these species as the crops of each image; an image without any has crops of any
+    /// kind.
+    pub fn forward_named(&self, x: &Tensor, pass: Pass, crops: &[Vec<u8>]) -> Tensor {
+        let mut compute = Compute { crops: self.embeddings(crops), ..self.compute(pass) };
+        self.network.walk(&mut compute, x, self.bands, self.classes).to_kind(Kind::Float)
+    }
+
     /// Computes logits like [`Self::forward`], in the precision of the last convolution.
     pub(super) fn walk(&self, x: &Tensor, pass: Pass) -> Tensor {
-        let mut compute = Compute { tensors: &self.tensors, precision: self.place.precision, pass, features: None };
-        self.network.walk(&mut compute, x, self.bands, self.classes)
+        self.network.walk(&mut self.compute(pass), x, self.bands, self.classes)
+    }
+
+    fn compute(&self, pass: Pass) -> Compute<'_> {
+        Compute { tensors: &self.tensors, precision: self.place.precision, pass, features: None, crops: None }
+    }
+
+    /// Returns the mean embedding of each image's crops, images × [`film::WIDTH`]; zero for an image without a named crop. `None` if no
+    /// image has one, or if the network does not take the crop as an input.
+    fn embeddings(&self, crops: &[Vec<u8>]) -> Option<Tensor> {
+        let embedding = self.tensors.get(film::EMBEDDING).filter(|_| crops.iter().any(|crops| !crops.is_empty()))?;
+        let species = embedding.size()[0];
+        let mut shares = vec![0.0; crops.len() * species.to_usize()];
+        for (row, crops) in shares.chunks_exact_mut(species.to_usize()).zip(crops) {
+            for crop in crops {
+                row[usize::from(*crop)] += 1.0 / crops.len().to_f32();
+            }
+        }
+        let shares = Tensor::from_slice(&shares).view([crops.len().to_i64(), species]);
+        Some(shares.to_device(self.place.device).matmul(embedding))
     }
 
     /// Predicts the class of each pixel of one or more images, stored as images × height × width × bands.
@@ -127,9 +172,7 @@ impl Model {
 
     /// Returns the logits of one image and the encoder features with cells of 8 and of 16 pixels, both in cells of 8.
     pub(super) fn scores_and_features(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Tensor, Features)> {
-        let features = Some(BTreeMap::new());
-        let mut compute =
-            Compute { tensors: &self.tensors, precision: self.place.precision, pass: Pass::Inference, features };
+        let mut compute = Compute { features: Some(BTreeMap::new()), ..self.compute(Pass::Inference) };
         let x = self.input(pixels, size)?;
         let scores = tch::no_grad(|| self.network.walk(&mut compute, &x, self.bands, self.classes));
         let features = compute.features.unwrap_or_default();
@@ -210,7 +253,6 @@ fn channels_last(x: &Tensor) -> Tensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use furrow_base::math::ToFloat;
 
     /// Expected: every network gives features with cells of 8 and of 16 pixels, in cells of 8, with the channels of its encoder there;
     /// the scores are the same as without features. Source: the networks' tables of channels.
@@ -229,5 +271,39 @@ mod tests {
             assert!(features.planes.iter().all(|plane| plane.len() == 96));
             assert_eq!(values(&scores).unwrap(), model.scores(&pixels, size).unwrap(), "{}", network.name());
         }
+    }
+
+    /// Expected: with crops as an input, each image has the scores of the ordinary network that is folded for its crops, and one without a
+    /// named crop those of the network without the input; the gradients of embeddings and maps are there.
+    #[test]
+    fn a_folded_network_answers_as_the_one_with_the_crop_as_an_input() {
+        let place = Placement { device: Device::Cpu, precision: Precision::Single };
+        let (network, size) = (Network::TinyUnet, (16u32, 12u32));
+        let model = Model::for_species(network, 3, 3, 4, 1, place);
+        let mut arrays = model.arrays().unwrap();
+        let maps = arrays.iter_mut().filter(|a| a.name.starts_with("film.") && a.name != film::EMBEDDING);
+        for (k, value) in maps.flat_map(|map| &mut map.values).enumerate() {
+            *value = ((k * 7) % 11).to_f32() / 11.0 - 0.5;
+        }
+        let model = Model::with(network, 3, 3, &arrays, place).unwrap();
+        let crops = [vec![], vec![2], vec![0, 3]];
+        let pixels: Vec<f32> = (0..3 * 16 * 12 * 3).map(|i| (i % 23).to_f32() / 23.0).collect();
+        let named = model.forward_named(&model.images(&pixels, size), Pass::Inference, &crops);
+        let all = values(&named).unwrap();
+        let mut answers = Vec::new();
+        for ((crops, pixels), scores) in
+            crops.iter().zip(pixels.chunks_exact(16 * 12 * 3)).zip(all.chunks_exact(16 * 12 * 3))
+        {
+            let crops: Vec<usize> = crops.iter().map(|crop| usize::from(*crop)).collect();
+            let plain = film::folded(network, 3, 3, &arrays, &crops).unwrap();
+            let plain = Model::with(network, 3, 3, &plain, place).unwrap().scores(pixels, size).unwrap();
+            assert!(plain.iter().zip(scores).all(|(a, b)| (a - b).abs() < 1e-4), "{crops:?}");
+            let changed = model.scores(pixels, size).unwrap() != plain;
+            answers.push(changed);
+        }
+        assert_eq!(answers, [false, true, true]);
+        named.sum(Kind::Float).backward();
+        let learns = |name: &str| model.tensors[name].grad().abs().sum(Kind::Float).double_value(&[]) > 0.0;
+        assert!(learns(film::EMBEDDING) && learns(&film::map("dec0_1.bn")));
     }
 }
