@@ -58,20 +58,20 @@ pub fn all_species() -> Result<(Vec<Shipped>, Faults)> {
 /// no species has that name.
 pub fn species(name: &str) -> Result<Option<PathBuf>> {
     let (wanted, is_file) = name.strip_suffix(".ron").map_or((name, false), |stem| (stem, true));
-    let called = |file: &&PathBuf| {
+    let file_matches = |file: &&PathBuf| {
         let stem = file.file_stem().unwrap_or_default();
         if is_file { stem == wanted } else { stem.eq_ignore_ascii_case(wanted) }
     };
-    if let Some(file) = shipped::species_files()?.iter().find(called) {
+    if let Some(file) = shipped::species_files()?.iter().find(file_matches) {
         SpeciesDesc::read(file)?;
         return Ok(Some(file.clone()));
     }
     if is_file {
         return Ok(None);
     }
-    let (all, _) = all_species()?;
-    let called = |species: &&Shipped| species.names().iter().any(|own| aliases::same(own, wanted));
-    if let Some(species) = all.iter().find(called) {
+    let (all, faults) = all_species()?;
+    let name_matches = |species: &&Shipped| species.names().iter().any(|own| aliases::same(own, wanted));
+    if let Some(species) = all.iter().find(name_matches) {
         return Ok(Some(species.file.clone()));
     }
     if Path::new(wanted).extension().is_some() {
@@ -85,6 +85,10 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
             let mut names: Vec<String> =
                 all.iter().flat_map(|species| [species.names(), words(species)].concat()).collect();
             names.retain(|name| !name.is_empty());
+            // The wanted species may be in a file that cannot be read.
+            if let Some((_, fault)) = faults.into_iter().next() {
+                return Err(fault);
+            }
             let near = nearest(&names, wanted).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
             Err(Error::input(format!("no built-in species is called `{wanted}`"))
                 .help(format!("{near}`trace species` lists them; a species file of your own ends in .ron")))

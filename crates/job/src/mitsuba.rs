@@ -109,8 +109,8 @@ fn sight(world: &World<'_>, leveled: &Leveled, i: u32) -> Option<Sight> {
     let (weight, leaf) = match bsdf.form() {
         Form::Rough { albedo, .. } => (albedo.mean(), false),
         Form::Sheet { .. } => (1.0, true),
-        Form::Unheld if bsdf.transmits() => (1.0, true),
-        Form::Unheld => (bsdf.reflectance(1.0).mean(), false),
+        Form::Unsupported if bsdf.transmits() => (1.0, true),
+        Form::Unsupported => (bsdf.reflectance(1.0).mean(), false),
     };
     let side = 1.0_f32.copysign(at.ng.dot(-direction));
     let local = mitsuba::relief(material, at.uv);

@@ -76,13 +76,13 @@ pub struct Export {
 }
 
 /// Returns a warning about the lights that exports omit, if there are any.
-fn unheld(lights: &[Light]) -> Option<String> {
+fn unsupported(lights: &[Light]) -> Option<String> {
     omitted(lights.iter().map(|light| (light.kind(), light.form())))
 }
 
 /// Returns the warning for lights with these kinds and forms.
 fn omitted<'a>(lights: impl Iterator<Item = (&'a str, Form)>) -> Option<String> {
-    let kinds: BTreeSet<&str> = lights.filter(|(_, form)| *form == Form::Unheld).map(|(kind, _)| kind).collect();
+    let kinds: BTreeSet<&str> = lights.filter(|(_, form)| *form == Form::Unsupported).map(|(kind, _)| kind).collect();
     let names: Vec<&str> = kinds.into_iter().collect();
     (!names.is_empty()).then(|| format!("the format has no such lights, they are omitted: {}", names.join(", ")))
 }
@@ -190,8 +190,9 @@ mod tests {
     #[test]
     fn omitted_lights_are_named_once() {
         let held = Light::examples();
-        assert_eq!(unheld(&held.into_iter().map(|(_, light)| light).collect::<Vec<Light>>()), None);
-        let lights = [("Laser", Form::Unheld), ("Sky", Form::Dome { uniform: false }), ("Laser", Form::Unheld)];
+        assert_eq!(unsupported(&held.into_iter().map(|(_, light)| light).collect::<Vec<Light>>()), None);
+        let lights =
+            [("Laser", Form::Unsupported), ("Sky", Form::Dome { uniform: false }), ("Laser", Form::Unsupported)];
         let warning = omitted(lights.into_iter()).unwrap_or_default();
         assert!(warning.ends_with(": Laser"), "{warning}");
     }

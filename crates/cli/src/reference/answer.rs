@@ -9,49 +9,58 @@ use furrow_base::{Error, Result};
 pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<String> {
     let (first, rest) = path.split_once('.').unwrap_or((path, ""));
     let chosen = references.iter().find(|of| of.root == first);
-    let Some(main) = chosen.or(references.first()) else { return Ok(String::new()) };
+    let Some(default) = chosen.or(references.first()) else { return Ok(String::new()) };
     let inside = if chosen.is_some() { rest } else { path };
     if path.is_empty() || chosen.is_some() && rest.is_empty() {
-        let others: Vec<&str> = references.iter().map(|of| of.root).filter(|root| *root != main.root).collect();
+        let others: Vec<&str> = references.iter().map(|of| of.root).filter(|root| *root != default.root).collect();
         let more = match others.as_slice() {
             [] => String::new(),
             of => format!("\nOther files: {program} explain {}\n", of.join(&format!(", {program} explain "))),
         };
-        return Ok(format!("{}\n\n{}\nDetails of one path: {program} explain PATH\n{more}", main.title, main.tree()));
+        return Ok(format!(
+            "{}\n\n{}\nDetails of one path: {program} explain PATH\n{more}",
+            default.title,
+            default.tree()
+        ));
     }
-    if let Some((section, entry)) = main.find(inside) {
-        return Ok(main.explain(section, entry));
+    if let Some((section, entry)) = default.find(inside) {
+        return Ok(default.explain(section, entry));
     }
     let name = inside.rsplit('.').next().unwrap_or(inside);
-    let candidates = if chosen.is_some() { std::slice::from_ref(main) } else { references };
+    let candidates = if chosen.is_some() { std::slice::from_ref(default) } else { references };
     let found: Vec<(&Reference, String)> =
         candidates.iter().flat_map(|of| of.named(name).into_iter().map(move |path| (of, path))).collect();
     // All steps of the path must match.
-    let ends = |path: &str| path == inside || path.ends_with(&format!(".{inside}"));
-    let found: Vec<(&Reference, String)> = found.into_iter().filter(|(_, path)| ends(path)).collect();
+    let matches = |path: &str| path == inside || path.ends_with(&format!(".{inside}"));
+    let found: Vec<(&Reference, String)> = found.into_iter().filter(|(_, path)| matches(path)).collect();
     match found.as_slice() {
         [(of, path)] => match of.find(path) {
             Some((section, entry)) => Ok(of.explain(section, entry)),
             None => Err(unknown(path, "", program)),
         },
         [] => {
-            let names: Vec<String> = candidates.iter().flat_map(Reference::paths).collect();
-            let last = |path: &String| path.rsplit('.').next().unwrap_or_default().to_owned();
-            let lasts: Vec<String> = names.iter().map(last).collect();
-            let near = nearest(&names, inside).map(str::to_owned).or_else(|| {
-                let near = nearest(&lasts, name)?;
-                lasts.iter().position(|last| last == near).map(|i| names[i].clone())
-            });
-            Err(unknown(path, &near.map_or(String::new(), |near| format!("did you mean `{near}`? ")), program))
+            let near = similar(candidates, inside).map(|near| format!("did you mean `{near}`? "));
+            Err(unknown(path, &near.unwrap_or_default(), program))
         }
         several => {
             let paths: Vec<String> = several
                 .iter()
-                .map(|(of, path)| if of.root == main.root { path.clone() } else { joined(of.root, path) })
+                .map(|(of, path)| if of.root == default.root { path.clone() } else { joined(of.root, path) })
                 .collect();
             Ok(format!("{name} occurs in several places:\n  {}\n", paths.join("\n  ")))
         }
     }
+}
+
+/// Returns the path that is most similar to `wanted`, or whose last step is most similar to that of `wanted`.
+fn similar(candidates: &[Reference], wanted: &str) -> Option<String> {
+    let last = |path: &str| path.rsplit('.').next().unwrap_or_default().to_owned();
+    let paths: Vec<String> = candidates.iter().flat_map(Reference::paths).collect();
+    let steps: Vec<String> = paths.iter().map(|path| last(path)).collect();
+    nearest(&paths, wanted).map(str::to_owned).or_else(|| {
+        let near = nearest(&steps, &last(wanted))?;
+        steps.iter().position(|step| step == near).map(|i| paths[i].clone())
+    })
 }
 
 fn unknown(path: &str, near: &str, program: &str) -> Error {

@@ -27,7 +27,7 @@ pub enum Form {
         transmittance: Spectrum,
     },
     /// None of these. Exporters replace it by a Lambertian surface of the same reflectance and transmittance, and warn.
-    Unheld,
+    Unsupported,
 }
 
 /// Film of water over a part of a surface.
@@ -60,9 +60,9 @@ pub trait Portable: Sized {
     fn transmittance(&self) -> Spectrum {
         Spectrum::ZERO
     }
-    /// Returns the form that exporters translate, by default [`Form::Unheld`].
+    /// Returns the form that exporters translate, by default [`Form::Unsupported`].
     fn form(&self) -> Form {
-        Form::Unheld
+        Form::Unsupported
     }
     /// Returns named examples over the range of parameters; the tests run over all of them.
     fn examples() -> Vec<(&'static str, Self)>;
@@ -84,6 +84,6 @@ mod tests {
                 vec![("plain", Self)]
             }
         }
-        assert!(Plain.form() == Form::Unheld && Plain.transmittance().is_black());
+        assert!(Plain.form() == Form::Unsupported && Plain.transmittance().is_black());
     }
 }

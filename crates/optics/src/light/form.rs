@@ -33,7 +33,7 @@ pub enum Form {
     },
     /// None of these. Exporters omit the light and warn; the rasterizer treats it as uniform ambient light that gives
     /// level ground the same irradiance.
-    Unheld,
+    Unsupported,
 }
 
 /// Outline of a flat light.
@@ -47,9 +47,9 @@ pub enum Outline {
 
 /// Properties of a light beside its sampling; the defaults are those of a light that has none of them.
 pub trait Portable: Sized {
-    /// Returns the form that exporters and the rasterizer translate, by default [`Form::Unheld`].
+    /// Returns the form that exporters and the rasterizer translate, by default [`Form::Unsupported`].
     fn form(&self) -> Form {
-        Form::Unheld
+        Form::Unsupported
     }
 
     /// Returns a light of the same irradiance whose size is scaled by `by`, 0 < `by` ≤ 1; `None` for a light without a
@@ -78,8 +78,8 @@ mod tests {
     fn a_light_that_states_nothing_is_not_held() {
         struct Plain;
         impl Portable for Plain {}
-        assert_eq!(Plain.form(), Form::Unheld);
+        assert_eq!(Plain.form(), Form::Unsupported);
         assert!(Plain.shrunk(0.5).is_none() && Box::new(Plain).shrunk(0.5).is_none());
-        assert_eq!(Box::new(Plain).form(), Form::Unheld);
+        assert_eq!(Box::new(Plain).form(), Form::Unsupported);
     }
 }

@@ -23,7 +23,7 @@ mod materials;
 mod pack;
 mod skins;
 
-use super::{Export, unheld, write_atomically};
+use super::{Export, unsupported, write_atomically};
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
@@ -204,7 +204,7 @@ fn lights(scene: &Scene, nodes: &mut Vec<Node>) -> Vec<Value> {
                 (frame.y, frame.z) = (-frame.y, -frame.z);
                 ("lamp", "spot", radiance * area, frame, centre)
             }
-            Form::Dome { .. } | Form::Unheld => continue,
+            Form::Dome { .. } | Form::Unsupported => continue,
         };
         let strength = Spectrum(strength.0.truncate().extend(0.0));
         let most = strength.max().max(f32::MIN_POSITIVE);
@@ -237,6 +237,6 @@ fn warnings(scene: &Scene) -> Vec<String> {
         !scene.camera.distortion().is_none(),
         "glTF has no lens distortion: the camera becomes a pinhole; see its extras",
     );
-    warnings.extend(unheld(&scene.lights));
+    warnings.extend(unsupported(&scene.lights));
     warnings
 }

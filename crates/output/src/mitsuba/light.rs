@@ -57,7 +57,7 @@ impl Lights {
                     of.lamps.push(Lamp { outline, centre, frame, radiance });
                 }
                 Form::Dome { .. } => around.push(light),
-                Form::Unheld => {}
+                Form::Unsupported => {}
             }
         }
         let radiance = |d: Vec3| around.iter().fold(Spectrum::ZERO, |sum, l| sum + l.le(d));

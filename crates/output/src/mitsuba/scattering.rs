@@ -158,7 +158,7 @@ fn split(form: Form, bsdf: &Bsdf, normal: Vec3) -> (Kind, Texel, bool) {
             let reflect = sides.map(|side| side.diffuse);
             (kind, Texel { reflect, transmit: transmittance, film: 0.0, normal }, true)
         }
-        Form::Unheld => {
+        Form::Unsupported => {
             let kind = if bsdf.transmits() {
                 Kind::Sheet { coats: [None; 2], layers: [None; 2] }
             } else {
@@ -180,7 +180,7 @@ mod tests {
     fn what_has_no_form_becomes_lambertian() {
         for (name, bsdf) in Bsdf::examples() {
             assert!(split(bsdf.form(), &bsdf, Vec3::Z).2, "{name}");
-            let (kind, texel, held) = split(Form::Unheld, &bsdf, Vec3::Z);
+            let (kind, texel, held) = split(Form::Unsupported, &bsdf, Vec3::Z);
             assert!(!held && texel.film == 0.0 && texel.transmit == bsdf.transmittance(), "{name}");
             assert_eq!(texel.reflect[0], bsdf.reflectance(1.0), "{name}");
             let sheet = Kind::Sheet { coats: [None; 2], layers: [None; 2] };

@@ -111,7 +111,7 @@ fn scale(scene: &Scene) -> f32 {
     let strength = |light: &Light| match light.form() {
         // The sun counts with its normal irradiance, whatever its elevation.
         Form::Distant { normal_irradiance, .. } => normal_irradiance,
-        Form::Area { .. } | Form::Dome { .. } | Form::Unheld => light.horizontal_irradiance(),
+        Form::Area { .. } | Form::Dome { .. } | Form::Unsupported => light.horizontal_irradiance(),
     };
     let all = scene.lights.iter().map(strength).fold(Spectrum::ZERO, |sum, s| sum + s);
     std::f32::consts::PI / all.max().max(1e-6)

@@ -46,7 +46,7 @@ impl Lights {
                     continue;
                 }
                 Form::Dome { .. } if techniques.has(Technique::Harmonics) => harmonics(light),
-                Form::Dome { .. } | Form::Unheld => even(light),
+                Form::Dome { .. } | Form::Unsupported => even(light),
             };
             for (sum, add) in ambient.iter_mut().zip(around) {
                 *sum += add;

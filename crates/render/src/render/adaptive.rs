@@ -16,17 +16,17 @@ use furrow_base::sampling::rng::mix;
 use std::time::Instant;
 
 /// Samples per pixel of the pilot pass: 4096 for a full tile. Also the minimum number of samples per pixel.
-const LOOK: u32 = 16;
+const PILOT_SPP: u32 = 16;
 
-/// The pilot pass is extended to 1/SHARE of the samples it predicts: skewed distributions look less noisy than they are
+/// The pilot pass is extended to 1/PILOT_DIVISOR of the samples it predicts: skewed distributions look less noisy than they are
 /// in few samples.
-const SHARE: u32 = 8;
+const PILOT_DIVISOR: u32 = 8;
 
 /// Sample counts are multiples of this: whole blocks of the stratified sequence.
 const BLOCK: u32 = 16;
 
 /// Separates the random numbers of the pilot pass from those of the image.
-const OTHER: u64 = 0x1007;
+const PILOT_SEED: u64 = 0x1007;
 
 /// Renders a window until the median relative error of each tile's pixels ([`Pixel::relative_error`]) is expected to be
 /// `error` (above 0), with at most `settings.spp` samples per pixel. The median over the whole image then reaches it
@@ -42,24 +42,24 @@ pub fn adaptive(
     deadline: Option<Instant>,
     watch: &RenderMonitor<'_>,
 ) -> Result<Film> {
-    let apart = Settings { seed: mix(settings.seed ^ OTHER), ..*settings };
-    let mut look = Progressive::new(world, integrator, &apart);
+    let apart = Settings { seed: mix(settings.seed ^ PILOT_SEED), ..*settings };
+    let mut pilot = Progressive::new(world, integrator, &apart);
     // The pilot pass may take a quarter of the time. If that is not enough, there is no time for a pilot pass at all.
     let quarter = deadline.map(|end| {
         let now = Instant::now();
         now + end.saturating_duration_since(now) / 4
     });
-    let tiles = look.of_tiles(|_| ()).len();
-    if !look.approach(&vec![LOOK.min(settings.spp); tiles], quarter, watch)? {
+    let tiles = pilot.of_tiles(|_| ()).len();
+    if !pilot.approach(&vec![PILOT_SPP.min(settings.spp); tiles], quarter, watch)? {
         // No decision was based on these samples yet, so they may be used for the image.
-        look.approach(&vec![settings.spp; tiles], deadline, watch)?;
-        return Ok(look.film());
+        pilot.approach(&vec![settings.spp; tiles], deadline, watch)?;
+        return Ok(pilot.film());
     }
     let need = |pixels: &[Pixel]| needed(pixels, error, settings.spp);
-    let more: Vec<u32> = look.of_tiles(need).into_iter().map(|n| (n / SHARE).max(LOOK)).collect();
-    look.approach(&more, quarter, watch)?;
-    let goals = look.of_tiles(need);
-    drop(look);
+    let more: Vec<u32> = pilot.of_tiles(need).into_iter().map(|n| (n / PILOT_DIVISOR).max(PILOT_SPP)).collect();
+    pilot.approach(&more, quarter, watch)?;
+    let goals = pilot.of_tiles(need);
+    drop(pilot);
     let mut image = Progressive::new(world, integrator, settings);
     image.approach(&goals, deadline, watch)?;
     Ok(image.film())
@@ -71,7 +71,7 @@ fn needed(pixels: &[Pixel], error: f32, most: u32) -> u32 {
     let samples = pixels.first().map_or(0, |p| p.samples);
     let ratio = f64::from(median_relative_error(pixels) / error);
     let needed = (f64::from(samples) * ratio * ratio).min(f64::from(most)).trunc_to::<u32>();
-    needed.max(LOOK).next_multiple_of(BLOCK).min(most)
+    needed.max(PILOT_SPP).next_multiple_of(BLOCK).min(most)
 }
 
 #[cfg(test)]
@@ -90,8 +90,8 @@ mod tests {
         let seen = [pixel(1.0, 0.08), pixel(2.0, 0.08), pixel(0.0, 0.0), pixel(5.0, 0.5), pixel(3.0, 0.01)];
         assert_eq!(needed(&seen, 0.04, 4096), 128);
         assert_eq!(needed(&seen, 0.08, 4096), 32);
-        assert_eq!(needed(&seen, 0.5, 4096), LOOK);
+        assert_eq!(needed(&seen, 0.5, 4096), PILOT_SPP);
         assert_eq!(needed(&seen, 0.001, 1000), 1000);
-        assert_eq!(needed(&[Pixel::default()], 0.01, 4096), LOOK, "a black tile is done");
+        assert_eq!(needed(&[Pixel::default()], 0.01, 4096), PILOT_SPP, "a black tile is done");
     }
 }
