@@ -44,8 +44,8 @@
 //!
 //! # Crates
 //!
-//! This crate is the facade. The work is in `crates/`; each crate uses only crates of lower layers, which Cargo enforces. Modules of one
-//! crate are layered as well: `tests/architecture.rs` reads this table and the `use` lines.
+//! This crate is the facade. The work is in `crates/`; each crate uses only crates of lower layers, and so do the modules of one crate:
+//! `tests/architecture.rs` reads this table and the `use` lines.
 //!
 //! | layer | crate | modules, lowest layer first |
 //! |---|---|---|

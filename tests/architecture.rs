@@ -1,4 +1,4 @@
-//! Architecture rules (method 13): module layers, forbidden imports, and the files that may use a crate, checked on the
+//! Architecture rules: module layers, forbidden imports, and the files that may use a crate, checked on the
 //! sources' `use` lines and paths.
 //!
 //! Rationale: modules that import only lower layers can be understood, tested and replaced one at a time; label code

@@ -76,7 +76,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<(f64, Pose)>> {
             return Err(wrong("has no quaternion of length 1"));
         }
         if time.abs() > LATEST || [x, y, z].iter().any(|v| v.abs() > FARTHEST) {
-            return Err(wrong(&format!("is beyond {FARTHEST} m from the world's origin, or beyond {LATEST} s")));
+            return Err(wrong(&format!("is more than {FARTHEST} m from the origin, or its time exceeds {LATEST} s")));
         }
         if all.last().is_some_and(|(before, _)| time - before < SHORTEST) {
             return Err(wrong("is not later than the one before"));

@@ -9,25 +9,32 @@ use furrow_report::number;
 const ASKED: u64 = 64;
 /// Ratio of the high to the low number of plants above which a warning is given.
 const WIDE: f64 = 3.0;
+/// Number of fields from which on percentiles are stated instead of the range.
+const MANY: usize = 20;
 
 /// Distribution over fields of the expected number of plants in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedPlants {
     /// Median.
     pub median: f64,
-    /// 5th percentile.
+    /// 5th percentile; the smallest number of fewer than 20 fields.
     pub low: f64,
-    /// 95th percentile.
+    /// 95th percentile; the largest number of fewer than 20 fields.
     pub high: f64,
+    /// Number of fields.
+    pub fields: usize,
 }
 
 impl ExpectedPlants {
     /// Computes the distribution of these numbers of plants; `None` if there are none.
     fn of(mut plants: Vec<f64>) -> Option<Self> {
         plants.sort_by(f64::total_cmp);
-        let last = plants.len().checked_sub(1)?.to_f64();
+        let fields = plants.len();
+        let last = fields.checked_sub(1)?.to_f64();
         let at = |share: f64| plants[(share * last).round_to::<usize>()];
-        Some(Self { median: at(0.5), low: at(0.05), high: at(0.95) })
+        let median = 0.5 * (plants[(fields - 1) / 2] + plants[fields / 2]);
+        let tail = if fields < MANY { 0.0 } else { 0.05 };
+        Some(Self { median, low: at(tail), high: at(1.0 - tail), fields })
     }
 
     /// Returns the ratio of `high` to `low`, with both at least 1.
@@ -37,13 +44,14 @@ impl ExpectedPlants {
 
     /// Returns the distribution as a sentence.
     pub fn words(&self) -> String {
-        let Self { median, low, high } = *self;
-        format!(
-            "about {} plants per image, {} to {} expected in nine fields of ten",
-            number(median),
-            number(low),
-            number(high)
-        )
+        let Self { median, low, high, fields } = *self;
+        let about = format!("about {} plants in view per image", number(median));
+        let range = format!("{} to {}", number(low), number(high));
+        match fields {
+            1 => about,
+            2..MANY => format!("{about}, {range} in the {fields} fields"),
+            _ => format!("{about}, {range} in 90 % of the fields"),
+        }
     }
 
     /// Returns the warning if there is one, otherwise the sentence.
@@ -82,14 +90,17 @@ mod tests {
     #[test]
     fn a_wide_spread_of_plant_numbers_is_reported() {
         let even = ExpectedPlants::of((0..100).map(|k| 10.0 + 0.1 * f64::from(k)).collect()).unwrap();
-        assert_eq!((even.low, even.median, even.high), (10.5, 15.0, 19.4));
+        assert_eq!((even.low, even.median, even.high), (10.5, 14.95, 19.4));
         assert_eq!(even.warning(), None);
         let wide = ExpectedPlants::of((0..100).map(f64::from).collect()).unwrap();
         assert!(
             wide.warning()
                 .unwrap()
-                .starts_with("about 50 plants per image, 5 to 94 expected in nine fields of ten, a factor of 18.8")
+                .starts_with("about 49.5 plants in view per image, 5 to 94 in 90 % of the fields, a factor of 18.8")
         );
+        let few = ExpectedPlants::of(vec![19.5, 11.1]).unwrap();
+        assert_eq!(few.words(), "about 15.3 plants in view per image, 11.1 to 19.5 in the 2 fields");
+        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "about 7 plants in view per image");
         // Fields with less than one plant count as one, so the ratio stays finite.
         assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
         assert_eq!(ExpectedPlants::of(Vec::new()), None);

@@ -57,7 +57,7 @@ impl Bins {
         place.max(0.0).trunc_to::<usize>().min(self.count() - 1)
     }
 
-    /// Returns the start of bin number `place`. Place 0 is the bin that starts at 0, or at 1 for logarithmic bins.
+    /// Returns the start of bin number `place`. Bin 0 starts at 0, or at 1 for logarithmic bins.
     pub(super) fn edge(&self, place: i64) -> f64 {
         match self {
             Self::Linear { width, .. } => place.to_f64() * width,
@@ -65,7 +65,7 @@ impl Bins {
         }
     }
 
-    /// Place of the first bin, in the numbering of [`edge`](Self::edge).
+    /// Returns the number of the first bin, as [`edge`](Self::edge) counts.
     pub(super) fn first(&self) -> i64 {
         match self {
             Self::Linear { from, width, .. } => (from / width).round_to::<i64>(),

@@ -94,7 +94,7 @@ impl Tally {
         matches!(self.histogram.bins, Bins::Logarithmic { .. })
     }
 
-    /// Places of the first and last nonempty bin.
+    /// Returns the numbers of the first and last nonempty bin.
     fn places(&self) -> Option<(i64, i64)> {
         let counts = &self.histogram.counts;
         let (first, last) = (counts.iter().position(|n| *n > 0)?, counts.iter().rposition(|n| *n > 0)?);
@@ -102,7 +102,7 @@ impl Tally {
         Some((begin + first.to_i64(), begin + last.to_i64()))
     }
 
-    /// Number of values in the bins at places `from..to`.
+    /// Returns the number of values in bins `from..to`.
     fn between(&self, from: i64, to: i64) -> u64 {
         let begin = self.histogram.bins.first();
         let index = |place: i64| (place - begin).clamp(0, self.histogram.counts.len().to_i64()).to_usize();

@@ -283,7 +283,9 @@ impl TrainedModel {
         let bytes = furrow_base::input::contents(&path).map_err(Error::reading(&path))?;
         let card = serde_json::from_slice(&bytes).map_err(|e| format!("this file cannot be read: {e}"));
         let card = card.and_then(|card: ModelCard| card.check().map(|()| card)).map_err(|what| {
-            Error::input(what).help("`train fit` does not write such cards: use one that you trust").in_file(path)
+            Error::input(what)
+                .help("this file was not written by `train fit`; use a network whose origin you trust")
+                .in_file(path)
         })?;
         let path = below(folder, &card.weights)?;
         let (values, _) = weights::read(&path)?;

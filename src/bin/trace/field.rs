@@ -80,7 +80,7 @@ pub(crate) struct FieldArgs {
     scene: SceneArgs,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// Index of the field in the distribution.
+    /// Number of the field: each number from 0 gives another field of the scene file.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     index: u64,
     /// Day, counted from the emergence of the first crop. Default: the first of the scene file's days, or else the
@@ -90,7 +90,7 @@ pub(crate) struct FieldArgs {
     /// Frame of a drive, from 0.
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
-    /// Name of one of the scene file's cameras. Default: the first.
+    /// Name of one of the scene file's cameras.
     #[arg(long, value_name = "NAME", default_value = FIRST)]
     camera: String,
 }

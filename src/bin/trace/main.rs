@@ -100,7 +100,7 @@ Files of an image:
   *_denoised.png, denoised.exr   with --denoise
 
 More samples reduce noise: doubling --spp doubles the time and multiplies the noise by 0.7.
-The scene files scenes/01-one-leaf.ron to 10 teach the scene format. From any folder, --scene field finds the shipped file.
+The scene files scenes/01-one-leaf.ron to 13-lidar.ron are lessons. From any folder, --scene field finds the shipped file.
 Paths go to stdout, everything else to stderr.
 Exit codes: 0 done, 1 failed, 2 wrong input, 75 stopped cleanly (Ctrl-C, TERM, HUP, USR1).";
 

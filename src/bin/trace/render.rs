@@ -230,10 +230,14 @@ fn summary(image: &Image<'_>, quality: &Quality, samples: u64, taken: Duration, 
     let (_, mean, most) = image.film.samples();
     let error =
         if most > 1 { format!("{:.1} %", 100.0 * image.film.median_relative_error()) } else { "unknown".into() };
-    let samples = samples.to_f64() / 1e6;
+    let millions = samples.to_f64() / 1e6;
+    let rate = if millions < 1.0 {
+        format!("{samples} samples in {drawn:.2} s")
+    } else {
+        format!("{millions:.0} Msamples in {drawn:.1} s: {:.2} Msamples/s", millions / drawn)
+    };
     format!(
-        "{samples:.0} Msamples in {drawn:.1} s: {:.2} Msamples/s; {}median relative error {error}; {taken:.1} s in all; files in {}",
-        samples / drawn,
+        "{rate}; {}median relative error {error}; {taken:.1} s in all; files in {}",
         if quality.is_fixed() { String::new() } else { format!("{mean:.0} samples per pixel; ") },
         out.display()
     )

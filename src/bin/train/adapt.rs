@@ -25,7 +25,7 @@ pub(crate) struct Args {
     /// Labelled images to keep training on as well; by default the training set of the run. May be given several times.
     #[arg(long = "set", value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     sets: Vec<Selection>,
-    /// Validation set: labelled images whose loss, I/U and predictions are logged during training. The best pass is kept, and
+    /// Validation set: labelled images whose loss, I/U and predictions are logged during training. The weights with the best validation score are kept, and
     /// training stops early by the rule of the run. Without it the last weights are kept. May be given several times.
     #[arg(long, value_name = "DIR[@PICK]", value_parser = Selection::parse)]
     val: Vec<Selection>,

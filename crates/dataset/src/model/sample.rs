@@ -46,7 +46,11 @@ impl Sample {
     /// the `format` that needs them.
     pub fn rendered(&self, format: &str) -> Result<&Rendered> {
         self.film.as_ref().ok_or_else(|| {
-            Error::misuse(format!("image {}: --format {format} needs results of the renderer", self.record.name))
+            Error::misuse(format!(
+                "image {}: --format {format} can be written only while the image is rendered",
+                self.record.name
+            ))
+            .help("name the format when the dataset is made: `trace dataset --format`")
         })
     }
 }

@@ -64,7 +64,7 @@ macro_rules! grown {
 pub static EDITS: &[Edit] = &[
     Edit {
         name: "raster",
-        about: "rasterized like a game engine of 2017: shadow maps, no bounces; labels from an ID render target",
+        about: "rasterized with the methods of a 2017 game engine: shadow maps, no indirect light; labels from an ID render target",
         // Labels differ in a few pixels per million, where a pixel centre is on an edge.
         keeps_labels: false,
         change: Change::Rendering(rasterized),

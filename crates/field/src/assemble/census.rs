@@ -98,9 +98,9 @@ impl<'a> Census<'a> {
 
     fn refusal(&self, population: Population, plants: f64) -> Error {
         let (path, advice) = population.place();
-        let about = format!("about {plants:.3e} plants or places for them");
+        let about = format!("about {plants:.0} plants or planting positions");
         let (words, more) = if plants > f64::from(MOST_PLANTS) {
-            (format!("{about}: labels can number {MOST_PLANTS}"), "")
+            (format!("{about}: label maps can number at most {MOST_PLANTS}"), "")
         } else if plants > self.most.to_f64() {
             let words = format!("{about}: they would need more memory than the limit, {}", gib(self.memory.to_f64()));
             (words, "; --memory sets the limit, in GiB")
@@ -140,11 +140,14 @@ mod tests {
         for (before, place) in [(20, "per_m2: 9"), (MANY, "per_m2: 5")] {
             let error = close(&page, u64::MAX, (before, MANY + 1)).unwrap_err();
             let words = error.to_string();
-            assert!(words.contains("about 1.678e7 plants or places for them: labels can number 16777215"), "{words}");
+            assert!(
+                words.contains("about 16777216 plants or planting positions: label maps can number at most 16777215"),
+                "{words}"
+            );
             assert!(words.contains(place) && error.exit_code() == 2, "{words}");
         }
         let places = Census::new(&page, false, u64::MAX).open(Population::Crop(0), 3.0 * MANY.to_f64(), 0).unwrap_err();
-        assert!(places.to_string().contains("labels can number 16777215"), "{places}");
+        assert!(places.to_string().contains("label maps can number at most 16777215"), "{places}");
     }
 
     /// Rationale: positions are listed before the size of their plants is known. Expected: no more positions than fit into memory at the

@@ -82,8 +82,8 @@ fn place(
     let meshes = meshes(drawn, k, &PlacedModel { model: model.clone(), turn, scale, foot });
     for (part, mesh) in model.parts.iter().zip(meshes) {
         let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
-            let words = format!("label maps can number {MOST_PLANTS} plants, and this model exceeds that");
-            drawn.page.blame(&at, Error::input(words).help("place fewer"))
+            let words = format!("label maps can number at most {MOST_PLANTS} plants; this model exceeds that");
+            drawn.page.blame(&at, Error::input(words).help("place fewer plants"))
         })?;
         let (lo, hi) = mesh.bounds().unwrap_or_default();
         let reach = lo.abs().max(hi.abs()).max_element();

@@ -243,9 +243,9 @@ impl Default for CrumbsDesc {
 pub struct ClodsDesc {
     /// Number longer than 5 mm, m⁻²; 0 for none, including crumbs.
     pub over_5mm_per_m2: Vary<NonNegative<100_000_000>>,
-    /// Length of the shortest body; smaller aggregates are crumbs, which are part of the surface.
+    /// Length of the shortest clod; smaller aggregates are crumbs, which are part of the surface.
     pub min_mm: Num<Positive<1000>>,
-    /// Length of the longest body.
+    /// Length of the longest clod.
     pub max_mm: Num<Positive<1000>>,
     /// Exponent D: larger values give fewer large aggregates per small one.
     pub exponent: Vary<Positive<100>>,

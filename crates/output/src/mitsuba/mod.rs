@@ -34,7 +34,7 @@ mod surface;
 mod xml;
 
 use super::png::{self, ImageData};
-use super::{Export, unheld};
+use super::{Export, unsupported};
 use files::{Band, Files, Plugins, SCALE, matrix};
 use furrow_base::Result;
 use furrow_base::geometry::{AlphaMask, Mesh};
@@ -89,7 +89,7 @@ pub fn write(folder: &Path, scene: &Scene, leveled: &Leveled, directions: &Direc
     let mut warnings = camera_warnings(scene);
     let groups = groups(scene, leveled)?;
     let lights = Lights::write(&scene.lights, &mut files)?;
-    warnings.extend(unheld(&scene.lights));
+    warnings.extend(unsupported(&scene.lights));
     if lights.has_lamps() && lights.has_sky() {
         warnings.push("with lamps in the scene the camera does not see the sky".into());
     }

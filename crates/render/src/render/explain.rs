@@ -19,7 +19,10 @@ pub fn explain(
     let scene = world.scene;
     let window = Window { x0: x, y0: y, x1: x + 1, y1: y + 1 };
     let tag = label(world.geometry, &scene.parts, &scene.camera, window).tags[0];
-    let mut text = format!("pixel {x},{y}\n  label: {} plant {} leaf {}", tag.class.name(), tag.plant, tag.leaf);
+    let mut text = match tag.plant {
+        0 => format!("pixel {x},{y}\n  label: {}, no plant", tag.class.name()),
+        _ => format!("pixel {x},{y}\n  label: {} plant {} leaf {}", tag.class.name(), tag.plant, tag.leaf),
+    };
     if let Some(description) = plant(tag.plant) {
         let _ = write!(text, "\n  plant: {description}");
     }
@@ -49,10 +52,13 @@ pub fn explain(
     let seen = pixel(world, integrator, settings, x, y);
     let _ = write!(
         text,
-        "\n  radiance: {}\n  ± error:  {}  ({} samples)",
+        "\n  radiance: {}\n  standard error: {}",
         bands(seen.mean),
-        bands(seen.variance.map(f32::sqrt)),
-        settings.spp
+        // One sample gives no estimate.
+        match settings.spp {
+            1 => "unknown (1 sample)".to_owned(),
+            spp => format!("{}  ({spp} samples)", bands(seen.variance.map(f32::sqrt))),
+        }
     );
     text
 }

@@ -19,7 +19,7 @@ impl Engine {
         (Self::Trace, "The path tracer"),
         (
             Self::Raster,
-            "A game engine of 2017: shadow maps, no bounces. For comparison; needs Vulkan and the feature `raster`",
+            "Rasterizer with the methods of a 2017 game engine: shadow maps, no indirect light. For comparison; needs Vulkan and the feature `raster`",
         ),
     ];
 

@@ -364,7 +364,7 @@ impl Checker<'_> {
         if desc.repeat == 0 {
             return Err(self.fault(
                 &step("repeat"),
-                "an image that is in an epoch 0 times is not trained on",
+                "`repeat: 0` would leave these images out of training",
                 "write 1 or more",
             ));
         }

@@ -83,7 +83,7 @@ pub(crate) struct RenderingArgs {
     #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
     spp: u32,
     /// Write labels and records of the same fields, without images. No light or sensor is simulated; --keep accepts
-    /// only depth, normals and label maps, and depth and normals must be named.
+    /// only depth, normals and label maps, name depth and normals explicitly: --keep depth,normals.
     #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "max_depth", "clamp"])]
     pub(crate) labels_only: bool,
     /// Denoise the images; needs Open Image Denoise.

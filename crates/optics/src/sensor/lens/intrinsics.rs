@@ -20,10 +20,10 @@ pub enum IntrinsicsDesc {
         /// Focal length along y.
         #[schemars(extend("x-example" = "500"))]
         fy: Vary<Positive<1_000_000>>,
-        /// Optical axis, from the left edge.
+        /// Principal point: distance from the left edge, pixels.
         #[schemars(extend("x-example" = "320"))]
         cx: Vary<Signed<1_000_000>>,
-        /// Optical axis, from the top edge.
+        /// Principal point: distance from the top edge, pixels.
         #[schemars(extend("x-example" = "240"))]
         cy: Vary<Signed<1_000_000>>,
     },

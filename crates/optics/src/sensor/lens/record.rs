@@ -21,9 +21,9 @@ pub struct CameraRecord {
     pub fx_px: f64,
     /// Focal length along y.
     pub fy_px: f64,
-    /// Optical axis, from the left edge.
+    /// Principal point: distance from the left edge, pixels.
     pub cx_px: f64,
-    /// Optical axis, from the top edge.
+    /// Principal point: distance from the top edge, pixels.
     pub cy_px: f64,
     /// Distortion, radial, r².
     pub k1: f64,
