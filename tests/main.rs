@@ -59,6 +59,7 @@ mod fuzz_corpus;
 mod gap;
 mod ground;
 mod guide;
+mod image_format;
 mod import;
 mod instances;
 mod keep;
@@ -78,7 +79,6 @@ mod networks;
 mod output;
 mod packs;
 mod pages;
-mod photo;
 #[cfg(feature = "train")]
 mod pixel_size;
 mod profile;

@@ -71,7 +71,7 @@ fn end(mut child: Child) -> ExitStatus {
 #[test]
 fn a_stream_holds_the_bytes_of_the_dataset_in_order() {
     let cases: [&[&str]; 4] = [
-        &["--photo", "jpeg90", "--keep", "nir"],
+        &["--image-format", "jpeg90", "--keep", "nir"],
         &["--seed", "5"],
         &["--keep", "none", "--split", "1,1,1", "--height", "40", "--without", "mis"],
         &["--keep", "depth32", "--classes", "soil; blade; weed", "--max-depth", "3"],

@@ -81,7 +81,7 @@ class StreamOptions(_Shared, total=False):
     labels_only: bool
     keep: Union[str, Sequence[str]]
     classes: str
-    photo: str
+    image_format: str
     split: Sequence[int]
     at_once: int
 

@@ -98,7 +98,7 @@ pub(super) fn image_id(record: &Record) -> u64 {
 fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
     let mut image = json!({
         "id": image_id(record),
-        "file_name": format!("{}.{}", record.name, set.recipe.photo().ending()),
+        "file_name": format!("{}.{}", record.name, set.recipe.image_format().ending()),
         "width": record.width,
         "height": record.height,
         "license": 1,

@@ -23,7 +23,7 @@ use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use super::conditions::ConditionsSummary;
 use super::{Format, SetWriter, image_file};
 use crate::format::labels;
-use crate::model::photo::Photo;
+use crate::model::image_format::ImageFormat;
 use crate::model::recipe::Recipe;
 use crate::model::record::{Plant, Record};
 use crate::model::sample::Sample;
@@ -123,7 +123,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let lossless = recipe.photo() == Photo::Png;
+        let lossless = recipe.image_format() == ImageFormat::Png;
         let photographs = "images are JPEG, as its scripts expect; the other formats have lossless images";
         let labels = "its labels are CropAndWeed's own, independent of --classes";
         let all = [(lossless, photographs), (recipe.labelling.classes.is_some(), labels)];

@@ -113,7 +113,7 @@ pub(super) fn by_camera(images: &[DriveImage]) -> BTreeMap<&str, Vec<&DriveImage
 
 /// Returns the path of the colour image, relative to `images/`.
 pub(super) fn photograph(set: &Set, image: &DriveImage) -> String {
-    format!("{}/rgb.{}", image.record.name, set.recipe.photo().ending())
+    format!("{}/rgb.{}", image.record.name, set.recipe.image_format().ending())
 }
 
 /// Returns the right, down and forward axes of the camera in world space, as columns, and its position, metres.

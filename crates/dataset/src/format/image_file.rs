@@ -1,6 +1,6 @@
 //! Image files of formats. They have no comment, so that equal pixels are equal bytes in every format.
 
-use crate::model::photo::Jpegs;
+use crate::model::image_format::Jpegs;
 use crate::{File, Sample};
 use furrow_base::Result;
 use furrow_output::ImageData;

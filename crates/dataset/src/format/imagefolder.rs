@@ -88,7 +88,7 @@ fn known(set: &Set, splits: &[Split]) -> Result<BTreeSet<&'static str>> {
 /// Returns the columns of one image.
 fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     let Record { name, split, .. } = record;
-    let photo = set.recipe.photo().ending();
+    let ending = set.recipe.image_format().ending();
     let file = |kind: &str, ending: &str| {
         let below = format!("{kind}/{name}.{ending}");
         set.folder.join(FOLDER).join(split.name()).join(&below).is_file().then_some(below)
@@ -101,12 +101,12 @@ fn columns(set: &Set, record: &Record) -> Vec<(&'static str, Value)> {
     // Texts are never null, since an empty text has a type.
     let list = |words: Vec<&str>| json!(words.join(", "));
     vec![
-        ("file_name", json!(format!("images/{name}.{photo}"))),
+        ("file_name", json!(format!("images/{name}.{ending}"))),
         ("mask_file_name", json!(format!("masks/{name}.png"))),
         ("plants_file_name", json!(label_map(OmittableMap::Plants, "plants"))),
         ("leaves_file_name", json!(label_map(OmittableMap::Leaves, "leaves"))),
         ("species_file_name", json!(file("species", "png"))),
-        ("nir_file_name", json!(file("nir", photo))),
+        ("nir_file_name", json!(file("nir", ending))),
         ("index", json!(record.index)),
         ("soil_pixels", json!(pixels(Class::Soil))),
         ("crop_pixels", json!(pixels(Class::Crop))),

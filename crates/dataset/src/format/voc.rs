@@ -11,7 +11,7 @@
 use furrow_base::math::ToInt;
 use super::{Format, SetWriter, image_file};
 use crate::format::labels::Labels;
-use crate::model::photo::Photo;
+use crate::model::image_format::ImageFormat;
 use crate::model::recipe::Recipe;
 use crate::model::rle::Box2;
 use crate::model::sample::{IGNORE, Sample};
@@ -103,7 +103,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
-        let lossless = recipe.photo() == Photo::Png;
+        let lossless = recipe.image_format() == ImageFormat::Png;
         let words = || "images are JPEG, as its readers expect; those in images/ are lossless".to_owned();
         lossless.then(words).into_iter().collect()
     }

@@ -4,8 +4,8 @@
 use crate::File;
 use crate::format;
 use crate::make::pack;
+use crate::model::image_format::ImageFormat;
 use crate::model::optional_maps::OptionalMap;
-use crate::model::photo::Photo;
 use crate::model::recipe::{FILE, ImageOrigin, Recipe};
 use crate::read::checksum_record::write_files;
 use crate::read::links;
@@ -58,8 +58,8 @@ fn joined(folder: &Path, mut recipe: Recipe, named: bool) -> Result<Recipe> {
             if !named {
                 now.omit.clone_from(&then.omit);
             }
-            if now.photo.unwrap_or_default() == Photo::default() {
-                now.photo = then.photo;
+            if now.image_format.unwrap_or_default() == ImageFormat::default() {
+                now.image_format = then.image_format;
             }
         }
         // Recipes of older versions lack this value; adding it would change the fingerprint that their images have.

@@ -8,9 +8,9 @@ use crate::make::pack;
 use crate::make::scene_files::{SceneFiles, collect_files};
 use crate::make::status::images_there;
 use crate::model::classes::Classes;
+use crate::model::image_format::ImageFormat;
 use crate::model::labelling::Labelling;
 use crate::model::optional_maps::{self, OmittableMap, OptionalMap};
-use crate::model::photo::Photo;
 use crate::model::recipe::{FILE, ImageOrigin, Recipe, Rendering};
 use crate::model::split::Shares;
 use crate::read::checksum_record;
@@ -58,7 +58,7 @@ pub struct Order {
     /// dataset and keeps the choice of an existing one.
     pub omit: Option<Vec<OmittableMap>>,
     /// Encoding of the images; with the default, PNG, an existing dataset keeps its encoding.
-    pub photo: Photo,
+    pub image_format: ImageFormat,
     /// Whether only labels are made, without lighting and without rendered images.
     pub labels_only: bool,
     /// Shares of the training, validation and test sets.
@@ -94,7 +94,7 @@ impl Order {
             labelling: Labelling::default(),
             keep: OptionalMap::USUAL.to_vec(),
             omit: None,
-            photo: Photo::default(),
+            image_format: ImageFormat::default(),
             labels_only: false,
             split: Shares::default(),
             pack: None,
@@ -177,7 +177,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     let elsewhere = rewritten || source.allows_outside();
     let scene_sha256 = if elsewhere { hash_of_copies(order, &files, &scene, stop)? } else { field.hash.clone() };
     let camera = &field.scene.camera;
-    order.photo.check_size(camera.width(), camera.height())?;
+    order.image_format.check_size(camera.width(), camera.height())?;
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: ImageOrigin::Rendered(Box::new(Rendering {
@@ -187,7 +187,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             keep,
             omit: optional_maps::in_order(order.omit.clone().unwrap_or_default()),
             labels_only: order.labels_only,
-            photo: Some(order.photo),
+            image_format: Some(order.image_format),
             edit: order.edit.label(),
             ..rendering(&source, field, &options, &kernels)
         })),
@@ -230,7 +230,7 @@ pub(crate) fn rendering(source: &SceneFile, field: &Field, options: &RenderOptio
         keep: OptionalMap::USUAL.to_vec(),
         omit: Vec::new(),
         labels_only: false,
-        photo: Some(Photo::Png),
+        image_format: Some(ImageFormat::Png),
         kernels: kernels.to_owned(),
         edit: None,
     }
@@ -246,8 +246,8 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<OptionalMa
     if order.edit.asks_samples() {
         return refused("this --edit makes labels from samples, and --labels-only takes none");
     }
-    if order.photo != Photo::default() {
-        return refused("--photo sets the encoding of images, and --labels-only renders none");
+    if order.image_format != ImageFormat::default() {
+        return refused("--image-format sets the encoding of images, and --labels-only renders none");
     }
     optional_maps::checked(optional_maps::of_labels(&order.keep)?)
 }

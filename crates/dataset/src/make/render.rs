@@ -5,8 +5,8 @@ use crate::make::damage;
 use crate::make::flow;
 use crate::make::plant_boxes;
 use crate::model::annotate::{self, keypoint, of_255};
+use crate::model::image_format;
 use crate::model::optional_maps::{self, OptionalMap};
-use crate::model::photo;
 use crate::model::recipe::{self, Recipe};
 use crate::model::record::{CaptureRecord, Exposure, Leaf, Plant, PlantAttributes, Record, Seen};
 use crate::model::sample::{Rendered, Sample};
@@ -193,7 +193,7 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
         sample.nir = photograph.nir;
     }
     field.profiler().enter(Phase::Files);
-    sample.jpeg = photo::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.photo())?;
+    sample.jpeg = image_format::store(sample.size(), &mut sample.rgb, &mut sample.nir, recipe.image_format())?;
     field.profiler().enter(Phase::Records);
     sample.coverage = render::coverage(&film, &field.grown().scene.tags()).into_iter().map(of_255).collect();
     // Class statistics include the coverage, so they are computed again now that it is known.

@@ -33,7 +33,7 @@ pub fn belongs(recipe: &Recipe, file: &str) -> bool {
         ImageOrigin::Imported { .. } => None,
     };
     let drawn = !recipe.labels_only();
-    let stored = |name: &str| drawn && file == format!("{name}.{}", recipe.photo().ending());
+    let stored = |name: &str| drawn && file == format!("{name}.{}", recipe.image_format().ending());
     let kept =
         |maps: &[OptionalMap]| rendering.is_some_and(|rendering| maps.iter().any(|map| rendering.keep.contains(map)));
     match file {
@@ -62,7 +62,7 @@ pub fn photograph_in(folder: &Path, name: &str, recipe: Option<&Recipe>) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::photo::Photo;
+    use crate::model::image_format::ImageFormat;
     use crate::model::recipe::Rendering;
 
     fn of(recipe: &Recipe) -> Vec<&'static str> {
@@ -93,7 +93,7 @@ mod tests {
         });
         assert_eq!(least, ["rgb.png", "semantics.png", "record.json"]);
         let stored = rendered(|rendering| {
-            (rendering.photo, rendering.parts) = (Some(Photo::Jpeg(90)), true);
+            (rendering.image_format, rendering.parts) = (Some(ImageFormat::Jpeg(90)), true);
             rendering.keep = vec![OptionalMap::Nir, OptionalMap::Normals];
             rendering.omit = vec![OmittableMap::Species, OmittableMap::Leaves];
         });

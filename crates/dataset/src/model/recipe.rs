@@ -5,9 +5,9 @@
 //! folder can continue the dataset.
 
 use crate::model::classes::Classes;
+use crate::model::image_format::ImageFormat;
 use crate::model::labelling::Labelling;
 use crate::model::optional_maps::{OmittableMap, OptionalMap};
-use crate::model::photo::Photo;
 use crate::model::split::{Shares, Split};
 use furrow_base::input::{Scope, below};
 use furrow_base::math::ToInt;
@@ -113,8 +113,8 @@ pub struct Rendering {
     pub labels_only: bool,
     /// Encoding of the images. Omitted in recipes of earlier versions: their images are PNG files with the same comment
     /// as label maps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub photo: Option<Photo>,
+    #[serde(default, rename = "photo", skip_serializing_if = "Option::is_none")]
+    pub image_format: Option<ImageFormat>,
     /// Ray tracing kernels with their instruction set, or graphics card with its driver.
     pub kernels: String,
     /// Name of the applied ablation among [`ablation::EDITS`]; its changes of render options are in the fields above as
@@ -293,17 +293,17 @@ impl Recipe {
     }
 
     /// Returns the encoding of the images.
-    pub fn photo(&self) -> Photo {
+    pub fn image_format(&self) -> ImageFormat {
         match &self.made {
-            ImageOrigin::Rendered(rendering) => rendering.photo.unwrap_or_default(),
-            ImageOrigin::Imported { .. } => Photo::Png,
+            ImageOrigin::Rendered(rendering) => rendering.image_format.unwrap_or_default(),
+            ImageOrigin::Imported { .. } => ImageFormat::Png,
         }
     }
 
     /// Returns whether the image files contain a comment, as in earlier versions. Without a comment, formats contain
     /// the same bytes.
     pub fn has_comments(&self) -> bool {
-        matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.photo.is_none())
+        matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.image_format.is_none())
     }
 
     /// Returns the render parameters; an error for imported images.

@@ -1,7 +1,7 @@
 //! One image with all its labels and metadata, in memory: the source of every format.
 
 use crate::model::box3::UprightBox;
-use crate::model::photo::Jpegs;
+use crate::model::image_format::Jpegs;
 use crate::model::record::Record;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};

@@ -17,8 +17,8 @@
 
 use crate::File;
 use crate::model::image_files::{self, NAMES};
+use crate::model::image_format::{ImageFormat, Jpegs};
 use crate::model::optional_maps::OptionalMap;
-use crate::model::photo::{Jpegs, Photo};
 use crate::model::recipe::{Recipe, compact};
 use crate::model::record::Record;
 use crate::model::sample::{IGNORE, Sample};
@@ -251,7 +251,7 @@ impl<'a, F: Files> Image<'a, F> {
     fn stored(&self, name: &str) -> Result<Option<Stored>> {
         for ending in furrow_output::ENDINGS {
             if let Some((place, bytes)) = self.optional(&format!("{name}.{ending}"))? {
-                return Ok(Some(Stored { place, bytes, is_jpeg: ending != Photo::Png.ending() }));
+                return Ok(Some(Stored { place, bytes, is_jpeg: ending != ImageFormat::Png.ending() }));
             }
         }
         Ok(None)

@@ -3,7 +3,7 @@
 use super::statistics::{Species, Statistics};
 use crate::format;
 use crate::model::image_files::belongs;
-use crate::model::photo::Photo;
+use crate::model::image_format::ImageFormat;
 use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::split::Split;
 use furrow_base::math::{ToFloat, ToInt};
@@ -158,7 +158,7 @@ fn stages(of: &Species) -> String {
 /// Returns the list of an image's files, with an example of reading them.
 pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
     let has = |file: &str| belongs(recipe, file);
-    let jpeg = recipe.photo() != Photo::Png;
+    let jpeg = recipe.image_format() != ImageFormat::Png;
     let mut rows = Vec::new();
     if !recipe.labels_only() {
         rows.push((if jpeg { "rgb.jpg" } else { "rgb.png" }, html! { "colour image, 8-bit sRGB" }));

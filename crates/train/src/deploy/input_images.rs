@@ -194,7 +194,7 @@ fn images(selection: &Selection, shape: &Shape) -> Result<Vec<InputImage>> {
             return Ok(InputImage { photo: folder.join(PHOTO), name, source });
         }
         if !is_packed && folder.is_dir() {
-            let missing = || folder.join(format!("rgb.{}", set.recipe.photo().ending()));
+            let missing = || folder.join(format!("rgb.{}", set.recipe.image_format().ending()));
             let photo = photograph_in(&folder, "rgb", recipe).unwrap_or_else(missing);
             let beside = |band: &Band| photograph_in(&folder, band.name(), recipe);
             let source = Source::Files(planes(&photo, shape, &beside)?);

@@ -8,9 +8,9 @@ use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::make::plan::{self, Order};
 use furrow_dataset::model::classes::Classes;
+use furrow_dataset::model::image_format::ImageFormat;
 use furrow_dataset::model::labelling::Labelling;
 use furrow_dataset::model::optional_maps::{self, OmittableMap, OptionalMap};
-use furrow_dataset::model::photo::Photo;
 use furrow_dataset::model::split::Shares;
 use furrow_dataset::read::packs;
 use furrow_dataset::{Set, format};
@@ -69,8 +69,8 @@ pub(crate) struct ContentArgs {
     keep: Vec<String>,
     /// Format of the colour images: png, or jpeg with a quality from 50 to 100, such as jpeg95, without chroma
     /// subsampling.
-    #[arg(long, value_name = "png|jpegQ", default_value_t = Photo::Png, value_parser = Photo::parse)]
-    photo: Photo,
+    #[arg(long, alias = "photo", value_name = "png|jpegQ", default_value_t = ImageFormat::Png, value_parser = ImageFormat::parse)]
+    image_format: ImageFormat,
     /// Proportions of train, val and test.
     #[arg(long, value_name = "TRAIN,VAL,TEST", default_value = "8,1,1", value_parser = Shares::parse)]
     split: Shares,
@@ -195,7 +195,7 @@ impl ContentArgs {
                 .help("leave one of them out; semantics can be kept on its own"));
         }
         (order.keep, order.omit) = optional_maps::parse(&self.keep)?;
-        (order.photo, order.split) = (self.photo, self.split);
+        (order.image_format, order.split) = (self.image_format, self.split);
         Ok(())
     }
 }

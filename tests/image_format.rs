@@ -1,4 +1,4 @@
-//! `trace dataset --photo`: images as PNG or JPEG, each stored once.
+//! `trace dataset --image-format`: images as PNG or JPEG, each stored once.
 //!
 //! Rationale: colour images take most of a dataset's disk space, and with lossy storage all readers must see the same
 //! pixels: those that the file decodes to. Expected: samples, formats and networks have those pixels; formats contain
@@ -55,7 +55,7 @@ fn all_readers_have_the_pixels_of_the_file() {
     let (jpeg, png) = (base.join("jpeg"), base.join("png"));
     let formats =
         "cityscapes,coco,colmap,cropandweed,imagefolder,nerf,panoptic,phenobench,voc,yolo,yolo-detect,yolo-pose";
-    succeed(make(&jpeg, 2, &["--photo", "jpeg90", "--format", formats]));
+    succeed(make(&jpeg, 2, &["--image-format", "jpeg90", "--format", formats]));
     succeed(make(&png, 2, &["--format", formats]));
     let read = |folder: &Path| native::read(folder, "000000").unwrap();
     let (lossy, exact): (Sample, Sample) = (read(&jpeg), read(&png));
@@ -142,7 +142,7 @@ sample = furrow.Dataset(sys.argv[1])[0]
 assert sample['image'].max() > 0 and sample['nir'].max() > 0
 ";
     let (_keep, data) = scratch();
-    succeed(make(&data, 1, &["--photo", "jpeg90"]));
+    succeed(make(&data, 1, &["--image-format", "jpeg90"]));
     let before = native::read(&data, "000000").unwrap();
     let (width, height) = before.size();
     let (dark, gray) = (vec![[0_u8; 3]; before.pixels()], vec![0_u8; before.pixels()]);
@@ -186,7 +186,7 @@ fn learnt_alike(_: &Set, _: &Sample) {}
 #[test]
 fn however_it_is_made_it_is_one_dataset() {
     let (_keep, whole) = scratch();
-    let more = ["--photo", "jpeg95", "--format", "coco"];
+    let more = ["--image-format", "jpeg95", "--format", "coco"];
     succeed(make(&whole, 3, &[&more[..], &["--threads", "1"]].concat()));
     let expected = tree(&whole);
     let (_keep, shards) = scratch();
@@ -236,7 +236,7 @@ fn however_it_is_made_it_is_one_dataset() {
         let trace = env!("CARGO_BIN_EXE_trace");
         let mut check = Command::new(&python);
         check
-            .arg(root.join("tests/photo/check_module.py"))
+            .arg(root.join("tests/image_format/check_module.py"))
             .args([&whole, &packed, &root.join(SMALL), &root.join("python")])
             .env("FURROW_TRACE", trace)
             .current_dir(root);
@@ -252,7 +252,7 @@ fn each_byte_lies_once() {
     use std::os::unix::fs::MetadataExt;
     for (photo, ending) in [("png", "png"), ("jpeg100", "jpg")] {
         let (_keep, data) = scratch();
-        succeed(make(&data, 1, &["--photo", photo, "--format", "coco"]));
+        succeed(make(&data, 1, &["--image-format", photo, "--format", "coco"]));
         let of = |file: &str| {
             let about = fs::metadata(data.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
             (about.dev(), about.ino())
@@ -275,7 +275,7 @@ fn each_byte_lies_once() {
 }
 
 /// Rationale: generating a dataset may take months, across program versions. Expected: a recipe without an image format
-/// keeps writing images as before, with the bytes of the single field including the comment, also with `--photo png`;
+/// keeps writing images as before, with the bytes of the single field including the comment, also with `--image-format png`;
 /// new datasets have no comment. The format that a dataset was started with is kept, and another one is refused.
 #[test]
 fn datasets_of_before_keep_their_bytes() {
@@ -287,7 +287,7 @@ fn datasets_of_before_keep_their_bytes() {
     let line = text.lines().find(|line| line.contains("\"photo\": \"png\"")).unwrap_or_else(|| panic!("{text}"));
     fs::write(&recipe, text.replace(&format!("{line}\n"), "")).unwrap();
     succeed(make(&old, 1, &[]));
-    succeed(make(&old, 2, &["--photo", "png", "--format", "coco"]));
+    succeed(make(&old, 2, &["--image-format", "png", "--format", "coco"]));
     assert!(!fs::read_to_string(&recipe).unwrap().contains("photo\""));
     let (_keep, one) = scratch();
     run(&one, &["--index", "1", "--width", "96", "--spp", "2"]);
@@ -301,6 +301,7 @@ fn datasets_of_before_keep_their_bytes() {
     let (_keep, new) = scratch();
     let (_keep, jpeg) = scratch();
     succeed(make(&new, 1, &[]));
+    // The name of the option in earlier versions.
     succeed(make(&jpeg, 1, &["--photo", "jpeg95"]));
     assert!(!has_comment(&new.join("images/000000/rgb.png")) && !has_comment(&new.join("images/000000/nir.png")));
     let pixels = |file: &Path| furrow_output::read_rgb(file).unwrap();
@@ -310,7 +311,7 @@ fn datasets_of_before_keep_their_bytes() {
     {
         let before = tree(folder);
         let count = if folder == &old { 2 } else { 1 };
-        let message = fail(make(folder, count, &["--photo", photo]), 2);
+        let message = fail(make(folder, count, &["--image-format", photo]), 2);
         let words = format!("another dataset is in this folder: photo {there} there, \"{photo}\" here");
         assert!(message.contains(&words), "{message}");
         same(&tree(folder), &before);
@@ -324,11 +325,11 @@ fn datasets_of_before_keep_their_bytes() {
 fn wrong_words_are_reported() {
     let (_keep, data) = scratch();
     for bad in ["jpeg", "jpeg0", "jpeg49", "jpeg101", "webp"] {
-        let message = fail(make(&data, 1, &["--photo", bad]), 2);
+        let message = fail(make(&data, 1, &["--image-format", bad]), 2);
         assert!(message.contains("such as jpeg95") && message.matches("error: ").count() == 1, "{bad}: {message}");
     }
     let mut labels =
-        trace(&["dataset", "--scene", SMALL, "--count", "1", "--labels-only", "--photo", "jpeg95", "--out"]);
+        trace(&["dataset", "--scene", SMALL, "--count", "1", "--labels-only", "--image-format", "jpeg95", "--out"]);
     labels.arg(&data);
     let message = fail(labels, 2);
     assert!(message.contains("--labels-only renders none") && message.matches("error: ").count() == 1, "{message}");

@@ -11,7 +11,7 @@ use std::path::Path;
 /// Encoding of images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
-pub enum Photo {
+pub enum ImageFormat {
     /// PNG.
     #[default]
     Png,
@@ -25,7 +25,7 @@ const QUALITIES: std::ops::RangeInclusive<u8> = 50..=100;
 /// Maximum width and height of a JPEG, pixels.
 const MOST_SIDE: u32 = u16::MAX as u32;
 
-impl Photo {
+impl ImageFormat {
     /// Parses `png`, or `jpeg` followed by a quality, such as `jpeg95`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let quality = |text: &str| text.parse().ok().filter(|quality| QUALITIES.contains(quality));
@@ -54,11 +54,11 @@ impl Photo {
             return Ok(());
         }
         Err(Error::input(format!("{width} × {height} pixels: the sides of a JPEG have at most {MOST_SIDE}"))
-            .help("omit --photo to store the images as PNG"))
+            .help("omit --image-format to store the images as PNG"))
     }
 }
 
-impl fmt::Display for Photo {
+impl fmt::Display for ImageFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Png => f.write_str("png"),
@@ -67,13 +67,13 @@ impl fmt::Display for Photo {
     }
 }
 
-impl From<Photo> for String {
-    fn from(photo: Photo) -> Self {
-        photo.to_string()
+impl From<ImageFormat> for String {
+    fn from(format: ImageFormat) -> Self {
+        format.to_string()
     }
 }
 
-impl TryFrom<String> for Photo {
+impl TryFrom<String> for ImageFormat {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
@@ -96,9 +96,9 @@ pub(crate) fn store(
     (w, h): (u32, u32),
     rgb: &mut Vec<[u8; 3]>,
     nir: &mut Vec<u8>,
-    photo: Photo,
+    format: ImageFormat,
 ) -> Result<Option<Jpegs>> {
-    let Photo::Jpeg(quality) = photo else { return Ok(None) };
+    let ImageFormat::Jpeg(quality) = format else { return Ok(None) };
     let mut jpegs = Jpegs::default();
     if !rgb.is_empty() {
         jpegs.rgb = furrow_output::encode_jpeg(w, h, rgb, quality)?;
@@ -118,13 +118,15 @@ mod tests {
     /// Expected: values are written as they are read, in recipes too; other words are refused with an example.
     #[test]
     fn words_are_read_as_they_are_written() {
-        for (text, photo) in [("png", Photo::Png), ("jpeg50", Photo::Jpeg(50)), ("jpeg100", Photo::Jpeg(100))] {
-            assert_eq!((Photo::parse(text), photo.to_string()), (Ok(photo), text.to_owned()));
-            assert_eq!(serde_json::to_string(&photo).unwrap(), format!("\"{text}\""));
-            assert_eq!(serde_json::from_str::<Photo>(&format!("\"{text}\"")).unwrap(), photo);
+        for (text, format) in
+            [("png", ImageFormat::Png), ("jpeg50", ImageFormat::Jpeg(50)), ("jpeg100", ImageFormat::Jpeg(100))]
+        {
+            assert_eq!((ImageFormat::parse(text), format.to_string()), (Ok(format), text.to_owned()));
+            assert_eq!(serde_json::to_string(&format).unwrap(), format!("\"{text}\""));
+            assert_eq!(serde_json::from_str::<ImageFormat>(&format!("\"{text}\"")).unwrap(), format);
         }
         for bad in ["", "jpeg", "jpeg0", "jpeg49", "jpeg101", "jpeg095", "jpeg+95", "jpeg9.5", "jpg95", "PNG", "webp"] {
-            assert!(Photo::parse(bad).is_err_and(|words| words.contains("such as jpeg95")), "{bad}");
+            assert!(ImageFormat::parse(bad).is_err_and(|words| words.contains("such as jpeg95")), "{bad}");
         }
     }
 
@@ -132,7 +134,9 @@ mod tests {
     /// refused.
     #[test]
     fn sizes_beyond_a_jpeg_are_refused() {
-        assert!(Photo::Jpeg(95).check_size(65_535, 1).is_ok() && Photo::Jpeg(95).check_size(1, 65_536).is_err());
-        assert!(Photo::Png.check_size(1, 65_536).is_ok());
+        assert!(
+            ImageFormat::Jpeg(95).check_size(65_535, 1).is_ok() && ImageFormat::Jpeg(95).check_size(1, 65_536).is_err()
+        );
+        assert!(ImageFormat::Png.check_size(1, 65_536).is_ok());
     }
 }
