@@ -42,7 +42,7 @@ fn decide(mut trained: TrainedModel, out: &Path) {
         match array.name.as_str() {
             // Rows are fat hen and sugar beet.
             film::EMBEDDING => {
-                array.values.iter_mut().enumerate().for_each(|(k, v)| *v = f32::from(u8::from(k == film::WIDTH)))
+                array.values.iter_mut().enumerate().for_each(|(k, v)| *v = f32::from(u8::from(k == film::WIDTH)));
             }
             // The second half of the rows gives β: 1000 for the first channel of the last batch norm.
             name if name == film::map("dec1_1.bn") => {
