@@ -24,8 +24,8 @@ fn table(stderr: &[u8]) -> Vec<(String, f64)> {
 fn a_profile_sums_to_the_whole_and_changes_nothing() {
     let (_folder, out) = scratch();
     let folders = [out.join("plain"), out.join("profiled")];
-    let plain = run(&folders[0], &["--width", "32", "--spp", "4"]);
-    let profiled = run(&folders[1], &["--width", "32", "--spp", "4", "--profile"]);
+    let plain = run(&folders[0], &["--width", "32", "--spp", "128"]);
+    let profiled = run(&folders[1], &["--width", "32", "--spp", "128", "--profile"]);
     for name in FILES {
         let [a, b] = folders.each_ref().map(|folder| fs::read(folder.join(name)).unwrap());
         assert!(a == b, "{name}");

@@ -82,6 +82,7 @@ class StreamOptions(_Shared, total=False):
     keep: Union[str, Sequence[str]]
     classes: str
     image_format: str
+    photo: str  # the former name of image_format
     split: Sequence[int]
     at_once: int
 

@@ -17,5 +17,5 @@ for k in range(3):
         with Image.open(root / f"images/{k:06d}" / file) as picture:
             expected = np.array(picture)
         assert np.array_equal(folders[k][name], expected) and np.array_equal(packs[k][name], expected), (k, name)
-streamed = next(furrow.stream(scene, spp=2, width=96, photo="jpeg95"))
+streamed = next(furrow.stream(scene, spp=2, width=96, image_format="jpeg95"))
 assert np.array_equal(streamed["image"], folders[0]["image"]) and np.array_equal(streamed["nir"], folders[0]["nir"])

@@ -317,8 +317,8 @@ mod tests {
             ("0 0 0 1 0 0 0 0", "no quaternion"),
             ("1 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0", "line 2 is not later"),
             ("0 0 0 NaN 1 0 0 0", "line 1 contains a word"),
-            ("0 1e300 0 1 1 0 0 0", "line 1 is beyond 1000 m"),
-            ("-1e300 0 0 1 1 0 0 0", "line 1 is beyond"),
+            ("0 1e300 0 1 1 0 0 0", "line 1 is more than 1000 m from the origin"),
+            ("-1e300 0 0 1 1 0 0 0", "line 1 is more than 1000 m"),
             ("time,x,y,z,qw,qx,qy,qz\nc d", "line 2 contains a word"),
             ("time,x,y,z,qw,qx,qy,qz\n0 0 0 1", "write: time x y z qw qx qy qz, in seconds and metres"),
         ] {
