@@ -78,8 +78,16 @@ struct Inner {
     source: Option<std::io::Error>,
     /// `true` if the cause persists for every field that is built.
     lasting: bool,
-    /// Further mistakes of the same file, and that file.
-    others: Option<(Vec<Error>, PathBuf)>,
+    others: Option<Others>,
+}
+
+/// Further mistakes of the same file.
+#[derive(Debug)]
+struct Others {
+    errors: Vec<Error>,
+    file: PathBuf,
+    /// `false` if the search for mistakes ended before the file could be read.
+    complete: bool,
 }
 
 impl Error {
@@ -208,16 +216,17 @@ impl Error {
         self
     }
 
-    /// Adds the further mistakes that were found in `file`. They are displayed after this one, followed by their number.
+    /// Adds the further mistakes that were found in `file`. They are displayed after this one, followed by their number,
+    /// and by a note unless they are `complete`.
     #[must_use]
-    pub fn with_others(mut self, others: Vec<Self>, file: &Path) -> Self {
-        self.0.others = (!others.is_empty()).then(|| (others, file.to_path_buf()));
+    pub fn with_others(mut self, others: Vec<Self>, file: &Path, complete: bool) -> Self {
+        self.0.others = (!others.is_empty()).then(|| Others { errors: others, file: file.to_path_buf(), complete });
         self
     }
 
     /// Further mistakes that were found in the same file.
     pub fn others(&self) -> &[Self] {
-        self.0.others.as_ref().map_or(&[], |(others, _)| others)
+        self.0.others.as_ref().map_or(&[], |others| &others.errors)
     }
 
     /// Kind of failure.
@@ -331,11 +340,12 @@ impl fmt::Display for Error {
         if let Some(command) = &self.0.see {
             write!(f, "\n see:  {command}")?;
         }
-        let Some((others, file)) = &self.0.others else { return Ok(()) };
-        for other in others {
+        let Some(Others { errors, file, complete }) = &self.0.others else { return Ok(()) };
+        for other in errors {
             write!(f, "\nerror: {other}")?;
         }
-        write!(f, "\n{} mistakes in {}", others.len() + 1, file.display())
+        let more = if *complete { "" } else { "; correct them and run it again: there may be more" };
+        write!(f, "\n{} mistakes in {}{more}", errors.len() + 1, file.display())
     }
 }
 
@@ -424,9 +434,11 @@ mod tests {
         assert_eq!(error.to_string(), shown);
         assert_eq!(error.place().and_then(|place| place.span.as_ref()), Some(&span));
         assert_eq!(Error::input("a").help("").advice(), None);
-        let all = Error::input("a").with_others(vec![Error::input("b").help("c")], Path::new("d.ron"));
+        let all = Error::input("a").with_others(vec![Error::input("b").help("c")], Path::new("d.ron"), true);
         assert_eq!(all.to_string(), "a\nerror: b\n help: c\n2 mistakes in d.ron");
-        assert_eq!(Error::input("a").with_others(Vec::new(), Path::new("d.ron")).to_string(), "a");
+        assert_eq!(Error::input("a").with_others(Vec::new(), Path::new("d.ron"), false).to_string(), "a");
+        let some = Error::input("a").with_others(vec![Error::input("b")], Path::new("d.ron"), false);
+        assert!(some.to_string().ends_with("2 mistakes in d.ron; correct them and run it again: there may be more"));
         let error = Error::missing("no x").in_file("c").help("get x").within("image 3");
         assert_eq!(error.to_string(), "image 3: c: no x\n help: get x");
         assert_eq!((error.kind(), error.place()), (Kind::Missing, None));

@@ -232,7 +232,9 @@ impl Spliced {
     }
 
     fn source(&mut self, page: &RonFile) -> usize {
-        self.sources.iter().position(|known| known.path == page.path).unwrap_or_else(|| {
+        // Values of the command line share a path.
+        let same = |known: &RonFile| known.path == page.path && known.text == page.text;
+        self.sources.iter().position(same).unwrap_or_else(|| {
             self.sources.push(page.clone());
             self.sources.len() - 1
         })

@@ -25,9 +25,9 @@ impl Source {
             return first;
         }
         let mut search = Search::new(text, library, options);
-        let found = search.mistakes();
+        let (found, complete) = search.mistakes();
         let others = found.into_iter().filter(|error| !same(error, &first)).collect();
-        first.with_others(others, &text.page.path)
+        first.with_others(others, &text.page.path, complete)
     }
 }
 
@@ -55,8 +55,9 @@ impl<'a> Search<'a> {
         Self { scene, texts, library: library.clone(), growing: library.growing, options, readings: 0 }
     }
 
-    /// Returns the mistakes in the order in which they are found, each at its place in the files as written.
-    fn mistakes(&mut self) -> Vec<Error> {
+    /// Returns the mistakes in the order in which they are found, each at its place in the files as written, and whether the
+    /// repaired files could be read.
+    fn mistakes(&mut self) -> (Vec<Error>, bool) {
         let (mut found, mut made): (Vec<Error>, Vec<Repair>) = (Vec::new(), Vec::new());
         let mut next = self.read();
         while let Some(error) = next {
@@ -71,11 +72,11 @@ impl<'a> Search<'a> {
             if !follows && !found.iter().any(|known| same(known, &error)) {
                 found.push(error);
             }
-            let Some((repair, after)) = repaired.filter(|_| found.len() < MOST) else { break };
+            let Some((repair, after)) = repaired.filter(|_| found.len() < MOST) else { return (found, false) };
             made.push(repair);
             next = after;
         }
-        found
+        (found, true)
     }
 
     /// Makes the text of an error's file available for repairs, unless it cannot be parsed at all.

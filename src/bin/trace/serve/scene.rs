@@ -39,17 +39,21 @@ impl SceneSource {
 
     /// Returns the checked text of the scene file.
     pub(super) fn text(&self) -> Result<String> {
+        let page = self.page()?;
+        page.parse_all::<FieldDesc>()?;
+        Ok(page.text)
+    }
+
+    fn page(&self) -> Result<RonFile> {
         let path = self.path();
-        let page = match (&self.scene, &self.file) {
+        Ok(match (&self.scene, &self.file) {
             (Some(scene), None) => RonFile { path, text: from_json::<FieldDesc>("Field", scene) },
             (None, Some(_)) => {
                 cli::check_scene(&path)?;
                 RonFile::read(&path)?
             }
             _ => return Err(Error::misuse("a request names either a file or a scene").help("see `trace serve --help`")),
-        };
-        page.parse_all::<FieldDesc>()?;
-        Ok(page.text)
+        })
     }
 
     /// Returns the text with absolute paths of the files that it names, so that it can be saved anywhere.
@@ -83,7 +87,8 @@ pub(super) struct Kept {
 impl Kept {
     /// Returns the scene file of a request with an edit. What did not change since the last request is not read again.
     pub(super) fn scene(&mut self, source: &SceneSource, edit: &'static Edit) -> Result<SceneFile> {
-        let (path, text) = (source.path(), source.text()?);
+        // Parsed below, where an error contains all mistakes.
+        let RonFile { path, text } = source.page()?;
         let scene = match self.known.take() {
             Some((known_path, name, known, scene)) if (&known_path, name) == (&path, edit.name) => {
                 let same = known == text && self.files.iter().all(|(file, before)| stamp(file) == *before);
