@@ -17,6 +17,8 @@ const COEFFICIENTS: [&str; 6] =
     ["distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "dist"];
 /// Names of the image's width and height.
 const SIZE: [[&str; 2]; 2] = [["image_width", "image_Width"], ["image_height", "image_Height"]];
+/// Largest side of a calibrated image, pixels.
+const MOST_PIXELS: f64 = 1e6;
 /// Largest relative difference between the aspect ratios of the calibration and of the image.
 const SAME_SHAPE: f64 = 2e-3;
 
@@ -38,6 +40,10 @@ impl Calibration {
     /// Reads a file that `cv2.FileStorage` has written, as YAML or XML. Errors name the line.
     pub fn read(text: &str) -> Result<Self> {
         let all = file_storage::read(text)?;
+        let twice = all.iter().enumerate().find(|(i, entry)| all[..*i].iter().any(|before| before.key == entry.key));
+        if let Some((_, entry)) = twice {
+            return Err(entry.fault("is given twice").help("keep one of the two"));
+        }
         let find = |names: &[&str]| all.iter().find(|entry| names.contains(&entry.key.as_str()));
         let need = |names: &[&str], what: &str| {
             find(names).ok_or_else(|| {
@@ -62,14 +68,23 @@ impl Calibration {
         let coefficients = entry.matrix()?;
         let line = entry.line;
         let [width, height] = SIZE.map(|names| find(&names).map(Entry::number).transpose());
-        let size = if let (Some(width), Some(height)) = (width?, height?) { Some([width, height]) } else { None };
-        if size.is_some_and(|size| size.iter().any(|side| *side < 1.0)) {
-            return Err(Error::input("the image size in the file is not above 0")
-                .help("write image_width and image_height in pixels"));
+        let size = match (width?, height?) {
+            (Some(width), Some(height)) => Some([width, height]),
+            (None, None) => None,
+            _ => {
+                return Err(Error::input("the file has only one of image_width and image_height")
+                    .help("write both, or none of them"));
+            }
+        };
+        if size.is_some_and(|size| size.iter().any(|side| !(1.0..=MOST_PIXELS).contains(side) || side.fract() != 0.0)) {
+            return Err(Error::input(format!(
+                "the image size in the file is not in whole pixels from 1 to {MOST_PIXELS}"
+            ))
+            .help("write image_width and image_height in pixels"));
         }
         let fisheye = match find(&["distortion_model"]) {
             Some(entry) => Some(named(entry)?),
-            None => find(&["fisheye_model"]).map(Entry::number).transpose()?.map(|flag| flag != 0.0),
+            None => find(&["fisheye_model"]).map(flag).transpose()?,
         };
         Ok(Self { size, focal: [fx, fy], centre: [cx + 0.5, cy + 0.5], coefficients, fisheye, line })
     }
@@ -113,6 +128,15 @@ impl Calibration {
     fn count(&self, expected: &str) -> Error {
         let words = format!("line {}: {} distortion coefficients, not {expected}", self.line, self.coefficients.len());
         Error::input(words).help("write all coefficients that cv2.calibrateCamera or cv2.fisheye.calibrate returns")
+    }
+}
+
+/// Returns a flag that is written as 0 or 1.
+fn flag(entry: &Entry) -> Result<bool> {
+    match entry.number()? {
+        0.0 => Ok(false),
+        1.0 => Ok(true),
+        _ => Err(entry.fault("is neither 0 nor 1").help("write 1 for cv2.fisheye, 0 for cv2.calibrateCamera")),
     }
 }
 

@@ -53,8 +53,14 @@ impl Entry {
             number(word).ok_or_else(|| self.fault(format_args!("contains `{word}`, not a finite number")).help(FORMS))
         };
         let numbers: Vec<f64> = self.data.iter().map(read).collect::<Result<_>>()?;
-        let side = |text: &Option<String>| text.as_ref().and_then(|text| text.parse::<usize>().ok());
-        if let (Some(rows), Some(cols)) = (side(&self.rows), side(&self.cols))
+        let side = |text: &Option<String>| match text {
+            None => Ok(None),
+            Some(text) => text
+                .parse::<usize>()
+                .map(Some)
+                .map_err(|_| self.fault(format_args!("has `{text}` rows or columns")).help("write whole numbers")),
+        };
+        if let (Some(rows), Some(cols)) = (side(&self.rows)?, side(&self.cols)?)
             && rows.saturating_mul(cols) != numbers.len()
         {
             let words = format!("has {} numbers, not {rows} × {cols}", numbers.len());

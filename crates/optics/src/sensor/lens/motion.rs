@@ -20,7 +20,7 @@ pub struct MotionDesc {
     /// Heading, degrees clockwise from north; default 0. At yaw 0 that is the image's top.
     pub heading_deg: Vary<Signed<360>>,
     /// Exposure time of a row, for motion blur and for the sensor. By default the sensor's exposure determines it, from
-    /// the light of the scene.
+    /// the light of the scene. 0 removes the blur and leaves the exposure to the light.
     #[serde(with = "super::bare", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vary<NonNegative<10_000>>>")]
     pub exposure_ms: Option<Vary<NonNegative<10_000>>>,
