@@ -498,7 +498,7 @@ fn mistakes_in_a_page_are_shown_where_they_are() {
         ("\"0..2\"", "\"2..0\"", "\"2..0\"", "`2..0` picks no images", "0..10"),
         ("\"0..2\"", "\"most\"", "\"most\"", "`most` picks no images", "train"),
         (frames, "(set: \"small\", images: \"0..7\")", "\"0..7\"", "`small` has 6 images", "fewer"),
-        ("repeat: 2", "repeat: 0", "0", "0 times", "1 or more"),
+        ("repeat: 2", "repeat: 0", "0", "out of training", "1 or more"),
         ("(name: \"Few\",", "(name: \"Few\", hyperparameters: (steps: 0),", "0", "0 is out of range", "above 0"),
         (
             "(name: \"Few\",",

@@ -83,7 +83,11 @@ class _Worker:
     ) -> Tuple[Dict[str, Any], List[np.ndarray[Any, Any]]]:
         assert self.process.stdin is not None and self.process.stdout is not None
         try:
-            self.process.stdin.write(json.dumps(request, default=plain).encode() + b"\n")
+            line = json.dumps(request, default=plain, allow_nan=False).encode() + b"\n"
+        except (ValueError, RecursionError) as error:
+            raise FurrowError(f"the scene cannot be written: {error}", "input", "give finite numbers, without cycles") from None
+        try:
+            self.process.stdin.write(line)
             self.process.stdin.flush()
         except OSError:
             raise self._lost() from None

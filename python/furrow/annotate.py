@@ -11,11 +11,14 @@ project with the labelling interface that is printed. The first class, soil, is 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import json
+import os
+import tempfile
 import zipfile
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import IO, Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from PIL import Image as Picture
@@ -63,13 +66,26 @@ class Predictions:
             yield Prediction(name, picture, classes)
 
 
+@contextlib.contextmanager
+def _replaced(path: Path) -> Iterator[IO[bytes]]:
+    """Open a temporary file that becomes `path` if nothing fails, and is removed otherwise."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".furrow-", delete=False) as file:
+        try:
+            yield file
+        except BaseException:
+            os.unlink(file.name)
+            raise
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)
+
+
 def cvat(predictions: Predictions, path: Path) -> None:
     """Write an archive that CVAT imports as "Segmentation mask 1.1": one coloured mask for each image."""
     colors = np.array([(0, 0, 0), *predictions.colors[1:]], np.uint8)
     names = ["background", *predictions.classes[1:]]
     lines = ["# label:color_rgb:parts:actions", *(f"{name}:{r},{g},{b}::" for name, (r, g, b) in zip(names, colors))]
     stems = []
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with _replaced(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for found in predictions:
             stem = Path(found.picture).stem
             stems.append(stem)
@@ -101,7 +117,8 @@ def label_studio(predictions: Predictions, path: Path, prefix: str = "") -> None
         ]
         image = {"image": prefix + Path(found.picture).name}
         tasks.append({"data": image, "predictions": [{"model_version": predictions.version, "result": results}]})
-    path.write_text(json.dumps(tasks), encoding="utf-8")
+    with _replaced(path) as unfinished:
+        unfinished.write(json.dumps(tasks).encode())
 
 
 def interface(predictions: Predictions) -> str:
@@ -152,6 +169,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         if chosen.label_studio:
             label_studio(predictions, chosen.label_studio, chosen.prefix)
             print(interface(predictions))
+    except OSError as error:
+        parser.exit(1, f"error: {error}\n")
     except FurrowError as error:
         parser.exit(2, f"error: {error}\n" + (f" help: {error.help}\n" if error.help else ""))
 

@@ -93,7 +93,7 @@ impl Format for Writer {
     }
 
     fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec!["kitti: P2 is a pinhole; lens distortion, if the scene has any, is not in it".to_owned()]
+        vec!["P2 is a pinhole; lens distortion, if the scene has any, is not in it".to_owned()]
     }
 }
 
