@@ -84,11 +84,15 @@ impl Repair {
         if matches!(&self.change, Change::Removed(Some(key)) if quoted(key)) {
             return true;
         }
-        let Some(at) = range_of(text, next) else { return false };
+        let Some(at) = range_of(text, next) else {
+            // Without a position, it is about the whole file: what was removed may be missing.
+            let whole = next.place().is_none_or(|place| place.span.is_none());
+            return whole && matches!(self.change, Change::Removed(_));
+        };
         let path: Vec<String> = around(&text.page.text, at.start).into_iter().map(|member| member.name).collect();
         let around = self.path.starts_with(&path);
         match (&self.change, missing(next)) {
-            (Change::Renamed(start), _) => at.start == *start,
+            (Change::Renamed(start), _) => at.start == *start || next.message().contains("given twice"),
             (Change::Number, missing) => around && missing.is_none(),
             (Change::Removed(key), Some(names)) => {
                 around && key.as_ref().is_some_and(|key| nearest(&names, key).is_some())
