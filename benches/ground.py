@@ -5,7 +5,7 @@
     python benches/ground.py --images photos/peanut/images --labels photos/peanut/labels --soil 0
 
 A set is a folder with the subfolders `images` and `labels` (PNG of class indices with the stems of the images), or the
-folder of one or more renders of `trace` (`rgb.png` next to `semantics.png`). Pixels whose label is `--soil` (0) and
+folder of a dataset or of renders of `trace` (`rgb.png` next to `semantics.png`). Pixels whose label is `--soil` (0) and
 which are at least `--apart` pixels from any other label count.
 
 Chroma: sRGB is averaged over blocks of 4 × 4 pixels and converted to CIE Lab (D65). `a` and `b` are the standard
@@ -109,10 +109,10 @@ def measure(image, label, soil, apart):
 
 def pairs(folder):
     """Returns images and their label masks in a set, by name."""
-    images = folder / "images"
-    if images.is_dir():
+    images = sorted(p for p in folder.glob("images/*") if p.is_file())
+    if images:
         labels = {p.stem: p for p in (folder / "labels").glob("*.png")}
-        return [(p, labels.get(p.stem)) for p in sorted(images.iterdir())]
+        return [(p, labels.get(p.stem)) for p in images]
     return [(p, p.parent / "semantics.png") for p in sorted(folder.rglob("rgb.png"))]
 
 

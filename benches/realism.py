@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how well rendered patches are told from photographs: the AUC of a classifier, 0.5 where they are alike.
+"""Measures how well a classifier distinguishes rendered patches from photographs: its AUC, 0.5 where it cannot.
 
     target/venv-torch/bin/python benches/realism.py --real photos/peanut photos/wheat … --rendered renders/fields …
 
@@ -30,23 +30,12 @@ import numpy as np
 import torch
 from efficientnet_lite_pytorch import EfficientNet
 from PIL import Image
+from ground import pairs
 from safetensors.torch import load_file
 
 WEIGHTS = Path(__file__).resolve().parent.parent / ".libtorch/efficientnet-lite0.safetensors"
 PURE, PLANTED = 0.95, 0.30
 PENALTY = 1e-2
-
-
-def pairs(folder):
-    """Returns images and label masks in a set: (image, mask)."""
-    if (folder / "images").is_dir():
-        images = sorted(p for p in (folder / "images").iterdir() if p.suffix.lower() in (".png", ".jpg", ".jpeg"))
-        for place in (folder / "labels", folder / "semantics"):
-            found = [(p, place / f"{p.stem}.png") for p in images]
-            if any(mask.is_file() for _, mask in found):
-                return [(image, mask) for image, mask in found if mask.is_file()]
-    found = [(p, p.parent / "semantics.png") for p in sorted(folder.rglob("rgb.png"))]
-    return [(image, mask) for image, mask in found if mask.is_file()]
 
 
 def squares(image, mask, options, order):
@@ -81,7 +70,7 @@ def features(network, patches):
 
 
 def fitted(positive, negative, weights):
-    """Returns the scores' function of a logistic regression: photographs are positive."""
+    """Trains a logistic regression, photographs positive. Returns the function from features to scores."""
     x, y = torch.cat([positive, negative]), torch.cat([torch.ones(len(positive)), torch.zeros(len(negative))])
     mean, spread = x.mean(0), x.std(0) + 1e-6
     x = (x - mean) / spread
@@ -113,17 +102,17 @@ def main():
     parser.add_argument("--side", type=int, default=128, help="side of a square, pixels")
     parser.add_argument("--patches", type=int, default=8, help="most squares of an image")
     parser.add_argument("--soil", type=int, default=0, help="class index of soil")
-    parser.add_argument("--sheet", type=Path, help="also write a picture of the rendered squares told most easily, and of those told least")
+    parser.add_argument("--sheet", type=Path, help="also write a picture of the rendered squares that look least like photographs, and of those that look most like them")
     options = parser.parse_args()
     if len(options.real) < 2:
-        parser.error("--real needs two sets or more: one is tested on, the others are learnt from")
+        parser.error("--real needs two sets or more: one is for testing, the others for training")
     network = EfficientNet.from_name("efficientnet-lite0")
     network.load_state_dict(load_file(WEIGHTS))
     network.eval()
     order = random.Random(1)
 
     def load(folder):
-        images = [taken for taken in (squares(image, mask, options, order) for image, mask in pairs(folder)) if taken]
+        images = [taken for taken in (squares(image, mask, options, order) for image, mask in pairs(folder) if mask) if taken]
         if len(images) < 2:
             raise SystemExit(f"{folder}: {len(images)} images with squares of {options.of}; at least two are needed")
         return [features(network, taken) for taken in images], [patch for taken in images for patch in taken]
@@ -147,7 +136,7 @@ def main():
         weights = [torch.full((len(x),), 1 / (len(sets) * len(x))) for x in sets] + [torch.full((len(even),), 1 / len(even))]
         return fitted(torch.cat(sets), even, torch.cat(weights))
 
-    print(f"{options.of}, squares of {options.side} pixels: {len(even)} rendered learnt from, {len(odd)} tested on")
+    print(f"{options.of}, squares of {options.side} pixels: {len(even)} rendered for training, {len(odd)} for testing")
     print(f"  {'set':24} {'squares':>7} {'AUC unseen':>11} {'seen':>6}")
     pooled = trained(list(first.values()))
     found = []

@@ -80,13 +80,14 @@ fn expected(set: &Set, samples: &[Sample], category: impl Fn(&str) -> Option<u64
 #[cfg(feature = "train")]
 fn learnt_alike(set: &Set, samples: &[Sample]) {
     use furrow_train::data::bands::Band;
-    use furrow_train::data::example::Example;
+    use furrow_train::data::{Example, Wanted};
     let map = furrow_dataset::model::classes::Classes::parse(CLASSES).unwrap().of(&set.recipe.species, &[]).unwrap();
     for sample in samples {
         let (split, name) = (sample.record.split.name(), &sample.record.name);
         let written =
             furrow_output::read_gray(&set.folder.join(format!("imagefolder/{split}/masks/{name}.png"))).unwrap().2;
-        let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &[Band::Red], false).unwrap();
+        let (_, learnt) =
+            Example::read_whole(set, sample.record.index, &map, 0.0, &[Band::Red], &Wanted::default()).unwrap();
         assert_eq!(learnt.labels, written, "{name}");
     }
 }

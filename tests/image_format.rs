@@ -170,13 +170,14 @@ assert sample['image'].max() > 0 and sample['nir'].max() > 0
 #[cfg(feature = "train")]
 fn learnt_alike(set: &Set, sample: &Sample) {
     use furrow_dataset::model::classes::Classes;
-    use furrow_train::data::{Band, Example};
+    use furrow_train::data::{Band, Example, Wanted};
     let map = Classes::default().of(&set.recipe.species, &[]).unwrap();
     let bands = [Band::Blue, Band::Gray("nir".into())];
-    let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &bands, false).unwrap();
+    let (_, learnt) = Example::read_whole(set, sample.record.index, &map, 0.0, &bands, &Wanted::default()).unwrap();
     let blue: Vec<u8> = sample.rgb.iter().map(|pixel| pixel[2]).collect();
     assert_eq!(learnt.planes, [blue, sample.nir.clone()]);
-    let error = Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("red-edge".into())], false).unwrap_err();
+    let error =
+        Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("red-edge".into())], &Wanted::default()).unwrap_err();
     assert!(error.to_string().contains("no band `red-edge`"), "{error}");
 }
 

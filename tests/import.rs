@@ -18,7 +18,7 @@ use furrow_dataset::read::native;
 use furrow_dataset::{Sample, Set};
 use furrow_output::{ImageData, encode_jpeg, write_png};
 use furrow_render::scene::tag::Class;
-use furrow_train::data::{Band, Example};
+use furrow_train::data::{Band, Example, Wanted};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -268,7 +268,7 @@ assert ['nir' in furrow.Dataset(folder)[0] for folder in sys.argv[1:]] == [False
     assert!(pairs(&full).iter().all(|pair| pair.nir.is_some()) && pairs(&out).iter().all(|pair| pair.nir.is_none()));
     let learnt = |set: &Set| {
         let map = Classes::default().of(&set.recipe.species, &[]).unwrap();
-        Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("nir".into())], false)
+        Example::read_whole(set, 0, &map, 0.0, &[Band::Gray("nir".into())], &Wanted::default())
     };
     assert!(learnt(&with).is_ok());
     let error = learnt(&set).unwrap_err();

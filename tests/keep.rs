@@ -15,7 +15,7 @@ use furrow_dataset::read::checksum::Checksum;
 use furrow_dataset::read::checksum_record::ChecksumRecord;
 use furrow_dataset::read::native;
 use furrow_output::{ImageData, write_png};
-use furrow_train::data::{Band, Example, Shape};
+use furrow_train::data::{Band, Example, Shape, Wanted};
 use furrow_train::deploy::input_images;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -265,7 +265,7 @@ assert sorted(sample) == ['image', 'leaves', 'plants', 'record', 'semantics'], s
 fn seen(set: &Set, band: &str) -> furrow_base::Result<Vec<Vec<u8>>> {
     let map = Classes::default().of(&set.recipe.species, &[])?;
     let bands = [Band::Gray(band.into())];
-    Example::read_whole(set, 0, &map, 0.0, &bands, false).map(|(_, example)| example.planes)
+    Example::read_whole(set, 0, &map, 0.0, &bands, &Wanted::default()).map(|(_, example)| example.planes)
 }
 
 /// Checks that neither training nor prediction reads a band that the set leaves out.
@@ -314,7 +314,8 @@ fn damage_is_damage_whoever_meets_it() {
 /// Checks that training reports a damaged file of the first image.
 fn cannot_be_learnt(set: &Set, file: &str) {
     let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
-    let error = Example::read_whole(set, 0, &map, 0.0, &Band::RGB, true).expect_err("damage");
+    let error = Example::read_whole(set, 0, &map, 0.0, &Band::RGB, &Wanted { plants: true, ..Wanted::default() })
+        .expect_err("damage");
     assert_eq!(error.exit_code(), 1, "{error}");
     assert!(error.to_string().contains(file), "{error}");
 }

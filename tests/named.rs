@@ -118,6 +118,8 @@ fn the_named_crop_decides_and_every_command_takes_it() {
     for words in ["does not know maize", "it knows fat hen, sugar beet", "train make --crop maize --out DIR"] {
         assert!(other.contains(words), "{words}: {other}");
     }
+    let mixed = fail(train(&["eval", path(&net), "--set", &set, "--crop", "auto", "--crop", "sugar beet"]), 2);
+    assert!(mixed.contains("give --crop auto alone"), "{mixed}");
     let unknown = fail(train(&["eval", path(&net), "--set", &set, "--crop", "maise"]), 2);
     assert!(unknown.contains("did you mean `maize` (ZEAMX)") && unknown.contains("species file"), "{unknown}");
     let plain = fail(train(&["export", path(&init), "--crop", "maize", "--out", path(&at("no"))]), 2);

@@ -16,7 +16,7 @@ use furrow_dataset::Set;
 use furrow_dataset::model::classes::Classes;
 use furrow_dataset::read::native;
 use furrow_output::{ImageData, write_png};
-use furrow_train::data::{Band, Example, Shape};
+use furrow_train::data::{Band, Example, Shape, Wanted};
 use furrow_train::deploy::input_images;
 use std::collections::BTreeMap;
 use std::fs;
@@ -175,7 +175,15 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     let set = Set::open(&data).expect("a dataset");
     assert!(set.sample(0).expect("an image") == before);
     let map = Classes::default().of(&set.recipe.species, &[]).expect("classes");
-    let (_, learnt) = Example::read_whole(&set, 0, &map, 0.0, &[Band::Gray("thermal".into())], true).expect("a band");
+    let (_, learnt) = Example::read_whole(
+        &set,
+        0,
+        &map,
+        0.0,
+        &[Band::Gray("thermal".into())],
+        &Wanted { plants: true, ..Wanted::default() },
+    )
+    .expect("a band");
     assert_eq!(learnt.planes, [thermal]);
     let shape = Shape { bands: Band::RGB.to_vec(), width, height };
     let found = || input_images::find(std::slice::from_ref(&data), &shape, &[]);

@@ -6,7 +6,7 @@ use crate::ensemble::Ensemble;
 use crate::run::{ModelCard, TrainedModel};
 use furrow_base::{Error, Result};
 
-/// Name that stands for crops of any kind.
+/// Name of crops of any kind.
 const AUTO: &str = "auto";
 
 /// Returns the network with the crops that a user names, and warnings. Without names, or with `auto`, it has crops of any kind.
@@ -14,6 +14,7 @@ const AUTO: &str = "auto";
 /// # Errors
 /// If the network was trained for other crops, or if a name is unknown.
 pub fn with_crops(trained: Ensemble, names: &[String]) -> Result<(Ensemble, Vec<String>)> {
+    check_auto(names)?;
     if trained.card.species.is_empty() {
         let names = names.iter().filter(|name| *name != AUTO);
         let warnings = names.filter_map(|name| check_crop(&trained.card, name).transpose()).collect::<Result<_>>()?;
@@ -30,6 +31,7 @@ pub fn with_crops(trained: Ensemble, names: &[String]) -> Result<(Ensemble, Vec<
 /// # Errors
 /// Like [`with_crops`], and if the network does not take the crop as an input.
 pub fn exported(trained: TrainedModel, names: &[String]) -> Result<TrainedModel> {
+    check_auto(names)?;
     if trained.card.species.is_empty() {
         for name in names.iter().filter(|name| *name != AUTO) {
             if check_crop(&trained.card, name)?.is_some() {
@@ -43,6 +45,15 @@ pub fn exported(trained: TrainedModel, names: &[String]) -> Result<TrainedModel>
         [] => Ok(trained),
         crops => trained.of_crops(crops),
     }
+}
+
+/// Returns an error if `auto` is given beside other names, which it contradicts.
+fn check_auto(names: &[String]) -> Result<()> {
+    if names.iter().any(|name| name == AUTO) && names.iter().any(|name| name != AUTO) {
+        return Err(Error::misuse("--crop auto stands for crops of any kind and takes no others beside it")
+            .help("name the crops, or give --crop auto alone"));
+    }
+    Ok(())
 }
 
 /// Returns the places of the named species in the list of a network that takes the crop as an input, without `auto`.

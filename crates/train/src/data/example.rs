@@ -58,24 +58,12 @@ pub struct Wanted {
 impl Example {
     /// Reads an image of a dataset at a network's size. Its label masks are dilated by `margin` pixels of the image, see [`margin`].
     pub fn read(set: &Set, number: u64, map: &Map, margin: f32, shape: &Shape, wanted: &Wanted) -> Result<Self> {
-        let (size, whole) = Self::read_wanted(set, number, map, margin, &shape.bands, wanted)?;
+        let (size, whole) = Self::read_whole(set, number, map, margin, &shape.bands, wanted)?;
         Ok(whole.resized(size, (shape.width, shape.height)))
     }
 
     /// Reads an image at its own size, and returns it with its width and height, pixels.
     pub fn read_whole(
-        set: &Set,
-        number: u64,
-        map: &Map,
-        margin: f32,
-        of: &[Band],
-        with_plants: bool,
-    ) -> Result<((u32, u32), Self)> {
-        Self::read_wanted(set, number, map, margin, of, &Wanted { plants: with_plants, species: Vec::new() })
-    }
-
-    /// Like [`Self::read_whole`], with the label maps that are wanted.
-    pub(super) fn read_wanted(
         set: &Set,
         number: u64,
         map: &Map,

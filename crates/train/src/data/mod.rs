@@ -41,7 +41,7 @@ pub mod store;
 pub use augment::Augment;
 pub use bands::Band;
 pub use crop::Crop;
-pub use example::{Example, Shape};
+pub use example::{Example, Shape, Wanted};
 pub use ground::{AugmentScale, Ground, PixelSizes};
 pub use loader::{Batch, Loader};
 pub use naming::Naming;

@@ -110,7 +110,7 @@ impl Store {
     pub fn whole(&self, place: usize) -> Result<((u32, u32), Example)> {
         let (of, number) = self.images[place];
         let (set, map, margin) = &self.sets[of];
-        Example::read_wanted(set, number, map, *margin, &self.shape.bands, &self.wanted[of])
+        Example::read_whole(set, number, map, *margin, &self.shape.bands, &self.wanted[of])
     }
 
     /// Returns the pixel size on the ground at the network's size, millimetres: the median over a sample of the images whose records
