@@ -3,15 +3,15 @@
 # tests compare with (tests/peers.sh). Runs in a fresh clone, as root or as a user who may sudo, and asks nothing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-bash tests/peers.sh packages
+bash tests/peers.sh build
 # Downloads while the processor compiles.
 bash tests/peers.sh libtorch & libtorch=$!
-bash tests/peers.sh python & python=$!
-trap 'kill $libtorch $python 2>/dev/null || true' EXIT
+bash tests/peers.sh packages python & peers=$!
+trap 'kill $libtorch $peers 2>/dev/null || true' EXIT
 cargo fmt --check
 cargo clippy --workspace --all-targets --no-default-features -- -D warnings
 wait $libtorch
 cargo clippy --workspace --all-targets --features system-tests,train,raster -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features train,raster
-wait $python
+wait $peers
 FURROW_REQUIRE_PEERS=1 cargo test --workspace --features system-tests,train,raster

@@ -1,22 +1,32 @@
 #!/usr/bin/env bash
 # Installs the dependencies of the build and the tests on Debian 12, as root or as a user with sudo, without prompts:
-# bash tests/peers.sh [packages|libtorch|python], all three by default. Installed packages are left alone.
-#   packages  Embree and a C compiler; Mesa's Vulkan driver for the raster engine; the programs used as independent references by the
-#             tests: a browser, a batch system, Debian's PyTorch for the CPU
+# bash tests/peers.sh [build|packages|libtorch|python], all four by default. Installed packages are left alone.
+#   build     Embree, a C compiler, and a Python that fetches libtorch
+#   packages  Mesa's Vulkan driver for the raster engine; the programs used as independent references by the tests: a browser, a batch
+#             system, Debian's PyTorch for the CPU
 #   libtorch  for the feature `train`, and weights that start a training
 #   python    clients that the tests compare with, in target/venv and target/venv-torch; needs `packages`; 210 MB to download
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-packages() {
-  local packages="libembree-dev build-essential mesa-vulkan-drivers libvulkan1 python3-venv libllvm19 chromium slurm-wlm munge iproute2 procps parallel python3-torch python3-torchvision python3-pil"
-  # shellcheck disable=SC2086 # a list of packages
-  if ! dpkg -s $packages >/dev/null 2>&1; then
+# Installs Debian packages unless all of them are there.
+debian() {
+  if ! dpkg -s "$@" >/dev/null 2>&1; then
     local sudo
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
-    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $packages
+    # shellcheck disable=SC2086 # `sudo` or nothing
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"
   fi
+}
+
+build() {
+  debian libembree-dev build-essential python3-venv
+}
+
+packages() {
+  debian mesa-vulkan-drivers libvulkan1 libllvm19 chromium slurm-wlm munge iproute2 procps parallel \
+    python3-torch python3-torchvision python3-pil
 }
 
 libtorch() {
@@ -41,10 +51,10 @@ python() {
   fi
 }
 
-[ $# -gt 0 ] || set -- packages libtorch python
+[ $# -gt 0 ] || set -- build packages libtorch python
 for part; do
   case $part in
-    packages | libtorch | python) $part ;;
-    *) echo "no part: $part; bash tests/peers.sh [packages|libtorch|python]" >&2; exit 2 ;;
+    build | packages | libtorch | python) $part ;;
+    *) echo "no part: $part; bash tests/peers.sh [build|packages|libtorch|python]" >&2; exit 2 ;;
   esac
 done
