@@ -4,11 +4,10 @@ Each folder holds an exported scene and `ours.bin`: for each pixel R, G, B, NIR,
 and leaf, float32.
 The estimated quantity is the ratio of two means over a region: each class, and each plant and leaf of at least 40 pixels. Leaves
 are tested because errors of a large leaf and a small one may cancel over their plant.
-Mitsuba renders BLOCKS images with independent seeds. Plants cover little of an image, so the window around them is rendered a
-second time with more samples, which are used for plants and leaves. Its pixels use independent random numbers, so the variance of
-a region's mean is the sum of its pixels' variances. Our image uses Sobol points; its reported variance, that of independent
-samples, is not below the true one: over 16 seeds the true standard error was half the reported one for a beet under lamps, and 0.5
-to 1.0 of it for its leaves.
+Mitsuba renders BLOCKS independent images at once: loading a field and translating its BSDFs takes longer than many samples. Its
+pixels use independent random numbers, so the variance of a region's mean is the sum of its pixels' variances. Our image uses Sobol
+points; its reported variance, that of independent samples, is not below the true one: over 16 seeds the true standard error was
+half the reported one for a beet under lamps, and 0.5 to 1.0 of it for its leaves.
 - Labels: the surface at each pixel's centre has the same class and plant, except in one pixel in a thousand.
 - Regions: the difference is below TOLERANCE of the mean (0 where the scene is exact) plus a limit in standard errors, which a
   correct scene exceeds with probability FALSE_ALARM: Student's t, divided among all regions and bands of the scene (Bonferroni),
@@ -24,13 +23,12 @@ import glob
 import os
 import re
 import sys
-import tempfile
 import time
 
 sys.dont_write_bytecode = True
 BLOCKS = 8
-# Samples per pixel and block: for the whole image, and for the window of the plants.
-SPP, SPP_PLANTS = 16, 64
+# Samples per pixel and block.
+SPP = 24
 # Samples per pixel of our image, as rendered by the test.
 SPP_OURS = 128
 # Probability that the regions of a correct scene fail.
@@ -89,23 +87,19 @@ def labels(scene, width, height):
     return keys.reshape(height, width, 2)
 
 
-def cropped(path, window):
-    """Loads the scene with its film cropped to `window` (x, y, width, height)."""
-    names = ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height")
-    crop = "".join(f'<integer name="{name}" value="{value}"/>' for name, value in zip(names, window))
-    with open(path, encoding="utf-8") as file:
-        text = re.sub("<film [^>]*>", lambda film: film[0] + crop, file.read(), count=1)
-    # Written beside the scene, because it names its files relative to itself.
-    with tempfile.NamedTemporaryFile("w", suffix=".xml", dir=os.path.dirname(path), encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        return mi.load_file(file.name)
-
-
-def render(scene, spp, bands, first):
-    """Renders BLOCKS independent images of a scene; axes: block, row, column, band."""
-    images = [np.array(mi.render(scene, spp=spp, seed=first + k)).astype(float) for k in range(BLOCKS)]
-    return np.stack([image.reshape(*image.shape[:2], -1)[..., :bands] for image in images])
+def render(scene, bands):
+    """Renders BLOCKS independent images of a scene; axes: row, column, block, band."""
+    sensor = scene.sensors()[0]
+    width, height = (int(side) for side in sensor.film().size())
+    samples = width * height * BLOCKS * SPP
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, samples)
+    pixel = dr.arange(mi.UInt32, samples) // (BLOCKS * SPP)
+    at = (mi.Point2f(pixel % width, pixel // width) + sampler.next_2d()) / mi.Point2f(width, height)
+    ray, weight = sensor.sample_ray_differential(0.0, sampler.next_1d(), at, sampler.next_2d())
+    radiance = weight * scene.integrator().sample(scene, sampler, ray)[0]
+    of_blocks = [dr.block_reduce(dr.ReduceOp.Add, radiance[band], SPP) / SPP for band in range(bands)]
+    return np.stack(of_blocks, -1).astype(float).reshape(height, width, BLOCKS, bands)
 
 
 def compare(path, tolerance, out):
@@ -119,13 +113,8 @@ def compare(path, tolerance, out):
     bands = [3] if "nir" in os.path.basename(path) else [0, 1, 2]
     mean, variance = ours[..., bands].astype(float), ours[..., [4 + b for b in bands]].astype(float)
     keys, leaves = ours[..., 8:10].astype(np.int32), ours[..., 10].astype(np.int32)
-    blocks = render(scene, SPP, len(bands), 0)
-    theirs, error = blocks.mean(0), blocks.var(0, ddof=1) / BLOCKS
-    rows, columns = np.nonzero(keys[..., 1] > 0)
-    (top, bottom), (left, right) = ((int(i.min()), int(i.max()) + 1) for i in (rows, columns))
-    window = cropped(path, (left, top, right - left, bottom - top))
-    closer = np.zeros_like(blocks)
-    closer[:, top:bottom, left:right] = render(window, SPP_PLANTS, len(bands), BLOCKS)
+    blocks = render(scene, len(bands))
+    theirs, error = blocks.mean(2), blocks.var(2, ddof=1) / BLOCKS
 
     faults = []
     differ = np.any(labels(scene, width, height) != keys, axis=-1)
@@ -138,17 +127,17 @@ def compare(path, tolerance, out):
     print(f"    pixels: z of mean {z.mean():+.3f}, spread {z.std():.2f}, {100 * far:.2f} % beyond {limit:.1f}")
     if far > (0.03 if tolerance > 0 else 0.005):
         faults.append("pixels differ")
-    regions = [(name, keys[..., 0] == c, closer if c else blocks) for c, name in enumerate(("soil", "crop", "weed"))]
+    regions = [(name, keys[..., 0] == c) for c, name in enumerate(("soil", "crop", "weed"))]
     for plant in np.unique(keys[..., 1][keys[..., 1] > 0]):
         of = keys[..., 1] == plant
-        regions.append((f"plant {plant}", of, closer))
-        regions += [(f"leaf {plant}.{leaf}", of & (leaves == leaf), closer) for leaf in np.unique(leaves[of])]
+        regions.append((f"plant {plant}", of))
+        regions += [(f"leaf {plant}.{leaf}", of & (leaves == leaf)) for leaf in np.unique(leaves[of])]
     regions = [region for region in regions if region[1].sum() >= 40]
     chance = FALSE_ALARM / (len(regions) * len(bands))
-    for name, where, images in regions:
-        a, b = mean[where].mean(0), images[:, where].mean((0, 1))
+    for name, where in regions:
+        a, b = mean[where].mean(0), theirs[where].mean(0)
         # One row per pixel: its variance, ours and theirs, and the degrees of freedom of each.
-        variances = np.concatenate([variance[where], images[:, where].var(0, ddof=1) / BLOCKS])
+        variances = np.concatenate([variance[where], error[where]])
         freedom = np.repeat([[SPP_OURS - 1], [BLOCKS - 1]], where.sum(), axis=0)
         sigma = np.sqrt(variances.sum(0)) / where.sum()
         freedom = variances.sum(0) ** 2 / np.maximum((variances**2 / freedom).sum(0), 1e-300)
