@@ -11,7 +11,7 @@
 use crate::common::dataset::{fail, path, succeed};
 use crate::common::program::{SMALL, names, trace};
 use crate::common::python::{ask, python, torch};
-use crate::common::training::{self, learn, normalised, pictures, stirred};
+use crate::common::training::{self, SET, learn, learnt, normalised, pictures, stirred};
 use furrow_output::ImageData;
 use furrow_train::deploy::input_images::Prediction;
 use furrow_train::deploy::{onnx, torchscript};
@@ -26,8 +26,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
-
-static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("deploy-set"));
 
 /// Trains Basic SegNet on these bands; the run is kept until the next test run.
 fn trained(name: &str, bands: &str) -> PathBuf {
@@ -104,7 +102,7 @@ fn exported_networks_compute_what_ours_do() {
     let mut exported = Vec::new();
     for (kind, (network, bands, exposure)) in KINDS.into_iter().enumerate() {
         let folder = folder.path().join(kind.to_string());
-        let taught = learn(network, bands, exposure, &SET, &folder.join("run"));
+        let taught = learnt(network, bands, exposure);
         // With random weights, this network's fifty ReLU6 layers amplify rounding differences, because runtimes fold
         // batch norms into convolutions.
         let learnt = if network == Network::LiteUnet { taught } else { stirred(&taught, 13) };

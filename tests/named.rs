@@ -6,17 +6,14 @@
 //! and says what to do. Source: the output of `train predict --help`, `train fit --help`.
 
 use crate::common::dataset::{fail, path, succeed};
-use crate::common::training::{self, pictures};
+use crate::common::training::{SET, pictures};
 use furrow_output::{ImageData, write_png};
 use furrow_train::deploy::input_images::Prediction;
 use furrow_train::net::film;
 use furrow_train::run::{self, TrainedModel};
 use furrow_train::weights;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use std::sync::LazyLock;
-
-static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("named-set"));
 
 /// Returns the command `train` with these arguments, on one thread.
 fn train(arguments: &[&str]) -> Command {

@@ -7,7 +7,7 @@
 //! PyTorch.
 
 use crate::common::python::{ask, python, torch};
-use crate::common::training::{self, learn, normalised, pictures, stirred};
+use crate::common::training::{self, SET, learnt, normalised, pictures, stirred};
 use furrow_train::data::Band;
 use furrow_train::fit::hyper::NormalizationMode;
 use furrow_train::fit::{Hyperparameters, Plan};
@@ -16,10 +16,7 @@ use furrow_train::run::TrainedModel;
 use furrow_train::torch::tch::{self, Device, Tensor};
 use furrow_train::torch::{Model, Pass, Placement, Precision, device};
 use furrow_train::weights::{self, Array};
-use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-
-static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("networks-set"));
+use std::path::Path;
 
 const SINGLE: Placement = Placement { device: Device::Cpu, precision: Precision::Single };
 
@@ -61,7 +58,7 @@ fn networks_compute_what_an_independent_program_does() {
     for network in Network::ALL {
         for bands in ["rgb", "rgbn"] {
             let kind = folder.path().join(format!("{}-{bands}", network.name()));
-            let trained = learn(*network, bands, NormalizationMode::Image, &SET, &kind.join("trained"));
+            let trained = learnt(*network, bands, NormalizationMode::Image);
             // The trained weights are tested for one set of bands only: other bands change only the first layer.
             let learnt = [("stirred", &stirred(&trained, 3)), ("trained", &trained)];
             for (name, learnt) in learnt.into_iter().take(if bands == "rgb" { 2 } else { 1 }) {
@@ -150,8 +147,7 @@ fn apart(a: &[f32], b: &[f32]) -> (f64, f64) {
 /// All networks with random weights, each with four images at the training size.
 fn examples() -> Vec<(Network, TrainedModel, Vec<f32>)> {
     let example = |network: &Network| {
-        let folder = tempfile::tempdir().unwrap();
-        let learnt = stirred(&learn(*network, "rgb", NormalizationMode::Image, &SET, folder.path()), 7);
+        let learnt = stirred(&learnt(*network, "rgb", NormalizationMode::Image), 7);
         let pixels = normalised(&learnt, &pictures(4, training::SIZE, 3, 11), training::SIZE);
         (*network, learnt, pixels)
     };

@@ -11,7 +11,7 @@
 
 use crate::common::dataset::{fail, path, succeed};
 use crate::common::program::{names, small_text, trace};
-use crate::common::training::{self, SIZE, learn, pictures, stirred};
+use crate::common::training::{SET, SIZE, learnt, pictures, stirred};
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
@@ -28,9 +28,7 @@ use furrow_train::run::{self, TrainedModel};
 use furrow_train::table::Experiment;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Arc, LazyLock};
-
-static SET: LazyLock<PathBuf> = LazyLock::new(|| training::set("pixel-size-set"));
+use std::sync::Arc;
 
 fn train(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_train"));
@@ -40,8 +38,7 @@ fn train(arguments: &[&str]) -> Command {
 
 /// Writes a network whose predictions contain all classes into a folder.
 fn network(folder: &Path) -> TrainedModel {
-    let learnt = learn(Network::BasicSegnet, "rgb", NormalizationMode::Image, &SET, &folder.join("learnt"));
-    let network = stirred(&learnt, 5);
+    let network = stirred(&learnt(Network::BasicSegnet, "rgb", NormalizationMode::Image), 5);
     network.write(&folder.join("run")).unwrap();
     network
 }

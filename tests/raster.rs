@@ -75,7 +75,7 @@ fn labels_are_those_of_the_rays_on_every_scene() {
     assert!(pages.len() >= 12, "{pages:?}");
     let (all, mut drawn) = (pages.len(), 0);
     for page in pages {
-        let options = Options { width: Some(320), ..Options::default() };
+        let options = Options { width: Some(160), ..Options::default() };
         let field = assemble::field(&page, &options).expect("a field");
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), 2).expect("an accelerator");
         // These effects change no label: `each_effect_changes_the_picture_and_no_label`.

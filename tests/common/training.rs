@@ -11,8 +11,10 @@ use furrow_train::net::{Network, Role, parameters};
 use furrow_train::run::TrainedModel;
 use furrow_train::session::{self, Machine};
 use furrow_train::weights;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
 /// Input size, in pixels, at which small networks are trained.
 pub const SIZE: (u32, u32) = (64, 48);
@@ -21,6 +23,9 @@ pub const SIZE: (u32, u32) = (64, 48);
 pub fn machine() -> Machine {
     Machine { device: "cpu".into(), loaders: 1, memory: 1 << 28 }
 }
+
+/// Eight images of the small scene, shared by all tests that only read them.
+pub static SET: LazyLock<PathBuf> = LazyLock::new(|| set("training-set"));
 
 /// Renders eight images of the small scene into a folder that is kept until the next run.
 pub fn set(name: &str) -> PathBuf {
@@ -40,6 +45,19 @@ pub fn learn(network: Network, bands: &str, normalization: NormalizationMode, se
     let shape = Shape { bands: Band::list(bands).expect("bands"), width: SIZE.0, height: SIZE.1 };
     let plan = Plan { network, shape, ..Plan::default() };
     learn_with(set, out, plan, Hyperparameters { normalization, ..Hyperparameters::default() })
+}
+
+/// A network trained on [`SET`] as by [`learn`], once for all tests that ask for the same one.
+pub fn learnt(network: Network, bands: &'static str, normalization: NormalizationMode) -> TrainedModel {
+    type Learnt = Arc<OnceLock<TrainedModel>>;
+    static ALL: LazyLock<Mutex<HashMap<String, Learnt>>> = LazyLock::new(Mutex::default);
+    let key = format!("{} {bands} {normalization:?}", network.name());
+    let one = ALL.lock().expect("no test panics here").entry(key).or_default().clone();
+    let train = || {
+        let folder = tempfile::tempdir().expect("a folder");
+        learn(network, bands, normalization, &SET, &folder.path().join("run"))
+    };
+    one.get_or_init(train).clone()
 }
 
 /// Trains a plan on a dataset for six steps with batches of two images.
