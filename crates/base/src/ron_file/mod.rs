@@ -41,7 +41,7 @@ pub use file::RonFile;
 pub use json::{from_json, to_json};
 pub use num::Num;
 pub use place::{Step, place};
-pub use quantities::{Quantity, Value, quantities};
+pub use quantities::{Limits, Quantity, Value, limits, quantities};
 pub use repair::{Repair, Spot};
 pub use schema::{DEFAULT, DRAWN, FIXED, KIND, PICKED, RANGE};
 pub use spliced::Spliced;
