@@ -5,7 +5,7 @@ use furrow_base::shell::quoted;
 use furrow_render::settings::Engine;
 use maud::{Markup, html};
 
-/// Index in place of which the page writes that of the image.
+/// Placeholder for the number of the image.
 const INDEX: &str = "INDEX";
 
 /// Returns the field for the number of an image, and the command that renders it with `trace`, in the dataset's folder.
