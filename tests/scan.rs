@@ -521,9 +521,10 @@ fn las_is_the_ply(file: &[u8], ply: &BTreeMap<String, Vec<f64>>) {
     for (k, number) in by_return.into_iter().enumerate() {
         assert_eq!(number as usize, ply["return_number"].iter().filter(|n| **n == (k + 1) as f64).count());
     }
+    let point = |name: &str, k: usize| ply[name][k];
     for k in 0..count {
         let at = begin + k * length;
-        let of = |name: &str| ply[name][k];
+        let of = |name: &str| point(name, k);
         assert_eq!(f64::from(file[at + 14] & 15), of("return_number"));
         assert_eq!(f64::from(file[at + 14] >> 4), of("number_of_returns"));
         assert_eq!(file[at + 16], [2, 64, 65][of("class") as usize]);

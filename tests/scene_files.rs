@@ -233,7 +233,7 @@ fn mistakes_of_a_long_page_are_found_soon() {
     let found = words.matches("unknown field `sprad`").count();
     assert!((6..40).contains(&found) && words.contains("there may be more"), "{words}");
     for k in 0..found {
-        assert!(words.contains(&format!("long.ron:{}:44: unknown field", k + 2)), "{words}");
+        assert!(words.contains(&format!("long.ron:{}:43: unknown field", k + 2)), "{words}");
     }
     // Half a second with an optimised program; the machine may be busy.
     assert!(begin.elapsed() < std::time::Duration::from_secs(30), "{:?}", begin.elapsed());
@@ -258,7 +258,7 @@ fn all_missing_files_of_a_layer_are_reported_at_once() {
     ] {
         assert!(words.contains(said), "{words}");
     }
-    assert!(words.contains("4:51: -1 is out of range") && words.contains("4 mistakes in "), "{words}");
+    assert!(words.contains("4:50: -1 is out of range") && words.contains("4 mistakes in "), "{words}");
 }
 
 /// Expected: a single mistake is printed as before, without a number; a file without mistakes gives exit code 0.
