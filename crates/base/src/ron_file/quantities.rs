@@ -3,7 +3,7 @@
 
 use super::num::{DISTRIBUTIONS, name_of};
 use super::place::{members, place};
-use super::schema;
+use super::schema::{self, Limits};
 use super::vary::Distribution;
 use schemars::JsonSchema;
 use std::ops::Range;
@@ -36,17 +36,6 @@ pub struct Quantity {
     pub value: Value,
     /// Names of the fields and variants that lead to it, as in the schema.
     names: Vec<String>,
-}
-
-/// Range of valid values of a number.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Smallest value.
-    pub min: f64,
-    /// Largest value.
-    pub max: f64,
-    /// `true` if the smallest value itself is not allowed.
-    pub above_min: bool,
 }
 
 /// Returns the limits of each number of `T`'s file, or of the values of each distribution; `None` for numbers without

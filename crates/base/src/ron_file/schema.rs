@@ -2,7 +2,6 @@
 
 use super::bound::Bound;
 use super::num::Num;
-use super::quantities::Limits;
 use super::vary::{Pick, Vary};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::Value;
@@ -60,6 +59,17 @@ pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
 /// Returns the schema of `T`'s file.
 pub(super) fn root<T: JsonSchema>() -> Value {
     SchemaGenerator::default().into_root_schema_for::<T>().to_value()
+}
+
+/// Range of valid values of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// `true` if the smallest value itself is not allowed.
+    pub above_min: bool,
 }
 
 /// Returns the limits of the number at the end of a path; `None` if there is none.
