@@ -61,7 +61,7 @@
 //! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model` |
 //! | 3 | `furrow-optics` | `optics` · `texture` · `bsdf`, `light`, `sensor` |
 //! | 2 | `furrow-report` | charts, tables, HTML pages |
-//! | 1 | `furrow-base` | `math`, `error`, `dispatch` · `supervise` · `sampling`, `geometry`, `input`, `atomic_file` · `ron_file` |
+//! | 1 | `furrow-base` | `math`, `error`, `dispatch` · `supervise`, `shell` · `sampling`, `geometry`, `input`, `atomic_file` · `ron_file` |
 //! | 1 | `furrow-embree` | bindings to Embree |
 
 #![warn(clippy::print_stderr)]

@@ -77,7 +77,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Layers (output), environment maps (input).
     ("exr", "output/exr/mod.rs texture/exr_size.rs texture/openexr.rs"),
     // Text on sheets of images.
-    ("font8x8", "bin/trace/letters.rs"),
+    ("font8x8", "output/letters.rs"),
     // `math` re-exports the vectors; two files sum in double precision.
     ("glam", "math/ film/ accel/brute.rs"),
     // Weights of the networks that ship with the project.

@@ -1,6 +1,6 @@
 //! Coarse ground, generated for the camera's pixel size, is as bright as ground in full detail.
 
-use crate::common::program::{field, shoot};
+use crate::common::program::{field, shoot, trace};
 use furrow_base::math::Spectrum;
 use furrow_field::assemble::Options;
 use furrow_optics::light::Light;
@@ -19,6 +19,32 @@ fn from_above(pixel_mm: f64) -> String {
     let (size, focal) = (80, 240.0);
     let lens = format!("intrinsics: Pixels(fx: {focal}, fy: {focal}, cx: 40, cy: 40)");
     format!("size: ({size}, {size}), {lens}, pose: Nadir(height_m: {})", focal * pixel_mm * 1e-3)
+}
+
+/// Rationale: a camera near the ground that sees the horizon shows little ground in each pixel, but every plant up to the
+/// reach is built. Expected: a warning of the time with a coarser level, if the level is left to the program and the plants
+/// take more than a minute; none for a level that the scene file states, and none with a lower reach.
+#[test]
+fn many_plants_to_the_horizon_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("low.ron");
+    for (more, warned) in [
+        ("reach_m: 30,", true),
+        ("reach_m: 30, detail: ByPixel,", false),
+        ("reach_m: 30, detail: Instanced,", false),
+        ("reach_m: 3,", false),
+    ] {
+        let text = format!(
+            "Field({more} lights: [Overcast()], soil: (clods: (over_5mm_per_m2: 0)), camera: Pinhole(size: (64, 48), \
+             intrinsics: FieldOfView(horizontal_deg: 60), pose: LookAt(position_m: (0, 0, 0.05), target_m: (0, 9, 0.05))), \
+             weeds: [(species: \"fat hen\", growth: AgeDays(20), spread: (per_m2: 120))])"
+        );
+        std::fs::write(&scene, text).unwrap();
+        let done = trace(&["check", "--memory", "60"]).arg(&scene).output().unwrap();
+        let words = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success(), "{more}: {words}");
+        assert_eq!(words.contains("core seconds to build; detail: Instanced"), warned, "{more}: {words}");
+    }
 }
 
 /// A camera three metres north of the origin that looks at it from `degrees` above the horizon; a pixel is 5 mm wide.

@@ -146,6 +146,29 @@ fn poses_place_boxes_on_the_points_of_their_plants() {
     ask("check_bop.py", "import numpy, plyfile, PIL");
 }
 
+/// Rationale: a format whose camera is a pinhole loses the distortion of a lens; a warning that every camera gets is not
+/// read. Expected: planning warns of a lens that distorts, and of no other.
+#[test]
+fn a_pinhole_format_warns_of_lenses_that_distort_and_of_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    for (lens, warned) in [("", false), (", distortion: (k1: -0.1)", true)] {
+        let text = format!(
+            "Field(camera: Pinhole(size: (48, 36), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.5){lens}), \
+             lights: [Overcast()], plants: [(species: \"sugar beet\", growth: AgeDays(6), position_m: (0, 0))])"
+        );
+        let scene = folder.path().join(format!("lens{warned}.ron"));
+        std::fs::write(&scene, text).unwrap();
+        let mut command = trace(&["dataset", "plan", "--count", "2", "--format", "bop,kitti,yolo"]);
+        let done =
+            command.arg("--scene").arg(&scene).arg("--out").arg(folder.path().join(format!("{warned}"))).output();
+        let done = done.unwrap();
+        let message = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success(), "{message}");
+        let words = "bop, kitti cannot represent the distortion of a lens: the camera is a pinhole";
+        assert_eq!(message.contains(words), warned, "{message}");
+    }
+}
+
 #[test]
 fn plyfile_reads_points_that_the_camera_sees_where_they_came_from() {
     ask("check_ply.py", "import numpy, plyfile");

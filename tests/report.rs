@@ -205,8 +205,19 @@ fn images_are_filtered_sorted_searched_and_enlarged() {
     };
     let covers: Vec<u64> = sorted.as_str().unwrap().split(',').map(cover).collect();
     assert!(covers.windows(2).all(|pair| pair[0] + 2 >= pair[1]), "{covers:?}");
+    assert_eq!(set(&mut page, "sort", "sun").as_str().unwrap().split(',').count() as u64, COUNT);
+    assert_eq!(names(&set(&mut page, "show", "light:daylight")).len() as u64, COUNT);
     page.ask("document.querySelector('a.enlarge').click()");
     page.wait("document.getElementById('large').open && document.querySelector('#large img').naturalWidth === 96");
+    // The command of another image, run in the dataset's folder, renders the pixels of the dataset.
+    set(&mut page, "again", "4");
+    let command = page.ask("document.getElementById('command').textContent");
+    let words: Vec<&str> = command.as_str().unwrap().split(' ').collect();
+    let mut again = std::process::Command::new(env!("CARGO_BIN_EXE_trace"));
+    let done = again.current_dir(&out).args(&words[1..]).args(["--quiet"]).output().unwrap();
+    assert!(done.status.success(), "{command}: {}", String::from_utf8_lossy(&done.stderr));
+    let pixels = |path: &str| furrow_output::read_photo(&out.join(path)).unwrap();
+    assert_eq!(pixels("out/4/rgb.png"), pixels("images/000004/rgb.png"), "{command}");
     assert!(page.complaints.is_empty(), "{:?}", page.complaints);
 }
 

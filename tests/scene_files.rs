@@ -215,6 +215,52 @@ fn all_mistakes_of_a_page_are_reported_at_once() {
     assert!(!out.exists());
 }
 
+/// Rationale: the search repairs and reads the file again for each mistake, which took minutes for a generated file of a
+/// megabyte. Expected: several mistakes of 20 000 weeds, each at its place, in seconds; the number of readings is limited by
+/// the length of the file, with a note that there may be more.
+#[test]
+fn mistakes_of_a_long_page_are_found_soon() {
+    let weed = "(species: \"fat-hen\", growth: AgeDays(12), sprad: (per_m2: 0.001))";
+    let weeds = vec![weed; 20_000].join(",\n");
+    let text = format!("Field(camera: JaiAd130(height_m: 1), lights: [Overcast()], weeds: [\n{weeds}\n])");
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("long.ron");
+    std::fs::write(&page, text).unwrap();
+    let begin = std::time::Instant::now();
+    let done = Command::new(env!("CARGO_BIN_EXE_trace")).arg("check").arg(&page).output().unwrap();
+    let words = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(2), "{words}");
+    let found = words.matches("unknown field `sprad`").count();
+    assert!((6..40).contains(&found) && words.contains("there may be more"), "{words}");
+    for k in 0..found {
+        assert!(words.contains(&format!("long.ron:{}:43: unknown field", k + 2)), "{words}");
+    }
+    // Half a second with an optimised program; the machine may be busy.
+    assert!(begin.elapsed() < std::time::Duration::from_secs(30), "{:?}", begin.elapsed());
+}
+
+/// Expected: both missing files of a layer are reported, and the mistake behind them; the repair puts a shipped file in
+/// place of each and never reports that one.
+#[test]
+fn all_missing_files_of_a_layer_are_reported_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("layer.ron");
+    let text = "Field(camera: JaiAd130(height_m: 1), lights: [Overcast()], soil: (layers: [\n\
+                (albedo: \"no.png\", height: \"neither.png\", size_m: 0.5, height_mm: (-4, 8)),\n]),\n\
+                weeds: [(species: \"nothing.ron\", growth: AgeDays(-1), spread: (per_m2: 4))])";
+    std::fs::write(&page, text).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_trace")).arg("check").arg(&page).output().unwrap();
+    let words = String::from_utf8(done.stderr).unwrap();
+    for said in [
+        "2:10: there is no file `no.png`",
+        "2:28: there is no file `neither.png`",
+        "4:19: there is no file `nothing.ron`",
+    ] {
+        assert!(words.contains(said), "{words}");
+    }
+    assert!(words.contains("4:50: -1 is out of range") && words.contains("4 mistakes in "), "{words}");
+}
+
 /// Expected: a single mistake is printed as before, without a number; a file without mistakes gives exit code 0.
 #[test]
 fn a_page_with_one_mistake_or_none_is_not_counted() {

@@ -428,6 +428,12 @@ fn a_slider_is_a_look_until_it_is_written() {
     let values = json!({ "plants[0].growth.Bbch": 12, "plants[0].turn_deg": 90.5 });
     assert_eq!(watched.post("wish", &json!({ "values": values, "index": 2 })).0, 200);
     let moved = events.until(|s| s["picture"]["asked"] == s["asked"] && s["picture"]["index"] == 2);
+    let command = moved["command"].as_str().unwrap();
+    assert_eq!(
+        command.split_once(" --index").unwrap().1,
+        " 2 --width 96 --spp 2 --set 'plants[0].growth.Bbch=12' --set 'plants[0].turn_deg=90.5'",
+        "{command}"
+    );
     assert_ne!(moved["picture"]["hash"], first["picture"]["hash"]);
     assert_eq!(watched.text(), before, "a request for an image must not write to the file");
     let (status, message) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": 12 }));
@@ -495,6 +501,23 @@ fn a_browser_shows_changes_and_mistakes() {
     page.wait("document.getElementById('explained').textContent.includes('reflectance')");
     page.ask("(() => { const i = document.querySelector('.slider input'); i.value = 1; i.dispatchEvent(new Event('input')); })()");
     page.wait("state.values['plants[0].growth.Bbch'] === 16 && state.picture.asked === state.asked");
+    // The image before the slider was moved, in the place of the new one.
+    page.wait("document.getElementById('before').dataset.view === 'labels' && !document.getElementById('before-toggle').disabled");
+    assert_eq!(page.ask("document.getElementById('before').hidden"), true);
+    page.ask(&press("b"));
+    let boxes =
+        page.ask("['before', 'picture'].map((id) => document.getElementById(id).getBoundingClientRect().toJSON())");
+    assert!(boxes[0] == boxes[1] && boxes[0]["width"].as_f64() > Some(10.0), "{boxes}");
+    assert_eq!(page.ask("document.getElementById('before').hidden"), false);
+    assert_ne!(
+        page.ask("document.getElementById('before').dataset.asked"),
+        page.ask("document.getElementById('picture').dataset.asked")
+    );
+    page.ask(&press("b"));
+    assert_eq!(
+        page.ask("document.getElementById('command').textContent.includes(\"--set 'plants[0].growth.Bbch=16'\")"),
+        true
+    );
     page.ask("document.querySelector('.slider .acts button:last-child').click()");
     page.wait("state.sliders[0].path === 'plants[0].turn_deg'");
     assert_eq!(watched.text(), good.replace("Choice([14, 16])", "16"));

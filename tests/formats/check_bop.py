@@ -12,7 +12,7 @@ import native
 dataset = Path(sys.argv[1])
 images = native.read(dataset)
 models = json.loads((dataset / "bop/models/models_info.json").read_text())
-plants, objects = 0, set()
+plants, cut, objects = 0, 0, set()
 for split, folder in zip(native.SPLITS, ("train_pbr", "val", "test")):
     own = native.of_split(images, split)
     root = dataset / "bop" / folder / "000000"
@@ -46,6 +46,19 @@ for split, folder in zip(native.SPLITS, ("train_pbr", "val", "test")):
             assert counts == [plant["seen"][kind] for kind in ("pixels", "unoccluded", "whole")]
             assert counts[:2] == [visible.sum(), whole.sum()] and abs(info["visib_fract"] - counts[0] / counts[2]) < 1e-9
             assert info["bbox_visib"] == plant["seen"]["box"]
+            # The box is that of the whole silhouette: it leaves the frame if and only if pixels of the plant do.
+            left, top, width, height = info["bbox_obj"]
+            low, end = np.maximum((left, top), 0), np.minimum((left + width, top + height), whole.shape[::-1])
+            held = np.zeros_like(whole)
+            held[low[1]:end[1], low[0]:end[0]] = True
+            assert not (whole & ~held).any()
+            leaves = left < 0 or top < 0 or left + width > whole.shape[1] or top + height > whole.shape[0]
+            assert leaves == (counts[2] > counts[1])
+            if not leaves:
+                rows, columns = np.nonzero(whole)
+                assert [left, top] == [columns.min(), rows.min()]
+                assert [left + width, top + height] == [columns.max() + 1, rows.max() + 1]
+            cut += leaves
             turn, shift = np.array(pose["cam_R_m2c"]).reshape(3, 3), np.array(pose["cam_t_m2c"])
             assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
             model = models[str(pose["obj_id"])]
@@ -58,4 +71,5 @@ for split, folder in zip(native.SPLITS, ("train_pbr", "val", "test")):
             objects.add(pose["obj_id"])
             plants += 1
 assert objects == set(range(1, len(models) + 1))
+assert cut or not plants, "no plant leaves the frame"
 print(f"bop: {plants} plants, {len(objects)} objects")

@@ -10,6 +10,7 @@
 //! | [`atomic_file`] | files that appear complete or not at all, also several together |
 //! | [`mod@dispatch`] | enums of types that implement a common trait |
 //! | [`error`] | the error type of all crates |
+//! | [`shell`] | words of shell commands |
 //! | [`supervise`] | panics of worker threads as errors |
 
 pub mod atomic_file;
@@ -20,6 +21,7 @@ pub mod input;
 pub mod math;
 pub mod ron_file;
 pub mod sampling;
+pub mod shell;
 pub mod supervise;
 
 pub use error::{Error, Result};

@@ -231,7 +231,7 @@ impl Library {
             let held = |cut: &MaskedImage| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
             cuts.iter().flatten().all(held).then(|| before.species.get(full).cloned())?
         };
-        let files: Vec<&Path> = file.sources().iter().map(|source| source.path.as_path()).collect();
+        let files: Vec<&Path> = file.sources().map(|source| source.path.as_path()).collect();
         if let Some(known) = self.kept(&files, known) {
             return Ok(known);
         }

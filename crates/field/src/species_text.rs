@@ -47,7 +47,7 @@ impl SpeciesFile {
     }
 
     /// Returns the files that the text was merged from, the requested file first.
-    pub fn sources(&self) -> &[RonFile] {
+    pub fn sources(&self) -> impl ExactSizeIterator<Item = &RonFile> {
         self.0.sources()
     }
 

@@ -5,6 +5,8 @@ pub mod cloud;
 mod denoise;
 mod exr;
 pub mod gltf;
+mod las;
+pub mod letters;
 mod lock;
 pub mod mitsuba;
 mod overlay;

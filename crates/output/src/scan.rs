@@ -1,7 +1,7 @@
 //! `scan.ply`: LiDAR measurements of a field, with the properties of a [cloud](super::cloud) and additional ones.
 
 use super::cloud::{Cloud, Column, Point, Value};
-use super::write_together;
+use super::{las, write_together};
 use furrow_base::Result;
 use furrow_base::math::{ToInt, Vec3};
 use furrow_field::Field;
@@ -66,8 +66,15 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
     cloud
 }
 
-/// Writes `scan.ply` into `folder`.
-pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Result<Vec<PathBuf>> {
-    let file = cloud(field, lidar, echoes).file(env!("CARGO_PKG_VERSION"));
-    write_together(folder, |together| together.add(&folder.join("scan.ply"), &file))
+/// Writes `scan.ply` into `folder`, and `scan.las` if `las` is set.
+pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo], las: bool) -> Result<Vec<PathBuf>> {
+    let version = env!("CARGO_PKG_VERSION");
+    let file = cloud(field, lidar, echoes).file(version);
+    write_together(folder, |together| {
+        together.add(&folder.join("scan.ply"), &file)?;
+        if las {
+            together.add(&folder.join("scan.las"), &las::file(field, echoes, version))?;
+        }
+        Ok(())
+    })
 }

@@ -22,7 +22,6 @@ mod init;
 mod leaf;
 #[cfg(not(all(feature = "datasets", feature = "watch")))]
 mod left_out;
-mod letters;
 mod list;
 mod pages;
 mod preview;

@@ -1,7 +1,6 @@
 //! `trace preview`: several fields of a scene file on one sheet, each with its index.
 
 use crate::field::{MemoryArgs, SetArgs, scene_file};
-use crate::letters;
 use crate::quality::{samples, threads};
 use crate::render::plants;
 use furrow_base::math::ToInt;
@@ -9,6 +8,7 @@ use furrow_base::{Error, Result};
 use furrow_cli::cli::{self, signal::Signals};
 use furrow_job::{Renderer, Request, SceneFile, Threads};
 use furrow_output::ImageData;
+use furrow_output::letters;
 use furrow_render::render::RenderMonitor;
 use furrow_render::settings::{Quality, RenderOptions};
 use std::collections::BTreeSet;

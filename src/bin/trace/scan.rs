@@ -23,6 +23,9 @@ pub(crate) struct Args {
     /// Folder for `scan.ply`. Default: `out/`, the scene file's name and `scan`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Also write `scan.las`: LAS 1.4, point format 6.
+    #[arg(long)]
+    las: bool,
     /// Number of threads; 0 for one per core. The file does not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -54,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     if echoes.is_empty() {
         print_warning("there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }
-    let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes)?;
+    let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes, args.las)?;
     let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());
     note(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
     Ok(paths)

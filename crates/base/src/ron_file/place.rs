@@ -47,7 +47,7 @@ pub(super) fn path_at(text: &str, offset: usize) -> Vec<&str> {
         if !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_') {
             path.push(name);
         }
-        let Some((key, value)) = members(text, &at).into_iter().find(|(_, value)| value.contains(&offset)) else {
+        let Some((key, value)) = each_member(text, &at).find(|(_, value)| value.contains(&offset)) else {
             break;
         };
         path.extend(key.filter(is_field));
@@ -84,7 +84,7 @@ pub(super) fn find(text: &str, whole: &Range<usize>, step: Step<'_>) -> Option<R
         Step::Field(name) => key.is_some_and(|key| key.trim_matches('"') == name),
         Step::Item(n) => n == *number,
     };
-    members(text, whole).into_iter().enumerate().find(wanted).map(|(_, (_, value))| value)
+    each_member(text, whole).enumerate().find(wanted).map(|(_, (_, value))| value)
 }
 
 /// Returns `true` if a member's key is a field name, as opposed to a quoted table key.
@@ -92,26 +92,29 @@ fn is_field(key: &&str) -> bool {
     !key.starts_with('"')
 }
 
-/// Returns the members of the bracketed value at `whole`: the field name or table key as written, if any, and the byte
-/// range of the value.
-pub(super) fn members<'t>(text: &'t str, whole: &Range<usize>) -> Vec<(Option<&'t str>, Range<usize>)> {
-    let mut all = Vec::new();
-    let Some(open) = text[whole.clone()].find(['(', '[', '{']) else { return all };
-    let mut at = skip(text, whole.start + open + 1);
-    while at < whole.end && !text[at..].starts_with([')', ']', '}']) {
+/// Field name or table key of a member as written, if any, and the byte range of its value.
+pub(super) type Keyed<'t> = (Option<&'t str>, Range<usize>);
+
+/// Returns the members of the bracketed value at `whole`.
+pub(super) fn members<'t>(text: &'t str, whole: &Range<usize>) -> Vec<Keyed<'t>> {
+    each_member(text, whole).collect()
+}
+
+/// Iterates over the members of the bracketed value at `whole`. Text behind the last one taken is not read.
+pub(super) fn each_member<'t>(text: &'t str, whole: &Range<usize>) -> impl Iterator<Item = Keyed<'t>> + use<'t> {
+    let (open, last) = (text[whole.clone()].find(['(', '[', '{']), whole.end);
+    let mut next = open.map(|open| skip(text, whole.start + open + 1));
+    std::iter::from_fn(move || {
+        let at = next.take().filter(|at| *at < last && !text[*at..].starts_with([')', ']', '}']))?;
         let end = value_end(text, at);
         let (key, value) = match key_end(text, at).map(|k| (k, skip(text, k))) {
             Some((k, colon)) if text[colon..].starts_with(':') => (Some(&text[at..k]), skip(text, colon + 1)),
             _ => (None, at),
         };
-        all.push((key, value.min(end)..end));
-        at = skip(text, end);
-        if !text[at..].starts_with(',') {
-            break;
-        }
-        at = skip(text, at + 1);
-    }
-    all
+        let comma = skip(text, end);
+        next = text[comma..].starts_with(',').then(|| skip(text, comma + 1));
+        Some((key, value.min(end)..end))
+    })
 }
 
 /// Finds a mismatched bracket. Returns its offset, or the end of the text, and the offset of the bracket still open
@@ -210,15 +213,19 @@ fn key_end(text: &str, at: usize) -> Option<usize> {
 /// Returns the end of the value that starts at `at`: before the comma or the closing bracket of the enclosing value,
 /// without trailing space and comments.
 pub(super) fn value_end(text: &str, mut at: usize) -> usize {
+    let bytes = text.as_bytes();
     let (mut depth, mut end) = (0_usize, at);
-    while let Some(c) = text[at..].chars().next() {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' | ',' if depth == 0 => break,
-            ')' | ']' | '}' => depth -= 1,
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' | b',' if depth == 0 => break,
+            b')' | b']' | b'}' => depth -= 1,
             _ => {}
         }
-        at = if c == '"' { quote_end(text, at) } else { at + c.len_utf8() };
+        at = match byte {
+            b'"' => quote_end(text, at),
+            _ => at + text[at..].chars().next().map_or(1, char::len_utf8),
+        };
         end = at;
         at = skip(text, at);
     }
@@ -247,17 +254,17 @@ fn skip(text: &str, mut at: usize) -> usize {
     loop {
         let rest = &text[at..];
         let past = |close: &str| rest.find(close).map_or(text.len(), |i| at + i + close.len());
-        let next = rest.len() - rest.trim_start().len();
-        if next > 0 {
-            at += next;
-        } else if rest.starts_with("//") {
-            at = past("\n");
-        } else if rest.starts_with("/*") {
-            at = block_end(text, at);
-        } else if rest.starts_with("#!") {
-            at = past("]");
-        } else {
-            return at;
+        // By bytes: errors about long files scan them many times.
+        match rest.as_bytes() {
+            [b'\t'..=b'\r' | b' ', ..] => at += 1,
+            [b'/', b'/', ..] => at = past("\n"),
+            [b'/', b'*', ..] => at = block_end(text, at),
+            [b'#', b'!', ..] => at = past("]"),
+            [0x80..=0xff, ..] => match rest.len() - rest.trim_start().len() {
+                0 => return at,
+                space => at += space,
+            },
+            _ => return at,
         }
     }
 }

@@ -3,7 +3,9 @@
 
 use super::num::{DISTRIBUTIONS, name_of};
 use super::place::{members, place};
+use super::schema::{self, Limits};
 use super::vary::Distribution;
+use schemars::JsonSchema;
 use std::ops::Range;
 
 /// Maximum bracket nesting that is searched.
@@ -32,6 +34,15 @@ pub struct Quantity {
     pub at: Range<usize>,
     /// Its value.
     pub value: Value,
+    /// Names of the fields and variants that lead to it, as in the schema.
+    names: Vec<String>,
+}
+
+/// Returns the limits of each number of `T`'s file, or of the values of each distribution; `None` for numbers without
+/// limits.
+pub fn limits<T: JsonSchema>(all: &[Quantity]) -> Vec<Option<Limits>> {
+    let root = schema::root::<T>();
+    all.iter().map(|quantity| schema::limits(&root, &quantity.names)).collect()
 }
 
 /// Returns every number and every distribution of numbers in a text, in order. If the text does not parse, returns
@@ -45,16 +56,17 @@ pub struct Quantity {
 /// ```
 pub fn quantities(text: &str) -> Vec<Quantity> {
     let mut all = Vec::new();
-    gather(text, &place(text, &[]), String::new(), DEEPEST, &mut all);
+    gather(text, &place(text, &[]), (String::new(), &[]), DEEPEST, &mut all);
     all
 }
 
-/// Collects the quantities of the value at `whole`, which has the path `path`.
-fn gather(text: &str, whole: &Range<usize>, path: String, depth: usize, all: &mut Vec<Quantity>) {
+/// Collects the quantities of the value at `whole`, which has the path `path` and these names on it.
+fn gather(text: &str, whole: &Range<usize>, (path, names): (String, &[&str]), depth: usize, all: &mut Vec<Quantity>) {
     let raw = &text[whole.clone()];
     let name = name_of(raw);
     if let Some(value) = value(raw, name) {
-        all.push(Quantity { path, at: whole.clone(), value });
+        let names = names.iter().copied().map(str::to_owned).collect();
+        all.push(Quantity { path, at: whole.clone(), value, names });
         return;
     }
     if depth == 0 || name.is_some_and(|name| DISTRIBUTIONS.contains(&name)) {
@@ -64,13 +76,15 @@ fn gather(text: &str, whole: &Range<usize>, path: String, depth: usize, all: &mu
     let alone = inner.len() == 1;
     for (number, (key, at)) in inner.into_iter().enumerate() {
         let dot = if path.is_empty() { "" } else { "." };
+        let field = key.filter(|key| !key.starts_with('"'));
+        let names: Vec<&str> = names.iter().copied().chain(name).chain(field).collect();
         let path = match (key, name) {
             (Some(key), _) => format!("{path}{dot}{}", key.trim_matches('"')),
             // A variant with a single value: `AgeDays(20)`.
             (None, Some(name)) if alone => format!("{path}{dot}{name}"),
             (None, _) => format!("{path}[{number}]"),
         };
-        gather(text, &at, path, depth - 1, all);
+        gather(text, &at, (path, &names), depth - 1, all);
     }
 }
 
@@ -88,6 +102,8 @@ fn value(raw: &str, name: Option<&str>) -> Option<Value> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bound::{Fraction, Positive, Signed};
+    use super::super::{Num, Vary};
     use super::*;
     use proptest::prelude::*;
 
@@ -112,6 +128,28 @@ Field(
         ];
         let expected: Vec<(String, &str)> = expected.into_iter().map(|(path, raw)| (path.to_owned(), raw)).collect();
         assert_eq!(found, expected);
+    }
+
+    /// Expected: the limits of the type, behind lists, options and variants; none where the type has no number.
+    #[test]
+    fn numbers_have_the_limits_of_their_type() {
+        #[derive(JsonSchema)]
+        #[allow(dead_code)]
+        struct Page {
+            share: Num<Fraction>,
+            parts: Vec<Part>,
+            name: String,
+        }
+        #[derive(JsonSchema)]
+        #[allow(dead_code)]
+        enum Part {
+            Flat { size: Option<Vary<Positive<20>>> },
+            Aged(Vary<Signed<90>>),
+        }
+        let text = "Page(share: 0.5, parts: [Flat(size: Uniform(1, 2)), Aged(3)], name: 4)";
+        let found = limits::<Page>(&quantities(text));
+        let limits = |min, max, above_min| Some(Limits { min, max, above_min });
+        assert_eq!(found, [limits(0.0, 1.0, false), limits(0.0, 20.0, true), limits(-90.0, 90.0, false), None]);
     }
 
     proptest! {

@@ -1,26 +1,39 @@
 //! Repairs of a text at the place of an error, so that the mistakes behind it are found as well.
 //!
 //! Reading a file stops at its first mistake. A repair changes the text there: it takes the suggestion of the error's
-//! help, removes the faulty field or item, or writes another number. A repaired text that is read further shows the
+//! help, removes the faulty field or item, or writes another number or file name. A repaired text that is read further shows the
 //! next mistake, unless the repair itself caused it ([`Repair::causes`]).
 
 use super::num::DISTRIBUTIONS;
-use super::place::{members, offset_of, token};
+use super::place::{each_member, offset_of, token};
 use super::spliced::{Spliced, offset_in};
 use super::suggest::nearest;
 use crate::Error;
 use crate::error::Place;
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// Numbers to try in place of a faulty one. Most quantities allow one of them.
 const NUMBERS: [&str; 10] = ["1", "0.5", "0", "10", "0.1", "45", "100", "0.01", "1000", "-1"];
 
-/// A text with one change at the place of an error.
+/// One change of a text at the place of an error.
 pub struct Repair {
-    /// The changed text.
-    pub text: Spliced,
+    /// File of the text.
+    file: PathBuf,
+    /// Byte range that is replaced.
+    at: Range<usize>,
+    new: String,
     change: Change,
     /// Names or indices of the changed member and of those around it, from the outermost to the innermost.
+    path: Vec<String>,
+}
+
+/// Position of an error in the text of its file.
+pub struct Spot {
+    file: PathBuf,
+    /// Byte offset.
+    start: usize,
+    /// Names or indices of the members around it, from the outermost to the innermost.
     path: Vec<String>,
 }
 
@@ -28,8 +41,8 @@ pub struct Repair {
 enum Change {
     /// A name replaced by the suggested one, which starts at this byte.
     Renamed(usize),
-    /// A member replaced by a number.
-    Number,
+    /// A member replaced by another value.
+    Value,
     /// A member removed, with its name or key if it has one.
     Removed(Option<String>),
 }
@@ -46,54 +59,87 @@ struct Member<'t> {
     name: String,
 }
 
+impl Spot {
+    /// Returns the position of an error in `text`; `None` if it is not about a position in it.
+    pub fn of(text: &Spliced, error: &Error) -> Option<Self> {
+        let start = range_of(text, error)?.start;
+        let path = around(&text.page.text, start).into_iter().map(|member| member.name).collect();
+        Some(Self { file: text.page.path.clone(), start, path })
+    }
+}
+
 impl Repair {
     /// Returns the repairs of an error about `text` that may let it be read further, in the order in which to try them.
-    /// Empty if the error has no position in the text.
-    pub fn all(text: &Spliced, error: &Error) -> Vec<Self> {
+    /// Empty if the error has no position in the text. `files` holds pairs of a field and the name of a file that it
+    /// accepts, to try in place of a faulty one.
+    pub fn all(text: &Spliced, error: &Error, files: &[(&str, &str)]) -> Vec<Self> {
         let Some(at) = range_of(text, error) else { return Vec::new() };
         let around = around(&text.page.text, at.start);
+        let repair = |at: Range<usize>, new: &str, change, depth: usize| Self {
+            file: text.page.path.clone(),
+            at,
+            new: new.to_owned(),
+            change,
+            path: around[..depth].iter().map(|member| member.name.clone()).collect(),
+        };
         let mut all = Vec::new();
         if let Some(new) = suggested(text, &at, error) {
-            all.push(Self::of(text.replaced(at.clone(), &new), Change::Renamed(at.start), &around));
+            all.push(repair(at.clone(), &new, Change::Renamed(at.start), around.len()));
         }
-        // The numbers of a distribution depend on each other, so it is replaced as a whole.
-        let drawn = around.iter().position(|member| is_distribution(&text.page.text[member.value.clone()]));
-        if let Some(depth) = drawn.map(|place| place + 1).or_else(|| (!around.is_empty()).then_some(around.len())) {
-            let at = &around[depth - 1].value;
-            let number = |number| Self::of(text.replaced(at.clone(), number), Change::Number, &around[..depth]);
-            all.extend(NUMBERS.into_iter().map(number));
+        let written = |member: &Member<'_>| &text.page.text[member.value.clone()];
+        match around.last() {
+            Some(member) if written(member).starts_with('"') => {
+                let fits = files.iter().filter(|(field, _)| member.key == Some(field));
+                let quoted = |(_, name): &(&str, &str)| {
+                    repair(member.value.clone(), &format!("\"{name}\""), Change::Value, around.len())
+                };
+                all.extend(fits.map(quoted));
+            }
+            Some(_) => {
+                // The numbers of a distribution depend on each other, so it is replaced as a whole.
+                let drawn = around.iter().position(|member| is_distribution(written(member)));
+                let depth = drawn.map_or(around.len(), |place| place + 1);
+                let at = &around[depth - 1].value;
+                all.extend(NUMBERS.map(|number| repair(at.clone(), number, Change::Value, depth)));
+            }
+            None => {}
         }
         for depth in (1..=around.len()).rev() {
             let member = &around[depth - 1];
             if member.removable {
                 let key = member.key.map(|key| key.trim_matches('"').to_owned());
-                all.push(Self::of(without(text, member), Change::Removed(key), &around[..depth]));
+                all.push(repair(with_comma(text, member), "", Change::Removed(key), depth));
             }
         }
         all
     }
 
-    fn of(text: Spliced, change: Change, around: &[Member<'_>]) -> Self {
-        Self { text, change, path: around.iter().map(|member| member.name.clone()).collect() }
+    /// File of the text that the repair changes.
+    pub fn file(&self) -> &Path {
+        &self.file
     }
 
-    /// Returns `true` if `next`, an error about `text` with this and perhaps further repairs, may follow from the repair:
-    /// it is about the changed value or one around it, or it names what was removed.
-    pub fn causes(&self, next: &Error, text: &Spliced) -> bool {
+    /// Returns the changed text. `text` is the one that the repair was made for.
+    pub fn apply(&self, text: &Spliced) -> Spliced {
+        text.replaced(self.at.clone(), &self.new)
+    }
+
+    /// Returns `true` if `next`, an error at `spot` of the text with this and perhaps further repairs, may follow from the
+    /// repair: it is about the changed value or one around it, or it names what was removed.
+    pub fn causes(&self, next: &Error, spot: Option<&Spot>) -> bool {
         let quoted = |key: &String| next.message().contains(&format!("\"{key}\""));
         if matches!(&self.change, Change::Removed(Some(key)) if quoted(key)) {
             return true;
         }
-        let Some(at) = range_of(text, next) else {
+        let Some(Spot { start, path, .. }) = spot.filter(|spot| spot.file == self.file) else {
             // Without a position, it is about the whole file: what was removed may be missing.
             let whole = next.place().is_none_or(|place| place.span.is_none());
             return whole && matches!(self.change, Change::Removed(_));
         };
-        let path: Vec<String> = around(&text.page.text, at.start).into_iter().map(|member| member.name).collect();
-        let around = self.path.starts_with(&path);
+        let around = self.path.starts_with(path);
         match (&self.change, missing(next)) {
-            (Change::Renamed(start), _) => at.start == *start || next.message().contains("given twice"),
-            (Change::Number, missing) => around && missing.is_none(),
+            (Change::Renamed(renamed), _) => start == renamed || next.message().contains("given twice"),
+            (Change::Value, missing) => around && missing.is_none(),
             (Change::Removed(key), Some(names)) => {
                 around && key.as_ref().is_some_and(|key| nearest(&names, key).is_some())
             }
@@ -121,7 +167,7 @@ fn around(text: &str, offset: usize) -> Vec<Member<'_>> {
     // A quoted string may contain brackets.
     while !text[whole.clone()].starts_with('"') {
         let list = text[whole.clone()].find(['(', '[', '{']).is_some_and(|i| text[whole.start + i..].starts_with('['));
-        let found = members(text, &whole).into_iter().enumerate().find_map(|(index, (key, value))| {
+        let found = each_member(text, &whole).enumerate().find_map(|(index, (key, value))| {
             let at = key.map_or(value.start, |key| offset_in(text, key))..value.end;
             let removable = list || key.is_some();
             let name = key.map_or_else(|| index.to_string(), str::to_owned);
@@ -150,12 +196,12 @@ fn suggested(text: &Spliced, at: &Range<usize>, error: &Error) -> Option<String>
     })
 }
 
-/// Returns the text without a member and the comma after it.
-fn without(text: &Spliced, member: &Member<'_>) -> Spliced {
+/// Returns the byte range of a member and the comma after it.
+fn with_comma(text: &Spliced, member: &Member<'_>) -> Range<usize> {
     let rest = &text.page.text[member.at.end..];
     let behind = rest.trim_start();
     let comma = behind.starts_with(',').then(|| rest.len() - behind.len() + 1);
-    text.replaced(member.at.start..member.at.end + comma.unwrap_or(0), "")
+    member.at.start..member.at.end + comma.unwrap_or(0)
 }
 
 /// Returns the names of the fields that an error reports as missing; `None` for any other error.
@@ -199,13 +245,18 @@ mod tests {
         let mut text = Spliced::of(RonFile::of(text));
         let (mut found, mut made) = (Vec::new(), Vec::<Repair>::new());
         while let Some(error) = read(&text) {
-            let repairs = Repair::all(&text, &error);
-            if !made.iter().any(|repair| repair.causes(&error, &text)) {
+            let repairs = Repair::all(&text, &error, &[]);
+            let spot = Spot::of(&text, &error);
+            if !made.iter().any(|repair| repair.causes(&error, spot.as_ref())) {
                 found.push(text.locate(error).to_string().lines().next().unwrap_or_default().to_owned());
             }
-            let good = |repair: &Repair| read(&repair.text).is_none_or(|next| !repair.causes(&next, &repair.text));
-            let Some(repair) = repairs.into_iter().find(good) else { break };
-            text = repair.text.clone();
+            let good = |repair: Repair| {
+                let after = repair.apply(&text);
+                let helps = read(&after).is_none_or(|next| !repair.causes(&next, Spot::of(&after, &next).as_ref()));
+                helps.then_some((repair, after))
+            };
+            let Some((repair, after)) = repairs.into_iter().find_map(good) else { break };
+            text = after;
             made.push(repair);
         }
         found

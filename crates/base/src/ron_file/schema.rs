@@ -42,19 +42,43 @@ pub(super) fn required<T: JsonSchema>(name: &str, missing: &str) -> Vec<String> 
             _ => None,
         }
     }
-    let schema = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
-    look(&schema, None, name, missing).unwrap_or_default()
+    look(&root::<T>(), None, name, missing).unwrap_or_default()
 }
 
 /// Returns how many of the names on a path into `T`'s file exist, counting the file's own name, and the names allowed
 /// at its end. Names inside a number are not checked.
 pub(super) fn known<T: JsonSchema>(path: &[&str]) -> (usize, Vec<Name>) {
-    let root = SchemaGenerator::default().into_root_schema_for::<T>().to_value();
+    let root = root::<T>();
     match at_end(&root, path) {
         Ok(at) if at.get(KIND).is_some() => (path.len(), Vec::new()),
         Ok(at) => (path.len(), names(&root, at)),
         Err(depth) => (depth, Vec::new()),
     }
+}
+
+/// Returns the schema of `T`'s file.
+pub(super) fn root<T: JsonSchema>() -> Value {
+    SchemaGenerator::default().into_root_schema_for::<T>().to_value()
+}
+
+/// Range of valid values of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// `true` if the smallest value itself is not allowed.
+    pub above_min: bool,
+}
+
+/// Returns the limits of the number at the end of a path; `None` if there is none.
+pub(super) fn limits(root: &Value, path: &[String]) -> Option<Limits> {
+    let path: Vec<&str> = path.iter().map(String::as_str).collect();
+    let at = at_end(root, &path).ok()?;
+    let number = |key: &str| at.get(key).and_then(Value::as_f64);
+    let (lowest, above) = (number("minimum"), number("exclusiveMinimum"));
+    Some(Limits { min: lowest.or(above)?, max: number("maximum")?, above_min: lowest.is_none() })
 }
 
 /// Returns the schema at the end of a path, or of the number there; otherwise the number of names on the path that exist.
@@ -76,12 +100,10 @@ fn at_end<'a>(root: &'a Value, path: &[&str]) -> Result<&'a Value, usize> {
 
 /// Returns `true` if `T`'s file has a string at the end of a path that exists.
 pub(super) fn is_text<T: JsonSchema>(path: &[&str]) -> bool {
-    at_end(&SchemaGenerator::default().into_root_schema_for::<T>().to_value(), path).is_ok_and(|at| {
-        match at.get("type") {
-            Some(Value::String(one)) => one == "string",
-            Some(Value::Array(several)) => several.iter().any(|one| one == "string"),
-            _ => false,
-        }
+    at_end(&root::<T>(), path).is_ok_and(|at| match at.get("type") {
+        Some(Value::String(one)) => one == "string",
+        Some(Value::Array(several)) => several.iter().any(|one| one == "string"),
+        _ => false,
     })
 }
 

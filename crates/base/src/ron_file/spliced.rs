@@ -5,12 +5,13 @@
 //! faulty part was written.
 
 use super::file::RonFile;
-use super::place::{Step, members, offset_of, place, words};
+use super::place::{Step, each_member, members, offset_of, place, words};
 use super::vary::DISTRIBUTION_WORDS;
 use crate::Error;
 use crate::error::Place;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Text assembled from several files.
 #[derive(Clone, Debug)]
@@ -18,7 +19,7 @@ pub struct Spliced {
     /// The whole text, under the path of the main file.
     pub page: RonFile,
     /// The files that the pieces come from.
-    sources: Vec<RonFile>,
+    sources: Vec<Arc<RonFile>>,
     pieces: Vec<Piece>,
 }
 
@@ -39,19 +40,19 @@ impl Spliced {
     /// Wraps a single file unchanged.
     pub fn of(page: RonFile) -> Self {
         let piece = Piece { start: 0, source: 0, from: 0..page.text.len(), copied: true };
-        Self { page: page.clone(), sources: vec![page], pieces: vec![piece] }
+        Self { page: page.clone(), sources: vec![Arc::new(page)], pieces: vec![piece] }
     }
 
     /// The files that the pieces come from, the main file first.
-    pub fn sources(&self) -> &[RonFile] {
-        &self.sources
+    pub fn sources(&self) -> impl ExactSizeIterator<Item = &RonFile> {
+        self.sources.iter().map(Arc::as_ref)
     }
 
     /// Returns the byte range of the value that `path` leads to; `None` if a step does not exist.
     pub fn find(&self, path: &[Step<'_>]) -> Option<Range<usize>> {
         let text = &self.page.text;
         path.iter().try_fold(place(text, &[]), |whole, step| {
-            members(text, &whole).into_iter().enumerate().find_map(|(k, (key, value))| {
+            each_member(text, &whole).enumerate().find_map(|(k, (key, value))| {
                 let is = match step {
                     Step::Field(name) => key.is_some_and(|key| key.trim_matches('"') == *name),
                     Step::Item(n) => k == *n,
@@ -63,7 +64,7 @@ impl Spliced {
 
     /// Returns the byte range of a field of the value at `whole`; `None` if it has no field of that name.
     pub fn value_in(&self, whole: &Range<usize>, field: &str) -> Option<Range<usize>> {
-        members(&self.page.text, whole).into_iter().find(|(key, _)| *key == Some(field)).map(|(_, value)| value)
+        each_member(&self.page.text, whole).find(|(key, _)| *key == Some(field)).map(|(_, value)| value)
     }
 
     /// Returns the keys of the table that `path` leads to, with their byte ranges including quotes.
@@ -84,7 +85,7 @@ impl Spliced {
     #[must_use]
     pub fn without(&self, whole: &Range<usize>, field: &str) -> Self {
         let text = &self.page.text;
-        let Some((key, value)) = members(text, whole).into_iter().find(|(key, _)| *key == Some(field)) else {
+        let Some((key, value)) = each_member(text, whole).find(|(key, _)| *key == Some(field)) else {
             return self.clone();
         };
         let start = key.map_or(value.start, |key| offset_in(text, key));
@@ -232,10 +233,12 @@ impl Spliced {
     }
 
     fn source(&mut self, page: &RonFile) -> usize {
+        let itself = |known: &Arc<RonFile>| std::ptr::eq(known.as_ref(), page);
         // Values of the command line share a path.
-        let same = |known: &RonFile| known.path == page.path && known.text == page.text;
-        self.sources.iter().position(same).unwrap_or_else(|| {
-            self.sources.push(page.clone());
+        let same = |known: &Arc<RonFile>| known.path == page.path && known.text == page.text;
+        let known = self.sources.iter().position(itself).or_else(|| self.sources.iter().position(same));
+        known.unwrap_or_else(|| {
+            self.sources.push(Arc::new(page.clone()));
             self.sources.len() - 1
         })
     }

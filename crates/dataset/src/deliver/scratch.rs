@@ -11,7 +11,6 @@
 //! make the remaining images.
 
 use crate::File;
-use crate::deliver::cluster::quoted;
 use crate::make::begin::write_changed;
 use crate::make::generate::{Callbacks, Delivery, OpenPacks, Shard, Work, generate_for};
 use crate::make::pack::store;
@@ -25,6 +24,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use furrow_base::error::Kind;
 use furrow_base::input::{self, below};
+use furrow_base::shell::quoted;
 use furrow_base::{Error, Result};
 use furrow_job::Threads;
 use furrow_output::{Lock, stream_atomically};

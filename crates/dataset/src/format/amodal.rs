@@ -77,7 +77,7 @@ impl Format for Writer {
         Ok(())
     }
 
-    fn needs_film(&self) -> bool {
+    fn needs_masks(&self) -> bool {
         true
     }
 }

@@ -9,8 +9,8 @@
 //! there are no meshes. Entries of `scene_gt.json` have the additional keys `class`, `species` and `plant`, the number in
 //! `plants.png`.
 //!
-//! `mask` is the plant without occlusion, `mask_visib` the visible part. `px_count_all` also counts pixels outside the
-//! frame; `bbox_obj` is limited to the frame. `bop/plants/SPLIT/NAME.json` contains the entries of one image.
+//! `mask` is the plant without occlusion, `mask_visib` the visible part. `px_count_all` and
+//! `bbox_obj` include pixels outside the frame, by up to the image size to each side. `bop/plants/SPLIT/NAME.json` contains the entries of one image.
 //!
 //! Source: BOP toolkit, `docs/bop_datasets_format.md`.
 
@@ -19,7 +19,6 @@ use super::{Format, SetWriter, image_file};
 use crate::File;
 use crate::model::recipe::{Recipe, json};
 use crate::model::record::Plant;
-use crate::model::rle::Box2;
 use crate::model::sample::{Rendered, Sample};
 use crate::model::split::Split;
 use crate::read::set::Set;
@@ -128,19 +127,11 @@ impl Format for Writer {
         })
     }
 
-    fn needs_film(&self) -> bool {
+    fn needs_masks(&self) -> bool {
         true
     }
 
     fn needs_boxes(&self) -> bool {
-        true
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn has_one_pose(&self) -> bool {
         true
     }
 }
@@ -219,7 +210,7 @@ fn pose(rendered: &Rendered, centre: DVec3, axes: [DVec3; 3]) -> Value {
 /// Returns the visibility of a plant.
 fn info(plant: &Plant, whole: &WholeMask) -> Value {
     value!({
-        "bbox_obj": Box2::around(whole.pixels()),
+        "bbox_obj": whole.bounds,
         "bbox_visib": plant.seen.bounds,
         "px_count_all": plant.seen.whole,
         "px_count_valid": plant.seen.unoccluded,

@@ -45,10 +45,6 @@ impl Format for Writer {
         MAPS.into_iter().map(map).collect()
     }
 
-    fn needs_film(&self) -> bool {
-        true
-    }
-
     fn needs_photograph(&self) -> bool {
         false
     }

@@ -41,10 +41,6 @@ impl Format for Writer {
         recipe.captures_a_day() > 1
     }
 
-    fn needs_film(&self) -> bool {
-        true
-    }
-
     fn needs_photograph(&self) -> bool {
         false
     }

@@ -76,24 +76,12 @@ impl Format for Writer {
         Ok(())
     }
 
-    fn needs_film(&self) -> bool {
+    fn needs_masks(&self) -> bool {
         true
     }
 
     fn needs_boxes(&self) -> bool {
         true
-    }
-
-    fn needs_camera(&self) -> bool {
-        true
-    }
-
-    fn has_one_pose(&self) -> bool {
-        true
-    }
-
-    fn warnings(&self, _recipe: &Recipe) -> Vec<String> {
-        vec!["P2 is a pinhole; lens distortion, if the scene has any, is not in it".to_owned()]
     }
 }
 

@@ -30,7 +30,7 @@ pub trait Format: Sync {
     /// Returns whether the format needs results of the renderer ([`Sample::film`]), so that adding it renders the
     /// images again.
     fn needs_film(&self) -> bool {
-        false
+        self.needs_flow() || self.needs_damage() || self.needs_masks() || self.needs_boxes()
     }
 
     /// Returns the maps of images that the format needs.
@@ -51,13 +51,18 @@ pub trait Format: Sync {
 
     /// Returns whether the format contains camera data, which imported images do not have.
     fn needs_camera(&self) -> bool {
-        false
+        self.needs_boxes()
     }
 
     /// Returns whether the format has a single pose for all rows of an image, so that it cannot represent a rolling
     /// shutter.
     fn has_one_pose(&self) -> bool {
-        false
+        self.needs_boxes()
+    }
+
+    /// Returns whether the format describes cameras as pinholes, so that it cannot represent the distortion of a lens.
+    fn has_pinhole(&self) -> bool {
+        self.needs_boxes()
     }
 
     /// Returns whether the format contains [`Rendered::flows`](crate::model::sample::Rendered::flows), which are
@@ -72,8 +77,14 @@ pub trait Format: Sync {
         false
     }
 
-    /// Returns whether the format contains [`Rendered::boxes`](crate::model::sample::Rendered::boxes), which are computed
+    /// Returns whether the format contains [`Rendered::masks`](crate::model::sample::Rendered::masks), which are kept
     /// only if needed.
+    fn needs_masks(&self) -> bool {
+        false
+    }
+
+    /// Returns whether the format contains [`Rendered::boxes`](crate::model::sample::Rendered::boxes), in the frame of
+    /// a pinhole camera with one pose, which are computed only if needed.
     fn needs_boxes(&self) -> bool {
         false
     }

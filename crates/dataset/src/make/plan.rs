@@ -205,6 +205,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     let mut all_warnings = field.warnings.clone();
     all_warnings.extend(warnings(&recipe)?);
     all_warnings.extend(rolling(&recipe, camera)?);
+    all_warnings.extend(distorted(&recipe, field.captures.iter().map(|capture| &capture.camera))?);
     let scene_sha256 = field.hash.clone();
     Ok(Draft { recipe, files, warnings: all_warnings, scene: source, scene_sha256 })
 }
@@ -285,6 +286,15 @@ fn rolling(recipe: &Recipe, camera: &Camera) -> Result<Option<String>> {
     let names: Vec<String> = formats.map(|(name, _)| name.to_string()).collect();
     let words = "cannot represent a rolling shutter: poses are those of the middle row";
     Ok((!names.is_empty()).then(|| format!("{} {words}", names.join(", "))))
+}
+
+/// Returns a warning if formats that describe cameras as pinholes are written for a camera whose lens distorts.
+fn distorted<'a>(recipe: &Recipe, mut cameras: impl Iterator<Item = &'a Camera>) -> Result<Option<String>> {
+    let formats = format::all(recipe)?.into_iter().filter(|(_, format)| format.has_pinhole());
+    let names: Vec<&str> = formats.map(|(name, _)| name).collect();
+    let warns = !names.is_empty() && cameras.any(|camera| !camera.distortion().is_none());
+    let words = "cannot represent the distortion of a lens: the camera is a pinhole";
+    Ok(warns.then(|| format!("{} {words}", names.join(", "))))
 }
 
 /// Returns the formats' warnings about data that they cannot represent.

@@ -226,7 +226,11 @@ fn labelled(
     } else {
         Vec::new()
     };
-    let WholePlants { extents, masks } = render::whole_plants(&field.scene, &labels);
+    let WholePlants { extents, masks } = if formats.iter().any(|(_, format)| format.needs_masks()) {
+        render::whole_plants(&field.scene, &labels)
+    } else {
+        WholePlants { extents: render::extents(&field.scene, &labels), masks: BTreeMap::new() }
+    };
     let tags = field.scene.tags();
     let kinds: BTreeMap<u32, u16> = field.plants.iter().map(|p| (p.number, p.kind)).collect();
     let kind = |plant: u32| kinds.get(&plant).copied().unwrap_or(0);

@@ -75,7 +75,7 @@ pub struct Rendered {
     pub flows: Vec<Flow>,
     /// Damage of the leaf at each pixel's centre; empty unless a format needs it.
     pub damage: Vec<furrow_render::material::Damage>,
-    /// Pixels that each plant would cover without occlusion, by its number.
+    /// Pixels that each plant would cover without occlusion, by its number; empty unless a format needs them.
     pub masks: BTreeMap<u32, WholeMask>,
     /// Boxes around each plant, by its number; empty unless a format needs them.
     pub boxes: BTreeMap<u32, PlantBoxes>,

@@ -9,6 +9,7 @@ use crate::read::native;
 use furrow_base::Result;
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_field::record::SpeciesRecord;
+use furrow_optics::light::LightRecord;
 use furrow_output::ImageData;
 use furrow_render::scene::tag::Class;
 use furrow_report::{count, data_url, percent};
@@ -60,6 +61,10 @@ struct ImageProperties {
     stage: Option<u32>,
     /// Species in view, sorted and without duplicates.
     species: Vec<String>,
+    /// Kinds of its lights, sorted and without duplicates.
+    lights: Vec<&'static str>,
+    /// Elevation of the sun, degrees.
+    sun: Option<f64>,
 }
 
 impl ImageProperties {
@@ -74,7 +79,15 @@ impl ImageProperties {
         let mut species: Vec<String> = record.seen().filter_map(|p| named(p.kind)).collect();
         species.sort();
         species.dedup();
-        Self { cover: [share(Class::Crop), share(Class::Weed)], stage, species }
+        let all = record.conditions.as_ref().map_or(&[][..], |conditions| &conditions.lights);
+        let mut lights: Vec<&str> = all.iter().map(LightRecord::kind).collect();
+        lights.sort_unstable();
+        lights.dedup();
+        let sun = all.iter().find_map(|light| match light {
+            LightRecord::Daylight(day) => Some(day.sun_elevation_deg),
+            _ => None,
+        });
+        Self { cover: [share(Class::Crop), share(Class::Weed)], stage, species, lights, sun }
     }
 
     fn values(&self) -> [f64; 3] {
@@ -106,6 +119,9 @@ fn tools(properties: &[ImageProperties]) -> Markup {
     let mut species: Vec<&String> = properties.iter().flat_map(|f| &f.species).collect();
     species.sort();
     species.dedup();
+    let mut lights: Vec<&str> = properties.iter().flat_map(|f| f.lights.iter().copied()).collect();
+    lights.sort_unstable();
+    lights.dedup();
     html! {
         p.tools hidden {
             label { "Show " select #show {
@@ -114,6 +130,7 @@ fn tools(properties: &[ImageProperties]) -> Markup {
                 option value="weed" { "with weeds" }
                 option value="bare" { "without plants" }
                 @for name in species { option value={ "species:" (name) } { "with " (name) } }
+                @for kind in lights { option value={ "light:" (kind) } { "lit by " (kind) } }
             } }
             label { "Sort by " select #sort {
                 option value="place" { "set" }
@@ -121,6 +138,7 @@ fn tools(properties: &[ImageProperties]) -> Markup {
                 option value="cover" { "most cover first" }
                 option value="bare" { "least cover first" }
                 option value="stage" { "oldest crop first" }
+                option value="sun" { "lowest sun first" }
             } }
             label { "Find " input #find type="search" placeholder="number" size="8"; }
             span #shown {}
@@ -154,7 +172,8 @@ fn card(sample: &Sample, properties: &ImageProperties, unusual: f64, has_files: 
     let labels = data_url("png", &furrow_output::encode_png(w, h, &ImageData::Rgba(&overlay(sample, w, h)), "")?);
     Ok(html! {
         figure.shot data-name=(name) data-crop=(rounded(properties.cover[0])) data-weed=(rounded(properties.cover[1]))
-            data-stage=[properties.stage] data-unusual=(rounded(unusual)) data-species=(properties.species.join("|")) {
+            data-stage=[properties.stage] data-unusual=(rounded(unusual)) data-species=(properties.species.join("|"))
+            data-light=(properties.lights.join("|")) data-sun=[properties.sun.map(rounded)] {
             label title=[source.as_ref()] {
                 input type="checkbox";
                 span.frame {
@@ -247,7 +266,13 @@ mod tests {
 
     #[test]
     fn the_image_that_is_unlike_the_others_is_the_most_unusual() {
-        let properties = |crop: f64, stage| ImageProperties { cover: [crop, 1.0], stage, species: Vec::new() };
+        let properties = |crop: f64, stage| ImageProperties {
+            cover: [crop, 1.0],
+            stage,
+            species: Vec::new(),
+            lights: Vec::new(),
+            sun: None,
+        };
         let all = [
             properties(10.0, Some(14)),
             properties(11.0, Some(14)),

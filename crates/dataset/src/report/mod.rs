@@ -7,10 +7,11 @@
 //! | file | contents |
 //! |---|---|
 //! | `statistics`, `photographs` | statistics of the records and of the pixel values |
-//! | `sheet`, `card` | contact sheet, dataset card |
+//! | `sheet`, `again`, `card` | contact sheet, command that renders an image again, dataset card |
 //!
 //! The charts and the page layout are those of [`furrow_report`].
 
+mod again;
 mod card;
 mod contact_sheet;
 mod photographs;
@@ -57,6 +58,7 @@ fn html(set: &Set, found: &Statistics, photographs: &Photographs, names: &[Vec<S
             label for="labels" class="switch" { "Show labels on all" }
             span.hint { "or point at an image, or tap it" }
             (sheet)
+            (again::section(recipe))
         }))
         (section("Labels", grid(labels(found))))
         (section("Plants", html! { (card::species(recipe, found)) (grid(plants(found))) }))

@@ -21,12 +21,13 @@
     unusual: (shot) => -number(shot, "unusual"),
     cover: (shot) => -cover(shot),
     bare: cover,
+    sun: (shot) => (shot.dataset.sun === undefined ? 1e3 : number(shot, "sun")),
     stage: (shot) => -(shot.dataset.stage === undefined ? -1 : number(shot, "stage")),
   };
   const update = () => {
     const show = byId("show").value;
-    const name = show.startsWith("species:") ? show.slice(8) : null;
-    const keep = name === null ? wanted[show] : (shot) => shot.dataset.species.split("|").includes(name);
+    const [, kind, name] = show.match(/^(species|light):(.*)$/) ?? [];
+    const keep = kind === undefined ? wanted[show] : (shot) => shot.dataset[kind].split("|").includes(name);
     const text = byId("find").value.trim();
     let count = 0;
     for (const shot of shots) {
@@ -54,8 +55,19 @@
     });
     large.querySelector("div").replaceChildren(...pictures);
     large.querySelector("p").textContent = link.closest("figcaption").textContent;
+    if (again) {
+      again.value = Number(name);
+      write(Number(name));
+    }
     large.showModal();
   });
+  // The command that renders an image again: of the number that is typed, or of the image that was enlarged last.
+  const again = byId("again");
+  const write = (number) => {
+    const command = byId("command");
+    command.textContent = command.dataset.command.replaceAll("INDEX", number);
+  };
+  again?.addEventListener("input", () => { if (again.checkValidity()) write(Number(again.value)); });
   tools.hidden = false;
   update();
 })();

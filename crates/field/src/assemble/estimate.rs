@@ -8,6 +8,7 @@ use super::preview::CountedPlant;
 use super::seedling::{PlantSite, Seedling, grow};
 use super::view::VisibleGround;
 use super::{ground, sow};
+use crate::desc::Detail;
 use crate::estimate::{Estimate, Share};
 use crate::library::Library;
 use furrow_base::Result;
@@ -45,15 +46,18 @@ const SECONDS_PER_INSTANCE: f64 = 1e-5;
 /// Core seconds per triangle of a plant.
 const SECONDS_PER_TRIANGLE: f64 = 2e-6;
 
+/// Time to build the plants of a field above which a coarser level of detail is recommended, core seconds.
+const SLOW_S: f64 = 60.0;
+
 /// Estimates the cost of the field for the ground in sight.
 pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &VisibleGround) -> Result<Estimate> {
     let camera = &drawn.camera;
     let pixels = f64::from(camera.width()) * f64::from(camera.height());
     let film = Cost::work(pixels * (size_of::<Pixel>().to_f64() + BYTES_BESIDE), pixels * SECONDS_PER_PIXEL);
-    let coarser = if drawn.detail == MeshDetail::Full {
-        ", or lower the camera, or set detail: ByPixel"
-    } else {
-        ", or lower the camera"
+    let coarser = match drawn.detail {
+        MeshDetail::Full => ", or lower the camera, or set detail: ByPixel",
+        MeshDetail::ByPixel => ", or lower the camera, or set detail: Instanced",
+        MeshDetail::Instanced => ", or lower the camera",
     };
     let mut shares = Vec::new();
     let fewer = match (drawn.desc.drive.is_some(), drawn.scanners.is_empty()) {
@@ -100,6 +104,21 @@ pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Visible
     }
     shares.extend(pictured(drawn, library)?);
     Ok(Estimate { shares })
+}
+
+/// Returns a warning if `detail: Auto` has chosen a mesh for each plant and the plants take long: shared meshes take a fraction. It is not
+/// given for a level that the scene file states.
+pub(super) fn slow(drawn: &Drawn<'_>, estimate: &Estimate) -> Option<String> {
+    let of_plants =
+        |share: &&Share| [Some(&Step::Field("crops")), Some(&Step::Field("weeds"))].contains(&share.at.first());
+    let seconds = estimate.shares.iter().filter(of_plants).map(|share| share.cost.seconds).sum::<f64>();
+    let chosen = drawn.desc.detail == Detail::Auto && drawn.detail == MeshDetail::ByPixel;
+    (chosen && seconds > SLOW_S).then(|| {
+        format!(
+            "the plants of this field take about {seconds:.0} core seconds to build; detail: Instanced shares meshes between plants of a \
+             species and stage, in a fraction of the time and memory, and a lower reach_m builds fewer plants"
+        )
+    })
 }
 
 /// Estimates the memory of images: soil textures, leaf images and model textures.

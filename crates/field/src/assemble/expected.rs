@@ -48,11 +48,12 @@ impl Source {
     }
 
     fn checked(&self, Asked { drawn, library, warnings }: Asked<'_>) -> Result<Vec<String>> {
-        let found = self.warnings(Asked { drawn, library, warnings })?;
+        let mut found = self.warnings(Asked { drawn, library, warnings })?;
         known::species(drawn, library)?;
         let sight = sight::sight(drawn, warnings)?;
         let estimate = estimate::estimate(drawn, library, &sight)?;
         estimate.check(drawn.memory()).map_err(|(at, error)| self.page().blame(&at, error))?;
+        found.extend(estimate::slow(drawn, &estimate));
         Ok(found)
     }
 

@@ -7,7 +7,7 @@ use super::{Options, SceneEdit, Source};
 use crate::library::Library;
 use furrow_base::Error;
 use furrow_base::error::Kind;
-use furrow_base::ron_file::{Repair, RonFile, Spliced};
+use furrow_base::ron_file::{Repair, RonFile, Spliced, Spot};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,10 @@ use std::path::{Path, PathBuf};
 const MOST: usize = 40;
 /// Maximum number of readings of the files.
 const MOST_READINGS: usize = 150;
+/// Maximum number of bytes of the scene file that are read in total, so that the search in a long file takes about a second.
+const MOST_BYTES: usize = 16 << 20;
+/// Fields and shipped files to try in place of a file that is missing or cannot be used.
+const SHIPPED: [(&str, &str); 3] = [("species", "sugar_beet"), ("albedo", "dirt.png"), ("height", "dirt.height.png")];
 
 impl Source {
     /// Adds to `first`, an error about the scene file `text`, the other mistakes that are found with the same options.
@@ -46,13 +50,15 @@ struct Search<'a> {
     growing: SceneEdit,
     options: &'a Options,
     readings: usize,
+    /// Bytes of the scene file read so far.
+    bytes: usize,
 }
 
 impl<'a> Search<'a> {
     fn new(text: &Spliced, library: &Library, options: &'a Options) -> Self {
         let scene = text.page.path.clone();
         let texts = BTreeMap::from([(scene.clone(), text.clone())]);
-        Self { scene, texts, library: library.clone(), growing: library.growing, options, readings: 0 }
+        Self { scene, texts, library: library.clone(), growing: library.growing, options, readings: 0, bytes: 0 }
     }
 
     /// Returns the mistakes in the order in which they are found, each at its place in the files as written, and whether the
@@ -63,7 +69,8 @@ impl<'a> Search<'a> {
         while let Some(error) = next {
             self.open(&error);
             let written = error.place().and_then(|place| self.texts.get(&place.file)?.written(place));
-            let follows = made.iter().any(|repair| self.causes(repair, &error));
+            let spot = self.spot(&error);
+            let follows = made.iter().any(|repair| repair.causes(&error, spot.as_ref()));
             let repaired = self.repair(&error);
             let error = match written {
                 Some(place) => error.at(place),
@@ -92,26 +99,28 @@ impl<'a> Search<'a> {
     /// helps.
     fn repair(&mut self, error: &Error) -> Option<(Repair, Option<Error>)> {
         let file = &error.place()?.file;
-        let own = self.texts.get(file).map_or_else(Vec::new, |text| Repair::all(text, error));
+        let own = self.texts.get(file).map_or_else(Vec::new, |text| Repair::all(text, error, &SHIPPED));
         let naming = if *file == self.scene { Vec::new() } else { self.without_file(file) };
         for repair in own.into_iter().chain(naming) {
-            let before = self.texts.insert(repair.text.page.path.clone(), repair.text.clone());
+            let text = self.texts.get(repair.file())?;
+            let after = repair.apply(text);
+            let before = self.texts.insert(repair.file().to_owned(), after);
             let next = self.read();
-            if self.readings > MOST_READINGS {
+            if self.readings > MOST_READINGS || self.bytes > MOST_BYTES {
                 return None;
             }
-            if next.as_ref().is_none_or(|next| !same(next, error) && !self.causes(&repair, next)) {
+            let causes = |next: &Error| repair.causes(next, self.spot(next).as_ref());
+            if next.as_ref().is_none_or(|next| !same(next, error) && !causes(next)) {
                 return Some((repair, next));
             }
-            self.texts.extend(before.map(|text| (text.page.path.clone(), text)));
+            self.texts.extend(before.map(|text| (repair.file().to_owned(), text)));
         }
         None
     }
 
-    /// Returns `true` if an error about the texts may follow from a repair.
-    fn causes(&self, repair: &Repair, error: &Error) -> bool {
-        let text = self.texts.get(&repair.text.page.path);
-        text.is_some_and(|text| repair.causes(error, text))
+    /// Returns the position of an error in the repaired text of its file.
+    fn spot(&self, error: &Error) -> Option<Spot> {
+        Spot::of(self.texts.get(&error.place()?.file)?, error)
     }
 
     /// Returns the repairs of the scene file that remove what names `file`, which cannot be repaired itself.
@@ -124,12 +133,13 @@ impl<'a> Search<'a> {
             name = name.take().or_else(|| (Path::new(written).file_stem() == stem).then(|| written.to_owned()));
             None
         });
-        name.map_or_else(Vec::new, |name| Repair::all(scene, &scene.page.about(&name, "", "")))
+        name.map_or_else(Vec::new, |name| Repair::all(scene, &scene.page.about(&name, "", ""), &SHIPPED))
     }
 
     /// Reads the repaired files, and returns the first error.
     fn read(&mut self) -> Option<Error> {
         self.readings += 1;
+        self.bytes += self.texts.get(&self.scene).map_or(0, |text| text.page.text.len());
         let texts = self.texts.iter().map(|(path, text)| (path.clone(), text.page.text.clone())).collect();
         let mut library = self.library.clone().renewed();
         library.replaced = texts;

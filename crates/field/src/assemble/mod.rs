@@ -219,6 +219,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     let sight = sight::sight(&drawn, &mut warnings)?;
     let estimate = estimate::estimate(&drawn, library, &sight)?;
     estimate.check(drawn.memory()).map_err(|(at, error)| page.blame(&at, error))?;
+    warnings.extend(estimate::slow(&drawn, &estimate));
     profiler.enter(Phase::Other);
     warnings.extend(plausibility::camera(&drawn));
     warnings.extend(plausibility::plants(&drawn, library)?);

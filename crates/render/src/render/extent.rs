@@ -43,7 +43,7 @@ impl Extent {
 /// leaves. Plants that would cover no pixel centre of the window even without occlusion are left out, and so are leaves
 /// that cover no pixel centre at all. Call it inside a pool.
 pub fn extents(scene: &Scene, labels: &LabelMap) -> BTreeMap<(u32, u16), Extent> {
-    whole_plants(scene, labels).extents
+    measure(scene, labels, |_, _| {})
 }
 
 /// Extents of plants and leaves, and the pixels that each plant would cover without occlusion.
@@ -63,6 +63,9 @@ pub struct WholeMask {
     pub window: Window,
     /// Whether each pixel of the area is covered, row by row.
     pub covered: Vec<bool>,
+    /// Left, top, width and height of the box around all pixels of the plant, those outside the window included: by the
+    /// image size to each side.
+    pub bounds: [i32; 4],
 }
 
 impl WholeMask {
@@ -83,6 +86,16 @@ impl WholeMask {
 
 /// Returns the [`extents`] of all plants together with their masks. Call it inside a pool.
 pub fn whole_plants(scene: &Scene, labels: &LabelMap) -> WholePlants {
+    let window = Area::of(labels.window);
+    let mut masks = BTreeMap::new();
+    let extents = measure(scene, labels, |plant, mask| {
+        masks.insert(plant, mask.within(window));
+    });
+    WholePlants { extents, masks }
+}
+
+/// Returns the [`extents`] of all plants. Calls `keep` with the number and mask of each.
+fn measure(scene: &Scene, labels: &LabelMap, mut keep: impl FnMut(u32, &Mask)) -> BTreeMap<(u32, u16), Extent> {
     let window = Area::of(labels.window);
     let seen = visible(labels);
     let reach = reach(&scene.camera);
@@ -110,7 +123,7 @@ pub fn whole_plants(scene: &Scene, labels: &LabelMap) -> WholePlants {
     let masks: Vec<Mask> = near.par_iter().map(|(key, thing)| thing.mask(**key, scene, &brute, labels)).collect();
 
     let visible = |key| seen.get(&key).map_or(0, |(count, _)| *count);
-    let (mut extents, mut whole) = (BTreeMap::new(), BTreeMap::new());
+    let mut extents = BTreeMap::new();
     for group in near.iter().zip(&masks).collect::<Vec<_>>().chunk_by(|a, b| a.0.0.0 == b.0.0.0) {
         let plant = group[0].0.0.0;
         let mut all = Mask::new(plants[&plant]);
@@ -128,10 +141,10 @@ pub fn whole_plants(scene: &Scene, labels: &LabelMap) -> WholePlants {
         if extent.unoccluded > 0 {
             extents.insert((plant, 0), extent);
             extents.extend(leaves);
-            whole.insert(plant, all.within(window));
+            keep(plant, &all);
         }
     }
-    WholePlants { extents, masks: whole }
+    extents
 }
 
 /// Returns the number of pixels of each (plant, leaf), where leaf 0 is everything of the plant that is not a leaf, and
@@ -305,7 +318,22 @@ impl Mask {
         };
         let covered = (part.y0..part.y1).flat_map(row).copied().collect();
         let [x0, y0, x1, y1] = [part.x0, part.y0, part.x1, part.y1].map(ToInt::to_u32);
-        WholeMask { window: Window { x0, y0, x1, y1 }, covered }
+        let around = self.bounds();
+        let bounds = [around.x0, around.y0, around.x1 - around.x0, around.y1 - around.y0];
+        WholeMask { window: Window { x0, y0, x1, y1 }, covered, bounds }
+    }
+
+    /// Returns the smallest area that contains the set.
+    fn bounds(&self) -> Area {
+        let mut bounds = Area::default();
+        for (row, y) in self.set.chunks(self.area.width().max(1)).zip(self.area.y0..) {
+            let first = row.iter().position(|set| *set);
+            if let Some((first, last)) = first.zip(row.iter().rposition(|set| *set)) {
+                let x = |column: usize| self.area.x0 + column.to_i32();
+                bounds = bounds.join(Area { x0: x(first), y0: y, x1: x(last) + 1, y1: y + 1 });
+            }
+        }
+        bounds
     }
 
     /// Counts the pixels inside the window and in total.

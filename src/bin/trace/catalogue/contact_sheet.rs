@@ -1,6 +1,6 @@
 //! The sheet of a species: one column of images per stage, below the stage's name, each image above a scale bar.
 
-use crate::letters;
+use furrow_output::letters;
 
 const PAPER: [u8; 3] = [251, 250, 247];
 /// Gap between images, pixels.

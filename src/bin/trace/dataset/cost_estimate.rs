@@ -4,10 +4,10 @@
 use crate::growing::Line;
 use furrow_base::Result;
 use furrow_base::math::{ToFloat, ToInt};
+use furrow_base::shell::quoted;
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Order;
-use furrow_dataset::deliver::cluster::quoted;
 use furrow_dataset::make::cost_estimate::{self, CostEstimate, Step};
 use furrow_job::Threads;
 use furrow_report::{count, number};

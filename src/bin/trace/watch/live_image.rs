@@ -4,7 +4,7 @@ use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::{Error, Result};
 use furrow_grow::plant::OrganKind;
 use furrow_job::{PreparedField, Renderer, View};
-use furrow_optics::sensor::Photograph;
+use furrow_optics::sensor::{Camera, Photograph};
 use furrow_output::ImageData as Png;
 use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
@@ -13,6 +13,11 @@ use furrow_render::scene::tag::Class;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Returns the width in pixels that a camera has in its scene file.
+pub(super) fn own_width(camera: &Camera) -> u32 {
+    (f64::from(camera.width()) / f64::from(camera.scale())).round_to()
+}
 
 /// How an image was rendered.
 #[derive(Clone, Copy, Default)]
@@ -48,6 +53,11 @@ impl LiveImage {
     /// Warnings of its field.
     pub(super) fn warnings(&self) -> &Vec<String> {
         &self.field.grown().warnings
+    }
+
+    /// Width of the scene's own camera, pixels.
+    pub(super) fn own_width(&self) -> u32 {
+        own_width(&self.field.grown().scene.camera)
     }
 
     /// Description for the page.

@@ -70,19 +70,39 @@ function loadPicture() {
   if (source === shownSource) return;
   loading = true;
   const next = new Image();
+  Object.assign(next.dataset, { view, asked: picture.asked });
   const done = () => { loading = false; loadPicture(); };
   next.onload = () => {
     shownSource = source;
     next.id = "picture";
     next.alt = "";
-    $("picture").replaceWith(next);
+    const last = $("picture");
+    last.replaceWith(next);
+    keepBefore(last, next.dataset);
     layOut();
+    showBefore();
     document.body.dataset.shown = source;
     done();
   };
   next.onerror = () => { shownSource = source; done(); };
   next.src = source;
 }
+
+// The element of the last image of the request before the one shown. Its address would show the new image.
+let comparing = false;
+function keepBefore(last, { asked }) {
+  if (!last.dataset.asked || last.dataset.asked === asked) return;
+  last.id = "before";
+  last.alt = "the image before the last change";
+  $("before").replaceWith(last);
+}
+function showBefore() {
+  const there = $("before").dataset.view === view;
+  $("before").hidden = !(comparing && there);
+  $("before-toggle").disabled = !there;
+  press($("before-toggle"), comparing && there);
+}
+function toggleBefore() { comparing = !comparing; showBefore(); }
 
 // CSS pixels per image pixel.
 function zoom() {
@@ -102,7 +122,7 @@ function layOut() {
   const z = zoom();
   $("frame").style.width = `${picture.width * z}px`;
   $("frame").style.height = `${picture.height * z}px`;
-  $("picture").classList.toggle("sharp", z >= 2.5);
+  for (const id of ["picture", "before"]) $(id).classList.toggle("sharp", z >= 2.5);
   // Show the photograph at the pixel scale of the scene's own camera.
   const photo = $("photo");
   if (photo.naturalWidth) {
@@ -165,6 +185,19 @@ async function explain() {
     $("explained").textContent = await (await fetch(`explain?x=${pixel.x}&y=${pixel.y}`)).text();
   } catch (error) {
     $("explained").textContent = error.message;
+  }
+}
+
+// --- The command ---
+
+// Browsers offer the clipboard only to pages of this machine or with encryption; elsewhere the text is selected.
+async function copyCommand() {
+  try {
+    await navigator.clipboard.writeText(state.command);
+    $("copy").textContent = "copied";
+    setTimeout(() => { $("copy").textContent = "copy"; }, 1500);
+  } catch {
+    getSelection().selectAllChildren($("command"));
   }
 }
 
@@ -309,6 +342,8 @@ function show() {
   $("warnings").replaceChildren(...(state.warnings).map((w) => make("li", { textContent: w })));
   $("warnings-panel").hidden = !$("warnings").childElementCount;
   if (state.photo && !photoSeen) { photoSeen = true; setPhoto("photo", null); }
+  $("command").textContent = state.command;
+  showBefore();
   showError();
   showStatus();
   showSliders();
@@ -358,7 +393,7 @@ const KEYS = {
   ",": () => step("seed", -1), ".": () => step("seed", 1), 0: () => wish({ seed: "file" }),
   "-": () => stepWidth(-1), "+": () => stepWidth(1), "=": () => stepWidth(1),
   f: toggleFit, s: () => wish({ sheet: !state.sheet.wanted }), p: togglePhoto, o: () => { if ($("beside").hidden) togglePhoto(); $("photo-input").click(); },
-  r: reset, d: () => document.querySelector(".slider input")?.focus(), Enter: explain,
+  b: toggleBefore, c: copyCommand, r: reset, d: () => document.querySelector(".slider input")?.focus(), Enter: explain,
   "?": () => $("help").open ? $("help").close() : $("help").showModal(),
   Escape: () => { if (state.sheet.wanted) wish({ sheet: false }); document.activeElement?.blur(); },
 };
@@ -403,6 +438,8 @@ $("seed-file").onclick = () => wish({ seed: "file" });
 $("width").onchange = () => wish({ width: Number($("width").value) });
 $("fit").onclick = toggleFit;
 $("sheet-toggle").onclick = KEYS.s;
+$("before-toggle").onclick = toggleBefore;
+$("copy").onclick = copyCommand;
 $("photo-toggle").onclick = togglePhoto;
 $("photo-file").onclick = () => $("photo-input").click();
 $("photo-input").onchange = () => {

@@ -4,6 +4,7 @@ use super::contact_sheet::ContactSheet;
 use super::live_image::LiveImage;
 use super::sliders::Slider;
 use furrow_base::ron_file::Assignment;
+use furrow_base::shell::quoted;
 use furrow_base::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -177,6 +178,23 @@ impl Session {
         (!inner.ended).then(|| (inner.version, self.describe(&inner)))
     }
 
+    /// Returns the command that renders the requested image, at most as wide as the camera of the last one.
+    fn command(&self, wish: &PageRequest, last: Option<&LiveImage>) -> String {
+        let mut words = vec!["trace".to_owned(), "--scene".into(), self.path.display().to_string()];
+        let mut option = |name: &str, value: String| words.extend([name.to_owned(), value]);
+        option("--index", wish.index.to_string());
+        if let Some(seed) = wish.seed {
+            option("--seed", seed.to_string());
+        }
+        option("--width", last.map_or(wish.width, |last| wish.width.min(last.own_width())).to_string());
+        option("--spp", self.spp.to_string());
+        let assigned = self.assigned.iter().map(Assignment::to_string);
+        for value in assigned.chain(wish.values.iter().map(|(path, value)| format!("{path}={value}"))) {
+            option("--set", value);
+        }
+        words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+    }
+
     fn describe(&self, inner: &Inner) -> Value {
         let Inner { wish, asked, version, shown, .. } = inner;
         let (expected_for, expected_warnings) = &shown.expected_warnings;
@@ -195,6 +213,7 @@ impl Session {
             "seed": wish.seed,
             "width": wish.width,
             "values": wish.values,
+            "command": self.command(wish, shown.picture.as_deref()),
             "warnings": warnings,
             "sliders": shown.sliders,
             "sheet": shown.sheet.about(wish.sheet),

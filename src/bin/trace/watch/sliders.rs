@@ -1,7 +1,8 @@
 //! Numbers of a scene file as sliders: previews of the field with other values, and writing a value into the file.
 
-use furrow_base::ron_file::{Assignment, Distribution, Quantity, Value, quantities};
+use furrow_base::ron_file::{Assignment, Distribution, Limits, Quantity, Value, limits, quantities};
 use furrow_base::{Error, Result};
+use furrow_field::desc::FieldDesc;
 use furrow_job::SceneFile;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -12,6 +13,10 @@ use std::path::Path;
 const STEPS: f64 = 200.0;
 /// Range of a slider for a normal distribution, in standard deviations from its centre.
 const BELL: f64 = 3.0;
+
+/// Largest ratio of a number's limits to twice its value with which its slider has the range of the limits. Wider limits,
+/// such as those of lengths, would leave the usual values on a few pixels of it.
+const WIDEST: f64 = 100.0;
 
 /// One number of the file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,12 +45,16 @@ pub(super) fn sliders(text: &str, assigned: &[Assignment]) -> Vec<Slider> {
         path.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
     };
     let free = |q: &Quantity| assigned.iter().all(|value| !within(&q.path, value.path()));
-    let mut all: Vec<Slider> = quantities(text).into_iter().filter(free).filter_map(|q| slider(text, &q)).collect();
+    let numbers = quantities(text);
+    let limits = limits::<FieldDesc>(&numbers);
+    let free = numbers.iter().zip(limits).filter(|(quantity, _)| free(quantity));
+    let mut all: Vec<Slider> = free.filter_map(|(quantity, limits)| slider(text, quantity, limits)).collect();
     all.sort_by_key(|slider| !slider.drawn);
     all
 }
 
-fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
+/// Returns the slider of a number with these limits.
+fn slider(text: &str, quantity: &Quantity, limits: Option<Limits>) -> Option<Slider> {
     let says = text[quantity.at.clone()].to_owned();
     let line = text[..quantity.at.start].matches('\n').count() + 1;
     // Whole numbers, if written without a decimal point.
@@ -55,9 +64,8 @@ fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
         // Seed and image size have their own controls in the page.
         Value::Fixed { .. } if quantity.path == "seed" => return None,
         Value::Fixed { number, whole } => {
-            let far = if *number == 0.0 { 1.0 } else { 2.0 * number.abs() };
-            let far = if *whole { far.max(10.0) } else { far };
-            (false, if *number < 0.0 { -far } else { 0.0 }, far, *number)
+            let [low, high] = range(quantity, *number, *whole, limits);
+            (false, low, high, *number)
         }
         Value::Drawn(Distribution::Uniform(low, high)) => (true, *low, *high, f64::midpoint(*low, *high)),
         Value::Drawn(Distribution::Normal { mean, sd, min, max }) => {
@@ -82,6 +90,19 @@ fn slider(text: &str, quantity: &Quantity) -> Option<Slider> {
     let step = if whole && high - low >= 2.0 { 1.0 } else { ((high - low) / STEPS).max(1e-9) };
     let at = if step == 1.0 { at.round() } else { at };
     Some(Slider { path: quantity.path.clone(), says, line, drawn, low, high, step, at, values })
+}
+
+/// Returns the range of the slider of a fixed number: its limits, or within them up to twice the number if they are much
+/// wider.
+fn range(quantity: &Quantity, number: f64, whole: bool, limits: Option<Limits>) -> [f64; 2] {
+    let far = if number == 0.0 { 1.0 } else { 2.0 * number.abs() };
+    let far = if whole { far.max(10.0) } else { far };
+    let usual = [if number < 0.0 { -far } else { 0.0 }, far];
+    let Some(Limits { min, max, above_min }) = limits else { return usual };
+    // All values of an angle are usual.
+    let all = quantity.path.ends_with("_deg") || max - min <= WIDEST * far;
+    let [low, high] = if all { [min, max] } else { [usual[0].max(min), usual[1].min(max)] };
+    [if above_min && low <= min { low + (high - low) / STEPS } else { low }, high]
 }
 
 /// Replaces the values at these paths in the text. Paths that do not exist are ignored.
@@ -154,10 +175,26 @@ mod tests {
         assert!((height.high - 1.2).abs() < 1e-9 && height.step < 0.01);
         assert_eq!(stage.values, [12.0, 14.0]);
         assert_eq!((n.low, n.high, n.step, n.at), (1.0, 9.0, 1.0, 5.0));
-        assert_eq!((yaw.drawn, yaw.low, yaw.high), (false, -10.0, 10.0));
+        assert!(!yaw.drawn && yaw.low <= -180.0 && yaw.high >= 180.0, "{yaw:?}");
         let assigned = [Assignment::parse("crops[0]=()").unwrap(), Assignment::parse("camera.yaw_deg=1").unwrap()];
         let paths: Vec<String> = sliders(TEXT, &assigned).into_iter().map(|s| s.path).collect();
         assert_eq!(paths, ["camera.height_m"]);
+    }
+
+    /// Rationale: a slider up to twice the value offers fractions above 1, which are refused, and hides most angles. Expected:
+    /// fractions and angles have the range of their type; a camera's height, which may be a kilometre, up to twice its value,
+    /// without the height 0 that is not allowed.
+    #[test]
+    fn fixed_numbers_reach_the_limits_of_their_type() {
+        let text = "Field(camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 60), \
+                    pose: Nadir(height_m: 0.85, yaw_deg: 1.5)), soil: (moisture: (mean: 0.8)))";
+        let all = sliders(text, &[]);
+        let of = |path: &str| all.iter().find(|s| s.path == path).unwrap_or_else(|| panic!("{path}: {all:?}"));
+        let moisture = of("soil.moisture.mean");
+        assert_eq!((moisture.low, moisture.high), (0.0, 1.0));
+        assert!(of("camera.pose.yaw_deg").high >= 180.0);
+        let height = of("camera.pose.height_m");
+        assert!(height.low > 0.0 && height.low < 0.02 && height.high == 1.7, "{height:?}");
     }
 
     /// Expected: distributions with empty bounds have no slider; they are reported when the file is read as a scene.

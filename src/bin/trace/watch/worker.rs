@@ -6,12 +6,12 @@
 
 use super::contact_sheet;
 use super::files::Files;
-use super::live_image::{LiveImage, RenderInfo};
+use super::live_image::{LiveImage, RenderInfo, own_width};
 use super::session::{PageRequest, Session};
 use super::sliders::{sliders, with};
 use super::tev::Tev;
 use furrow_base::error::Kind;
-use furrow_base::math::{RoundTo, ToInt};
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::RonFile;
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
@@ -139,8 +139,7 @@ impl Worker {
     fn grow(&mut self, scene: &SceneFile, wish: &PageRequest) -> Result<PreparedField> {
         let guess = self.own_width.map_or(wish.width, |own| own.min(wish.width));
         let field = scene.clone().width(guess).field(wish.index)?;
-        let camera = &field.grown().scene.camera;
-        let own = (f64::from(camera.width()) / f64::from(camera.scale())).round_to::<u32>();
+        let own = own_width(&field.grown().scene.camera);
         self.own_width = Some(own);
         let wanted = own.min(wish.width);
         if wanted == guess { Ok(field) } else { scene.clone().width(wanted).field(wish.index) }

@@ -16,7 +16,6 @@ mod script;
 mod slurm;
 
 pub use request::{Alerts, Job, Pod, Scheduler};
-pub use script::quoted;
 
 use crate::Set;
 use furrow_base::input::{refuse_links, tidy};

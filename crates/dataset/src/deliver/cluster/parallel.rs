@@ -1,9 +1,10 @@
 //! GNU parallel, on one machine or on several by ssh; xargs if it is not installed.
 
 use super::request::Job;
-use super::script::{fill, plain, quoted};
+use super::script::{fill, plain};
 use crate::File;
 use furrow_base::Result;
+use furrow_base::shell::quoted;
 
 /// Returns the script.
 pub(super) fn files(dir: &str, job: &Job) -> Result<Vec<File>> {

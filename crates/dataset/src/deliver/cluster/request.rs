@@ -1,7 +1,8 @@
 //! Settings of job files.
 
-use super::script::{expanded, quoted};
+use super::script::expanded;
 use crate::make::push::Push;
+use furrow_base::shell::quoted;
 use furrow_base::{Error, Result};
 use std::path::PathBuf;
 use std::time::Duration;

@@ -24,15 +24,6 @@ pub(super) fn name(dir: &str) -> String {
     if plain.is_empty() { "furrow".into() } else { format!("furrow-{plain}") }
 }
 
-/// Quotes a string so that the shell reads it as one word.
-pub fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
-}
-
 /// Quotes a string so that the shell reads it as one word and expands `$NAME` and `${NAME}` in it; everything else is
 /// literal. The script fails if a variable is empty or not set.
 pub(super) fn expanded(word: &str) -> String {
@@ -93,15 +84,6 @@ pub(super) fn fill(path: &str, template: &str, names: &[(&str, String)]) -> File
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn words_survive_a_shell() {
-        for word in ["/a/b.c", "it's here", "", "$(rm) \"x\" \\ `y` *", "@x"] {
-            let message =
-                std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
-            assert_eq!(String::from_utf8(message.unwrap().stdout).unwrap(), word);
-        }
-    }
 
     /// Expected: variables are expanded, including values with spaces and adjacent text; all other shell syntax is
     /// literal.

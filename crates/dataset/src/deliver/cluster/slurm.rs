@@ -1,9 +1,10 @@
 //! Slurm: a job array that renders, and a job that runs after it.
 
 use super::request::Job;
-use super::script::{fill, name, plain, quoted};
+use super::script::{fill, name, plain};
 use crate::File;
 use furrow_base::Result;
+use furrow_base::shell::quoted;
 use std::time::Duration;
 
 /// Returns the two jobs and the script that submits them.

@@ -3,20 +3,13 @@
 use font8x8::legacy::BASIC_LEGACY;
 
 /// Height of a letter in dots.
-pub(crate) const HEIGHT: usize = 8;
+pub const HEIGHT: usize = 8;
 /// Distance between letters in dots.
-pub(crate) const PITCH: usize = 8;
+pub const PITCH: usize = 8;
 
 /// Draws text into an image of this width, with its top left corner at (x, y). A dot is `dot` × `dot` pixels. Text
 /// outside the image is clipped; characters outside ASCII are blank.
-pub(crate) fn draw(
-    pixels: &mut [[u8; 3]],
-    width: usize,
-    words: &str,
-    (x, y): (usize, usize),
-    dot: usize,
-    ink: [u8; 3],
-) {
+pub fn draw(pixels: &mut [[u8; 3]], width: usize, words: &str, (x, y): (usize, usize), dot: usize, ink: [u8; 3]) {
     for (i, letter) in words.chars().enumerate() {
         let glyph = BASIC_LEGACY.get(letter as usize).copied().unwrap_or_default();
         for (row, bits) in glyph.into_iter().enumerate() {
