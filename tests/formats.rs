@@ -249,6 +249,7 @@ fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
             canopy: None,
             exposure: None,
             sampling: None,
+            quality: None,
             warnings: Vec::new(),
         },
         rgb: vec![[90, 80, 70]; 8],

@@ -83,6 +83,7 @@ mod pages;
 mod pixel_size;
 mod profile;
 mod python;
+mod quality;
 #[cfg(feature = "raster")]
 mod raster;
 mod reference;

@@ -49,6 +49,7 @@ class _Shared(TypedDict, total=False):
     denoise: bool
     engine: str
     without: Sequence[str]
+    quality: str
     max_depth: int
     clamp: float
     edit: str
@@ -212,7 +213,7 @@ def load(scene: PathLike) -> Scene:
 
 
 def _render(source: Dict[str, Any], options: RenderOptions, progress: bool) -> Image:
-    enough = options.get("target_error") is None and options.get("time") is None
+    enough = all(options.get(name) is None for name in ("target_error", "time", "quality"))
     arguments = _flags("render", {"spp": 16 if enough else None, **options}, RenderOptions)
     with _bar(progress) as show:
         request = {**source, "arguments": arguments, "progress": show is not None}
@@ -259,7 +260,7 @@ def _stream_flags(options: StreamOptions) -> List[str]:
     # Encode only the maps that become arrays. With labels only, neither bands nor samples per pixel apply.
     usual: Dict[str, Any] = {} if options.get("labels_only") else {"keep": "nir", "spp": 16}
     chosen = {**usual, **options}
-    if options.get("labels_only"):
+    if options.get("labels_only") or (options.get("quality") and "spp" not in options):
         chosen.pop("spp", None)
     return _flags("stream", chosen, StreamOptions)
 

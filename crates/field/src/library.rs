@@ -279,11 +279,18 @@ impl Library {
             self.pictures.insert(key, known.clone());
             return Ok((known, counted));
         }
-        let color = Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
-        let maps = if relief {
-            Maps::from_height(Height::load(&beside, relief_range).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?)
+        let color = || Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e));
+        let (color, maps) = if relief {
+            let height = || {
+                let height = Height::load(&beside, relief_range);
+                height.map(Maps::from_height).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))
+            };
+            let (color, maps) = rayon::join(color, height);
+            (color?, maps?)
         } else {
-            Maps::derive(&color, &HeightFromBrightness::LEAF)
+            let color = color()?;
+            let maps = Maps::derive(&color, &HeightFromBrightness::LEAF);
+            (color, maps)
         };
         let mask = color.alpha_mask().map(Arc::new);
         let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
@@ -436,12 +443,12 @@ impl Library {
             return Ok(known);
         }
         let wrong = |named: &Path, error| at_its_place(page, &named.to_string_lossy(), IMAGE_HELP, error);
-        let albedo = Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| wrong(&desc.albedo, e))?;
-        let albedo = albedo.wrapped(Wrap::Repeat);
-        let height = match height {
-            None => read_off(&albedo),
-            Some(height) => Height::load(&height, 1.0).map_err(|e| wrong(&desc.height, e))?,
-        };
+        let (albedo, height) = rayon::join(
+            || Texture::load(&albedo, ColorSpace::Srgb).map_err(|e| wrong(&desc.albedo, e)),
+            || height.map(|height| Height::load(&height, 1.0).map_err(|e| wrong(&desc.height, e))).transpose(),
+        );
+        let albedo = albedo?.wrapped(Wrap::Repeat);
+        let height = height?.unwrap_or_else(|| read_off(&albedo));
         let layer = Arc::new(Layer::new(albedo, height.wrapped(Wrap::Repeat)));
         self.layers.insert(key, layer.clone());
         Ok(layer)

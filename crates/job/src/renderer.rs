@@ -14,7 +14,7 @@ use furrow_render::accel;
 use furrow_render::film::Film;
 use furrow_render::integrator::{self, Integrator, World};
 use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
-use furrow_render::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
+use furrow_render::settings::{Engine, Preset, Quality, RenderOptions, Technique, Techniques};
 use std::time::{Duration, Instant};
 
 /// Seconds per pixel reserved for the sensor model and for writing files, if there is a time limit.
@@ -212,6 +212,7 @@ impl Renderer {
                 .techniques
                 .deviations()
                 .into_iter()
+                .chain(self.options.preset.map(Preset::deviation))
                 .chain(edit)
                 .chain(left_out.map(String::from))
                 .chain(grown.assigned.iter().map(|value| format!("set: {value}")))

@@ -190,7 +190,8 @@ impl SceneFile {
     /// Returns the warnings of field `index` that can be found without building it. [`Field::warnings`](furrow_field::Field) of the built
     /// field repeats them.
     pub fn expected_warnings(&self, index: u64) -> Result<Vec<String>> {
-        self.source.expected_warnings(&Options { index, ..self.options.clone() })
+        let options = Options { index, ..self.options.clone() };
+        self.threads.install(|| self.source.expected_warnings(&options))
     }
 
     /// Checks the scene file and the files that it names without building field `index`. Returns the warnings; an error contains all mistakes
@@ -219,7 +220,8 @@ impl SceneFile {
 
     /// Returns the expected number of plants in view of field `index`.
     pub(super) fn expected_plants(&self, index: u64) -> Result<f64> {
-        self.source.expected_plants(&Options { index, ..self.options.clone() })
+        let options = Options { index, ..self.options.clone() };
+        self.threads.install(|| self.source.expected_plants(&options))
     }
 
     /// Builds field `index` on its [day](Self::day). The result is always the same for the same file, seed and index; earlier fields are

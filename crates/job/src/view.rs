@@ -39,10 +39,12 @@ impl View {
     pub fn check(self, options: &RenderOptions) -> Result<()> {
         let techniques = &options.techniques;
         let path_only = techniques.left_out().iter().any(|technique| *technique != Technique::Qmc);
-        let limited = techniques.max_depth.is_some() || techniques.clamp.is_some();
+        let limited = techniques.max_depth.is_some() || techniques.clamp.is_some() || options.preset.is_some();
         if self != Self::Path && (path_only || limited || options.quality.denoise) {
-            return Err(Error::misuse("--without, --max-depth, --clamp and --denoise apply only to path tracing")
-                .help("use them with --integrator path"));
+            return Err(Error::misuse(
+                "--without, --max-depth, --clamp, --quality and --denoise apply only to path tracing",
+            )
+            .help("use them with --integrator path"));
         }
         Ok(())
     }

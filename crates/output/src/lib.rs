@@ -151,7 +151,7 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
     let overlay = overlay::draw(rgb, labels);
     let mut files = vec![
         ("rgb.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
-        ("nir.png", png::encode(w, h, &ImageData::Gray(&photograph.nir), &text)?),
+        ("nir.png", png::encode(w, h, &ImageData::Brightness(&photograph.nir), &text)?),
         ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
         ("semantics.png", png::encode(w, h, &ImageData::Indexed(&classes, &palette), &text)?),
         ("plants.png", png::encode(w, h, &ImageData::Numbers(&plants), &text)?),
@@ -172,7 +172,7 @@ pub fn denoised_files(film: &Film, photograph: &Photograph, provenance: &Provena
     let rgb = photograph.rgb.as_chunks::<3>().0;
     Ok(vec![
         ("rgb_denoised.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
-        ("nir_denoised.png", png::encode(w, h, &ImageData::Gray(&photograph.nir), &text)?),
+        ("nir_denoised.png", png::encode(w, h, &ImageData::Brightness(&photograph.nir), &text)?),
         ("denoised.exr", exr::encode_radiance(film, &text)?),
     ])
 }

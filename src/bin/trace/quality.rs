@@ -3,16 +3,16 @@
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use furrow_base::sampling::Sampler;
 use furrow_cli::cli;
-use furrow_render::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
+use furrow_render::settings::{Engine, Preset, Quality, RenderOptions, Technique, Techniques};
 use std::time::Duration;
 
 /// Sampling quality: when to stop adding samples.
 #[derive(clap::Args, Clone)]
-#[command(group = clap::ArgGroup::new("enough").multiple(true))]
+#[command(group = clap::ArgGroup::new("enough").multiple(true).conflicts_with("preset"))]
 pub(crate) struct QualityArgs {
-    /// Samples per pixel.
-    #[arg(long, default_value_t = Quality::SPP, value_parser = samples(), conflicts_with = "enough")]
-    spp: u32,
+    /// Samples per pixel. Default: 64, or 4 with --quality dataset.
+    #[arg(long, value_parser = samples(), conflicts_with = "enough")]
+    spp: Option<u32>,
     /// Sample each part of the image until its expected median relative error is this, such as 0.02 for 2 %.
     #[arg(long, value_name = "ERROR", value_parser = error, group = "enough")]
     target_error: Option<f32>,
@@ -26,11 +26,11 @@ pub(crate) struct QualityArgs {
 }
 
 impl QualityArgs {
-    /// Returns the selected quality.
-    pub(crate) fn quality(&self, denoise: bool) -> Quality {
+    /// Returns the selected quality; `technique` sets the default number of samples.
+    pub(crate) fn quality(&self, technique: &TechniqueArgs, denoise: bool) -> Quality {
         let Self { target_error, time, .. } = *self;
         let fixed = target_error.is_none() && time.is_none();
-        Quality { spp: if fixed { self.spp } else { self.max_spp }, target_error, time, denoise }
+        Quality { spp: if fixed { technique.spp(self.spp) } else { self.max_spp }, target_error, time, denoise }
     }
 }
 
@@ -44,6 +44,10 @@ pub(crate) struct TechniqueArgs {
     /// rasterizer's image changes.
     #[arg(long, value_parser = techniques(), value_delimiter = ',', value_name = "TECHNIQUE")]
     without: Vec<Technique>,
+    /// Preset of quality instead of the full integrator: `dataset` renders 4 samples per pixel of direct light and one
+    /// bounce. Introduces bias: light of further bounces is missing.
+    #[arg(long = "quality", id = "preset", value_name = "PRESET", value_parser = presets(), conflicts_with = "max_depth")]
+    preset: Option<Preset>,
     /// Maximum number of surfaces on a path. Default: 12. A small number introduces bias: light from longer paths is
     /// missing.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -57,7 +61,14 @@ pub(crate) struct TechniqueArgs {
 impl TechniqueArgs {
     /// Combines these techniques with a quality.
     pub(crate) fn options(&self, quality: Quality) -> RenderOptions {
-        RenderOptions::new(self.engine, quality, Techniques::new(&self.without, self.max_depth, self.clamp))
+        let max_depth = self.max_depth.or(self.preset.map(Preset::max_depth));
+        let techniques = Techniques::new(&self.without, max_depth, self.clamp);
+        RenderOptions { preset: self.preset, ..RenderOptions::new(self.engine, quality, techniques) }
+    }
+
+    /// Returns the number of samples per pixel: the given one, or else that of the preset or the default.
+    pub(crate) fn spp(&self, given: Option<u32>) -> u32 {
+        given.unwrap_or_else(|| self.preset.map_or(Quality::SPP, Preset::spp))
     }
 }
 
@@ -69,6 +80,12 @@ pub(crate) fn samples() -> clap::builder::RangedI64ValueParser<u32> {
 fn engines() -> impl TypedValueParser<Value = Engine> {
     let values = Engine::ALL.map(|(engine, help)| PossibleValue::new(engine.name()).help(help));
     PossibleValuesParser::new(values).map(|name| Engine::named(&name).unwrap_or_default())
+}
+
+fn presets() -> impl TypedValueParser<Value = Preset> {
+    let values = Preset::ALL.map(|(preset, help)| PossibleValue::new(preset.name()).help(help));
+    // The parser accepts only known names.
+    PossibleValuesParser::new(values).try_map(|name| Preset::named(&name).ok_or("no such preset"))
 }
 
 fn techniques() -> impl TypedValueParser<Value = Technique> {

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let profiler = args.profile.profiler();
     args.field.check()?;
     let edit = args.edit()?;
-    let options = edit.options(args.technique.options(args.quality.quality(args.denoise)));
+    let options = edit.options(args.technique.options(args.quality.quality(&args.technique, args.denoise)));
     if args.pixel.is_some() && options.engine == Engine::Raster {
         return Err(Error::misuse("--pixel has no effect with --engine raster, which has no rays")
             .help("use --engine trace, or leave it out"));
@@ -159,7 +159,7 @@ impl Args {
         then: impl FnOnce(Made<'_>) -> Result<T>,
     ) -> Result<T> {
         let begin = Instant::now();
-        let options = self.edit()?.options(self.technique.options(self.quality.quality(self.denoise)));
+        let options = self.edit()?.options(self.technique.options(self.quality.quality(&self.technique, self.denoise)));
         self.integrator.check(&options)?;
         let renderer = Renderer::open(&options)?;
         let scene = self.field.of(scene.threads(&Threads::new(self.threads)?))?;

@@ -81,6 +81,7 @@ mod tests {
                 split: Split::Train,
                 capture: None,
                 sampling: None,
+                quality: None,
                 width,
                 height,
                 classes: Vec::new(),

@@ -163,6 +163,7 @@ mod tests {
             canopy: None,
             exposure: None,
             sampling: None,
+            quality: None,
             warnings: Vec::new(),
         }
     }

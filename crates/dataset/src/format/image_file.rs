@@ -18,7 +18,7 @@ pub(super) fn photograph(sample: &Sample, path: &str) -> Result<File> {
 
 /// Returns the near-infrared image in the same way.
 pub(super) fn near_infrared(sample: &Sample, path: &str) -> Result<File> {
-    stored(sample, path, |jpeg| &jpeg.nir, &ImageData::Gray(&sample.nir))
+    stored(sample, path, |jpeg| &jpeg.nir, &ImageData::Brightness(&sample.nir))
 }
 
 fn stored(sample: &Sample, path: &str, of: impl Fn(&Jpegs) -> &Vec<u8>, picture: &ImageData<'_>) -> Result<File> {

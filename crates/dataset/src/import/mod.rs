@@ -203,6 +203,7 @@ fn sample(recipe: &Recipe, listed: &SourceImage, index: u64, read: Labelled) -> 
             canopy: None,
             exposure: None,
             sampling: None,
+            quality: None,
             warnings: read.warnings,
         },
         rgb: read.rgb,

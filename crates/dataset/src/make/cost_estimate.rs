@@ -25,6 +25,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, report};
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
+use furrow_base::sampling::Sampler;
 use furrow_base::{Error, Result};
 use furrow_job::{Renderer, SceneFile, Threads};
 use furrow_render::render::RenderMonitor;
@@ -34,15 +35,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A probe is rendered with the image's samples divided by this number, but with at least [`FEWEST`] samples, or all of
-/// them if the image has fewer.
-const SHARE: u32 = 3;
-/// Smallest number of samples of a probe: fewer samples give no reliable time per sample.
-const FEWEST: u32 = 8;
+/// Samples of all pixels of a probe's second rendering: about 1.5 core seconds, hundred times the resolution of the clock.
+const SAMPLES: u64 = 700_000;
+/// Smallest number of samples per pixel of a probe's second rendering: the first has fewer.
+const FEWEST: u64 = 2;
 /// Smallest number of probes, whatever time they take, and largest number.
 const PROBES: [usize; 2] = [3, 16];
-/// Core seconds after which no further probe is rendered, once the smallest number is reached.
-const LONG_ENOUGH_S: f64 = 20.0;
+/// Core seconds of the process within which further probes must end, once the smallest number is reached.
+const LONG_ENOUGH_S: f64 = 13.0;
 /// Ratio of the numbers of samples of a probe's second and first rendering.
 const STEP: u32 = 4;
 /// Approximate length of an image's row in the timing log, bytes.
@@ -144,8 +144,11 @@ pub fn estimate_cost(
     let some = probed(recipe.count);
     let (least, most) = (PROBES[0].min(some.len()), some.len());
     for (drawn, index) in some.into_iter().enumerate() {
-        if drawn >= PROBES[0] && cpu()? - start > LONG_ENOUGH_S {
-            break;
+        if drawn >= PROBES[0] {
+            let taken = cpu()?;
+            if taken + (taken - start) / drawn.to_f64() > LONG_ENOUGH_S {
+                break;
+            }
         }
         begun(Step::Image { number: drawn + 1, least, most });
         match threads.install(|| images.probe(index, stop)) {
@@ -285,9 +288,11 @@ impl Images {
         if let ImageOrigin::Rendered(rendering) = &mut recipe.made {
             rendering.scene_sha256 = scene_sha256;
         }
-        let options = recipe.rendering()?.options();
+        let rendering = recipe.rendering()?;
+        let options = rendering.options();
         let spp = options.quality.spp;
-        let many = (spp / SHARE).max(FEWEST).min(spp);
+        let pixels = u64::from(rendering.width) * u64::from(rendering.height);
+        let many = (SAMPLES / pixels.max(1)).clamp(FEWEST, u64::from(Sampler::MAX_SAMPLES)).to_u32().min(spp);
         let drawn = [(many / STEP).max(1), many];
         let quality = |spp| Quality { spp, ..options.quality };
         let opened = |spp| Renderer::open(&RenderOptions { quality: quality(spp), ..options.clone() });

@@ -226,6 +226,7 @@ pub(crate) fn rendering(source: &SceneFile, field: &Field, options: &RenderOptio
         without: options.techniques.left_out().to_vec(),
         max_depth: options.techniques.max_depth,
         clamp: options.techniques.clamp,
+        quality: options.preset,
         parts: false,
         models: field.models.clone(),
         keep: OptionalMap::USUAL.to_vec(),

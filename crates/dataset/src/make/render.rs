@@ -188,6 +188,7 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
         bands: Some(photograph.shot),
     });
     sample.record.sampling = if denoised.is_none() { film.sampling() } else { None };
+    sample.record.quality = recipe.rendering()?.quality;
     sample.rgb = photograph.rgb.as_chunks::<3>().0.to_vec();
     if recipe.keeps(OptionalMap::Nir) {
         sample.nir = photograph.nir;
@@ -250,6 +251,7 @@ fn labelled(
             canopy: None,
             exposure: None,
             sampling: None,
+            quality: None,
             warnings: field.warnings.clone(),
         },
         rgb: Vec::new(),

@@ -14,7 +14,7 @@ use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::{self, Edit};
 use furrow_field::record::SpeciesRecord;
-use furrow_render::settings::{Engine, Quality, RenderOptions, Technique, Techniques};
+use furrow_render::settings::{Engine, Preset, Quality, RenderOptions, Technique, Techniques};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -93,6 +93,9 @@ pub struct Rendering {
     pub max_depth: Option<u32>,
     /// Maximum radiance of a path; null for no limit.
     pub clamp: Option<f32>,
+    /// Preset of quality; omitted for the full integrator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Preset>,
     /// Whether images have a `parts.png`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub parts: bool,
@@ -158,6 +161,7 @@ impl Rendering {
             engine: self.engine,
             quality: Quality { denoise: self.denoise, ..Quality::spp(self.spp) },
             techniques,
+            preset: self.quality,
         }
     }
 }

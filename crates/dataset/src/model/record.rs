@@ -8,6 +8,7 @@ use furrow_grow::plant::Condition;
 use furrow_optics::sensor::ShotRecord;
 use furrow_render::film::Sampling;
 use furrow_render::scene::tag::{Class, lowercase};
+use furrow_render::settings::Preset;
 use serde::{Deserialize, Serialize, Serializer, ser};
 
 /// Record of one image.
@@ -53,6 +54,9 @@ pub struct Record {
     /// Sampling noise of the image; omitted if it is unknown, and for a denoised image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
+    /// Preset of quality of the image, which is biased; omitted for the full integrator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Preset>,
     /// Warnings for the author of the scene file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,

@@ -78,6 +78,7 @@ mod tests {
             canopy: None,
             exposure: None,
             sampling: None,
+            quality: None,
             warnings: Vec::new(),
         };
         let mut sample = Sample {

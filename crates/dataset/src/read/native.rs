@@ -76,7 +76,7 @@ pub fn files(recipe: &Recipe, sample: &Sample, text: &str) -> Result<Vec<File>> 
             add("rgb.png", &|| furrow_output::encode_png(w, h, &ImageData::Rgb(&sample.rgb), of_photograph))?;
         }
         if !sample.nir.is_empty() {
-            add("nir.png", &|| furrow_output::encode_png(w, h, &ImageData::Gray(&sample.nir), of_photograph))?;
+            add("nir.png", &|| furrow_output::encode_png(w, h, &ImageData::Brightness(&sample.nir), of_photograph))?;
         }
     }
     add("semantics.png", &|| png(&ImageData::Indexed(&sample.semantics, &colors)))?;

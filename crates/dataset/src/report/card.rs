@@ -67,6 +67,7 @@ pub(super) fn provenance(recipe: &Recipe) -> Markup {
             let mut deviations: Vec<String> = made.without.iter().map(|t| format!("without {}", t.name())).collect();
             deviations.extend(made.max_depth.map(|n| format!("at most {n} surfaces on a path")));
             deviations.extend(made.clamp.map(|x| format!("radiance of a path clamped to {x}")));
+            deviations.extend(made.quality.map(|preset| format!("quality {} ({})", preset.name(), preset.bias())));
             deviations.extend(made.edit.as_ref().map(|name| format!("edit {name}")));
             if !deviations.is_empty() {
                 rows.push(("deviations", html! { (deviations.join(", ")) }));

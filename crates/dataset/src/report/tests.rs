@@ -45,6 +45,7 @@ fn record(conditions: Option<Conditions>) -> Record {
         canopy: None,
         exposure: None,
         sampling: None,
+        quality: None,
         warnings: Vec::new(),
     }
 }

@@ -39,6 +39,7 @@ fn rasterized(options: &mut RenderOptions) {
     options.engine = Engine::Raster;
     options.quality = Quality::spp(1);
     options.techniques.max_depth = None;
+    options.preset = None;
 }
 
 /// Defines an edit of the materials.

@@ -18,6 +18,7 @@ use super::hosek::HosekWilkie;
 use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec3, vec3};
 use furrow_base::sampling::distribution::Distribution2D;
+use rayon::prelude::*;
 
 /// Cells along a side of the square.
 const SIDE: usize = 128;
@@ -60,6 +61,7 @@ impl Dome {
     /// Tabulates a shape without scaling.
     fn bake(shape: Shape) -> Self {
         let cells = (0..SIDE * SIDE)
+            .into_par_iter()
             .map(|cell| {
                 let mut sum = Spectrum::ZERO;
                 let mut weight = 0.0;

@@ -79,8 +79,7 @@ impl Maps {
 
     /// Derives the maps from generated or measured heights in image lengths.
     pub fn from_height(height: Height) -> Self {
-        let normal = NormalMap::new(&height);
-        let occlusion = AmbientOcclusion::new(&height);
+        let (normal, occlusion) = rayon::join(|| NormalMap::new(&height), || AmbientOcclusion::new(&height));
         Self { height, normal, occlusion }
     }
 }

@@ -79,12 +79,12 @@ pub(crate) struct ContentArgs {
 /// How images are rendered.
 #[derive(clap::Args)]
 pub(crate) struct RenderingArgs {
-    /// Samples per pixel.
-    #[arg(long, default_value_t = Quality::SPP, value_parser = samples())]
-    spp: u32,
+    /// Samples per pixel. Default: 64, or 4 with --quality dataset.
+    #[arg(long, value_parser = samples())]
+    spp: Option<u32>,
     /// Write labels and records of the same fields, without images. No light or sensor is simulated; --keep accepts
     /// only depth, normals and label maps, name depth and normals explicitly: --keep depth,normals.
-    #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "max_depth", "clamp"])]
+    #[arg(long, conflicts_with_all = ["spp", "denoise", "engine", "without", "preset", "max_depth", "clamp"])]
     pub(crate) labels_only: bool,
     /// Denoise the images; needs Open Image Denoise.
     #[arg(long)]
@@ -182,7 +182,7 @@ pub(crate) fn begin(folder: &Path, mut order: Order, quiet: bool, signals: &Sign
 impl RenderingArgs {
     /// Rendering options without an edit.
     pub(crate) fn options(&self) -> RenderOptions {
-        let spp = if self.labels_only { 1 } else { self.spp };
+        let spp = if self.labels_only { 1 } else { self.technique.spp(self.spp) };
         self.technique.options(Quality { denoise: self.denoise, ..Quality::spp(spp) })
     }
 }
