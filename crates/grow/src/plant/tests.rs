@@ -360,8 +360,10 @@ fn triangles_stay_within_budget() {
             ("STEME", 20..) | ("POROL", 19..) => 60_000,
             // Broad lobes have twice the triangles of fine ones.
             ("DAUCA", _) => 32_000,
-            ("TRZAX" | "HORVX" | "ORYSA" | "SETVI" | "DIGSA", 22..) => 24_000,
-            ("ARHHY", 14..) | ("CONAR", 16..) | ("CIRAR" | "MATIN", _) => 24_000,
+            ("TRZAX" | "HORVX" | "ORYSA" | "SETVI" | "DIGSA", 22..)
+            | ("ARHHY", 14..)
+            | ("CONAR", 16..)
+            | ("CIRAR" | "MATIN", _) => 24_000,
             ("BRSOB" | "BRSOL" | "CAPBP" | "ARHHY" | "GLXMA" | "PHSVX" | "PIBSX" | "LYPES", _) => 14_000,
             // Up to six stems.
             ("SOLTU", _) => 70_000,
