@@ -2,7 +2,7 @@
 
 /// Names in American and British English, German, French and Spanish, by the species file's name without `.ron`. Crops have
 /// the EPPO codes of their species and varieties too.
-pub(super) const ALIASES: [(&str, &[&str]); 30] = [
+pub(super) const ALIASES: [(&str, &[&str]); 45] = [
     (
         "alopecurus",
         &["blackgrass", "slender meadow foxtail", "Acker-Fuchsschwanz", "vulpin des champs", "cola de zorra"],
@@ -11,6 +11,9 @@ pub(super) const ALIASES: [(&str, &[&str]); 30] = [
         "amaranthus",
         &["pigweed", "common amaranth", "Zurückgebogener Amarant", "Amarant", "amarante réfléchie", "bledo"],
     ),
+    ("barley", &["Gerste", "Sommergerste", "orge", "cebada"]),
+    ("bean", &["French bean", "green bean", "bush bean", "Buschbohne", "Gartenbohne", "haricot", "judía", "frijol"]),
+    ("cabbage", &["cabbage", "Weißkohl", "Kopfkohl", "Weißkraut", "chou cabus", "chou pommé", "repollo"]),
     ("capsella", &["Hirtentäschel", "Hirtentäschelkraut", "bourse-à-pasteur", "bolsa de pastor"]),
     ("carrot", &["Möhre", "Karotte", "carotte", "zanahoria", "DAUCS"]),
     ("cauliflower", &["Blumenkohl", "Karfiol", "chou-fleur", "coliflor"]),
@@ -23,8 +26,32 @@ pub(super) const ALIASES: [(&str, &[&str]); 30] = [
         &["Canada thistle", "field thistle", "Acker-Kratzdistel", "Ackerkratzdistel", "chardon des champs", "cardo"],
     ),
     ("convolvulus", &["Ackerwinde", "Acker-Winde", "liseron des champs", "correhuela"]),
+    ("cyperus", &["nutsedge", "yellow nutgrass", "Erdmandelgras", "Erdmandel", "souchet comestible", "chufa"]),
+    (
+        "digitaria",
+        &[
+            "crabgrass",
+            "hairy crabgrass",
+            "hairy finger-grass",
+            "Bluthirse",
+            "Blutrote Fingerhirse",
+            "digitaire sanguine",
+            "garranchuelo",
+        ],
+    ),
     ("echinochloa", &["barnyardgrass", "cockspur", "Hühnerhirse", "panic pied-de-coq", "panic", "pata de gallo"]),
     ("fallopia", &["wild buckwheat", "climbing buckwheat", "Windenknöterich", "renouée liseron", "polígono trepador"]),
+    (
+        "galinsoga",
+        &[
+            "smallflower galinsoga",
+            "quickweed",
+            "Kleinblütiges Franzosenkraut",
+            "Franzosenkraut",
+            "galinsoga à petites fleurs",
+            "soldado galante",
+        ],
+    ),
     (
         "galium",
         &[
@@ -38,7 +65,9 @@ pub(super) const ALIASES: [(&str, &[&str]); 30] = [
     ),
     ("lettuce", &["Salat", "Kopfsalat", "laitue", "lechuga"]),
     ("maize", &["corn", "sweet corn", "Mais", "maïs", "maíz"]),
+    ("onion", &["Zwiebel", "Speisezwiebel", "oignon", "cebolla"]),
     ("papaver", &["corn poppy", "field poppy", "Klatschmohn", "coquelicot", "amapola"]),
+    ("pea", &["garden pea", "field pea", "Erbse", "pois", "guisante", "arveja"]),
     ("peanut", &["groundnut", "Erdnuss", "arachide", "cacahuète", "cacahuete", "maní"]),
     (
         "persicaria",
@@ -46,17 +75,44 @@ pub(super) const ALIASES: [(&str, &[&str]); 30] = [
     ),
     ("plantago", &["buckhorn plantain", "ribwort", "Spitzwegerich", "plantain lancéolé", "llantén menor"]),
     ("poa", &["annual bluegrass", "Einjähriges Rispengras", "pâturin annuel", "poa anual"]),
+    ("portulaca", &["purslane", "Portulak", "Gemüse-Portulak", "pourpier", "pourpier maraîcher", "verdolaga"]),
     ("potato", &["Kartoffel", "Erdapfel", "pomme de terre", "patata", "papa"]),
     ("rape", &["canola", "oilseed rape", "rapeseed", "Raps", "Winterraps", "colza", "BRSNN"]),
+    ("rice", &["Reis", "riz", "arroz"]),
     ("senecio", &["common groundsel", "Gemeines Greiskraut", "Kreuzkraut", "séneçon commun", "hierba cana"]),
+    (
+        "setaria",
+        &[
+            "green bristle-grass",
+            "green bristlegrass",
+            "Grüne Borstenhirse",
+            "Borstenhirse",
+            "sétaire verte",
+            "almorejo",
+        ],
+    ),
     (
         "sinapis",
         &["wild mustard", "field mustard", "Ackersenf", "Acker-Senf", "moutarde des champs", "mostaza silvestre"],
     ),
+    ("solanum", &["nightshade", "Schwarzer Nachtschatten", "morelle noire", "hierba mora"]),
+    (
+        "sonchus",
+        &[
+            "smooth sow-thistle",
+            "common sowthistle",
+            "Kohl-Gänsedistel",
+            "Gänsedistel",
+            "laiteron maraîcher",
+            "cerraja",
+        ],
+    ),
     ("soybean", &["soya bean", "soya", "soy", "Sojabohne", "Soja", "soja"]),
+    ("spinach", &["Spinat", "épinard", "espinaca"]),
     ("stellaria", &["common chickweed", "Vogelmiere", "mouron des oiseaux", "stellaire intermédiaire", "pamplina"]),
     ("sugar_beet", &["sugarbeet", "beet", "Zuckerrübe", "Rübe", "betterave", "betterave sucrière", "remolacha"]),
     ("sunflower", &["Sonnenblume", "tournesol", "girasol"]),
+    ("tomato", &["Tomate", "Paradeiser", "tomate"]),
     (
         "tripleurospermum",
         &["false mayweed", "scentless chamomile", "Geruchlose Kamille", "matricaire inodore", "manzanilla inodora"],

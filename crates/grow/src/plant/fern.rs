@@ -10,6 +10,9 @@ use super::skeleton::Skeleton;
 use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3, lerp, vec3};
 use furrow_base::sampling::{Purpose, Stream};
 
+/// Width of the broadest lobes of a leaf, relative to the leaf's width.
+const BROADEST: f32 = 0.14;
+
 /// An axis of the blade and the parameters of its branches.
 struct FernAxis {
     start: Vec3,
@@ -23,48 +26,69 @@ struct FernAxis {
     reach: f32,
 }
 
-/// Builds the rest mesh of a blade of `width` with `pairs` of pinnae and `pinnules` pairs of pinnules on the longest
-/// pinna. `segment` is the width of a segment, `cell` the shortest cell of the mesh, all in metres.
-pub(super) fn blade(
-    (pairs, pinnules): (usize, usize),
-    segment: f32,
-    (width, cell): (f32, f32),
-    skeleton: &Skeleton,
-    stream: &mut Stream,
-) -> RestMesh {
-    let length = skeleton.length();
-    // Small leaves have fewer, not finer, segments.
-    let (pairs, pinnules) = (pairs.min(MOST).to_f32(), pinnules.min(MOST).to_f32());
-    let pairs = pairs.min(length / (2.4 * segment)).max(1.0);
-    let half_width = |t: f32| half_width(t) * width;
-    let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
-    ribbons.strip(
-        Vec3::ZERO,
-        vec3(0.0, length, 0.0),
-        Vec3::Z,
-        Vec3::ZERO,
-        segment,
-        2 * pairs.min(8.0).trunc_to::<u32>(),
-    );
-    let whole =
-        FernAxis { start: Vec3::ZERO, along: vec3(0.0, length, 0.0), up: Vec3::Z, pairs, reach: 0.5 * width / length };
-    // Branches shorter than a segment's width are not built yet.
-    let is_seen = |limb: &FernAxis| limb.along.length() > segment;
-    for (pinna, mut own) in branches(&whole, stream) {
-        let share = pinna.along.length() / (0.5 * width);
-        let pinna = FernAxis { pairs: pinnules * share, reach: 0.42, ..pinna };
-        let bow = pinna.up * (pinna.along.length() * own.range32(-0.12, 0.12));
-        ribbons.strip(pinna.start, pinna.along, pinna.up, bow, 0.8 * segment, 2);
-        for (pinnule, own) in branches(&pinna, &own).into_iter().filter(|(pinnule, _)| is_seen(pinnule)) {
-            let long = pinnule.along.length();
-            ribbons.strip(pinnule.start, pinnule.along, pinnule.up, Vec3::ZERO, segment, 1);
-            let pinnule = FernAxis { pairs: (long / (2.6 * segment)).min(2.0), reach: 0.5, ..pinnule };
-            for (lobe, _) in branches(&pinnule, &own).into_iter().filter(|(lobe, _)| is_seen(lobe)) {
-                ribbons.strip(lobe.start, lobe.along, lobe.up, Vec3::ZERO, 0.9 * segment, 1);
+/// Plan of a blade. Lengths in metres.
+pub(super) struct Fern {
+    /// Number of pairs of pinnae, and of pairs of pinnules on the longest pinna.
+    pub(super) counts: (usize, usize),
+    /// Width of a segment.
+    pub(super) segment: f32,
+    /// Width of the last lobes, in segments.
+    pub(super) breadth: f32,
+    /// Width of the blade.
+    pub(super) width: f32,
+    /// Shortest cell of the mesh.
+    pub(super) cell: f32,
+}
+
+impl Fern {
+    /// Builds the rest mesh.
+    pub(super) fn blade(&self, skeleton: &Skeleton, stream: &mut Stream) -> RestMesh {
+        let &Self { counts: (pairs, pinnules), segment, breadth, width, cell } = self;
+        let length = skeleton.length();
+        // Broad lobes grow with the blade; they need the room of several segments.
+        let breadth = breadth.min(BROADEST * width / segment).max(1.0);
+        let room = breadth.powf(0.7);
+        // Small leaves have fewer, not finer, segments.
+        let (pairs, pinnules) = (pairs.min(MOST).to_f32(), pinnules.min(MOST).to_f32() / room);
+        let pairs = pairs.min(length / (2.4 * segment * room)).max(1.0);
+        let half_width = |t: f32| half_width(t) * width;
+        let mut ribbons = Ribbons::new(skeleton, &half_width, segment, cell);
+        ribbons.strip(
+            Vec3::ZERO,
+            vec3(0.0, length, 0.0),
+            Vec3::Z,
+            Vec3::ZERO,
+            segment,
+            2 * pairs.min(8.0).trunc_to::<u32>(),
+        );
+        let whole = FernAxis {
+            start: Vec3::ZERO,
+            along: vec3(0.0, length, 0.0),
+            up: Vec3::Z,
+            pairs,
+            reach: 0.5 * width / length,
+        };
+        // Branches shorter than a segment's width are not built yet.
+        let is_seen = |limb: &FernAxis| limb.along.length() > segment;
+        for (pinna, mut own) in branches(&whole, stream) {
+            let share = pinna.along.length() / (0.5 * width);
+            let pinna = FernAxis { pairs: pinnules * share, reach: 0.42, ..pinna };
+            let bow = pinna.up * (pinna.along.length() * own.range32(-0.12, 0.12));
+            ribbons.strip(pinna.start, pinna.along, pinna.up, bow, 0.8 * segment, 2);
+            if breadth > 1.0 {
+                ribbons.lobe(pinna.start + 0.5 * pinna.along + 0.25 * bow, 0.5 * pinna.along, pinna.up, breadth);
+            }
+            for (pinnule, own) in branches(&pinna, &own).into_iter().filter(|(pinnule, _)| is_seen(pinnule)) {
+                let long = pinnule.along.length();
+                ribbons.lobe(pinnule.start, pinnule.along, pinnule.up, breadth);
+                let pinnule = FernAxis { pairs: (long / (2.6 * segment * room)).min(2.0), reach: 0.5, ..pinnule };
+                for (lobe, _) in branches(&pinnule, &own).into_iter().filter(|(lobe, _)| is_seen(lobe)) {
+                    ribbons.lobe(lobe.start, lobe.along, lobe.up, 0.9 * breadth);
+                }
             }
         }
+        ribbons.rest
     }
-    ribbons.rest
 }
 
 /// Returns the length of branches at the fraction `t` of their axis, relative to the longest.

@@ -43,6 +43,8 @@ pub(super) struct LeafState<'a> {
     pub(super) rigged: bool,
     /// Random stream of this leaf.
     pub(super) stream: Stream,
+    /// Random stream of the plant, for properties that all its leaves share.
+    pub(super) plant: &'a Stream,
 }
 
 /// The plant at the current age, before any geometry is built.
@@ -221,6 +223,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         let n = layer.leaves.get().trunc_to::<u32>();
         for i in 0..n {
             number += 1;
+            let plant = stream;
             let mut stream = stream.child(Purpose::Leaf, u64::from(number));
             let size = desc.size.draw32(&mut stream) * vigour;
             let jitter = desc.azimuth_deg.draw32(&mut stream).to_radians();
@@ -252,6 +255,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 cell: CELL,
                 rigged: false,
                 stream,
+                plant,
             });
         }
     }

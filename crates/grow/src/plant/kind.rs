@@ -36,6 +36,10 @@ pub enum Shape {
         pinnules: Vary<PositiveCount>,
         /// Width of a segment.
         segment_mm: Vary<Positive<10_000>>,
+        /// Width of the last lobes, in segments, drawn once for each plant: 1 for finely cut leaves, 3 for cultivars with
+        /// broad flat lobes. Broader lobes are fewer.
+        #[serde(default = "vary::<Positive<100>, 1>", skip_serializing_if = "is_one")]
+        breadth: Vary<Positive<100>>,
     },
     /// Leaflets on a rachis, each a sheet within an outline: two pairs for peanut; one pair and a terminal leaflet for
     /// soybean. The blade's width is the span of the lowest pair; the length of the rachis is given by `rib`.
@@ -268,6 +272,10 @@ fn level() -> (Vary<Signed<3600>>, Vary<Signed<3600>>) {
 
 fn is_level(bends: &(Vary<Signed<3600>>, Vary<Signed<3600>>)) -> bool {
     *bends == level()
+}
+
+fn is_one(breadth: &Vary<Positive<100>>) -> bool {
+    *breadth == vary::<Positive<100>, 1>()
 }
 
 fn blade() -> OrganKind {

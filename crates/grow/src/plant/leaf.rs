@@ -1,7 +1,7 @@
 //! Builds one leaf: poses its skeleton and bends blade and stalk with it.
 
 use super::blade::{self, RestMesh};
-use super::fern;
+use super::fern::{self, Fern};
 use super::growth::{CELL, LeafState};
 use super::kind::Shape;
 use super::leaflets;
@@ -16,7 +16,7 @@ use super::stipules;
 use super::tube::{self, Profile, Ring};
 use furrow_base::geometry::outline::Outline;
 use furrow_base::math::{Mat3, RoundTo, ToFloat, Vec3, lerp, smoothstep, vec3};
-use furrow_base::sampling::Stream;
+use furrow_base::sampling::{Purpose, Stream};
 
 /// Number of vertices around a stalk.
 const SIDES: u32 = 9;
@@ -57,7 +57,7 @@ pub(super) enum Lower {
 /// Builds a leaf and adds its organs.
 pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lower: Lower) {
     // Posture and relief have separate streams, so that changes to the relief never change the posture.
-    let mut stream = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 100);
+    let mut stream = leaf.stream.child(Purpose::Leaf, 100);
     let mut skeleton = Skeleton::new(&measures(leaf));
     let root = stand(leaf, seat, lower, &mut stream);
     pose(&mut skeleton, leaf, root, lower, &mut stream);
@@ -65,18 +65,18 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lo
         skeleton.straighten();
     }
     let motions = skeleton.motions(root);
-    let mut stream = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 101);
+    let mut stream = leaf.stream.child(Purpose::Leaf, 101);
     let relief = relief(leaf, &mut stream);
     let mut spined = RestMesh::default();
     let rest = match &leaf.kind.shape {
         Shape::Sheet { outline } => {
             let (rows, columns) = cells(leaf);
             let mut sheet = blade::sheet(*outline, leaf.width, rows, columns, &skeleton);
-            let mut own = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 102);
+            let mut own = leaf.stream.child(Purpose::Leaf, 102);
             LeafOutline::draw(leaf.kind.margin_sd.f32(), &mut own).apply(&mut sheet, leaf.blade);
             relief.apply(&mut sheet, leaf.blade);
             if let Some(spines) = &leaf.kind.spines {
-                let mut own = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 104);
+                let mut own = leaf.stream.child(Purpose::Leaf, 104);
                 spined = spines::grow(&sheet, spines, leaf.blade, &mut own);
             }
             sheet.rest
@@ -88,10 +88,12 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lo
             let division = Division { pairs, lobes, bare: bare.f32().min(MOST_BARE), segment, cell: leaf.cell };
             pressed(leaf, ribbons::blade(division, leaf.width, &skeleton, &mut stream))
         }
-        Shape::Fern { pairs, pinnules, segment_mm } => {
+        Shape::Fern { pairs, pinnules, segment_mm, breadth } => {
             let counts = (pairs.draw(&mut stream).trunc_to::<usize>(), pinnules.draw(&mut stream).trunc_to::<usize>());
             let segment = segment_mm.draw32(&mut stream) * 1e-3;
-            pressed(leaf, fern::blade(counts, segment, (leaf.width, leaf.cell), &skeleton, &mut stream))
+            let breadth = breadth.draw32(&mut leaf.plant.child(Purpose::Plant, 3));
+            let fern = Fern { counts, segment, breadth, width: leaf.width, cell: leaf.cell };
+            pressed(leaf, fern.blade(&skeleton, &mut stream))
         }
         Shape::Leaflets { .. } => leaflets::blade(leaf, &relief, cells(leaf), &skeleton, &mut stream),
     };
@@ -245,7 +247,7 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
     }
     // The halves of a level blade hang slightly, each branch independently.
     let hang = 0.12 * leaf.bend * elevation.cos();
-    let mut own = leaf.stream.child(furrow_base::sampling::Purpose::Leaf, 102);
+    let mut own = leaf.stream.child(Purpose::Leaf, 102);
     let [inner, outer] = [&leaf.kind.branch_bend_deg.0, &leaf.kind.branch_bend_deg.1];
     skeleton.bend_branches(|_, _| {
         let designed = [inner, outer].map(|bend| bend.draw32(&mut own).to_radians());

@@ -20,6 +20,11 @@ const CURL: f32 = 0.2;
 /// Maximum number of ribbons of one blade, a guard against species files that ask for a million lobes.
 pub(super) const MOST: usize = 600;
 
+/// Width up to which a lobe is a strip, in segments.
+const NARROW: f32 = 1.4;
+/// Depth of a ribbon's keel, in half-widths.
+const KEEL: f32 = 0.55;
+
 /// Smallest fraction of the finest ribbons that a coarse mesh keeps.
 const LEAST_DRAWN: f32 = 0.12;
 /// Fractional part of the golden ratio.
@@ -70,12 +75,38 @@ impl<'a> Ribbons<'a> {
         });
     }
 
+    /// Adds a lobe of `breadth` segments' width: a strip that tapers to its tip, or, if it is broader than [`NARROW`], a
+    /// flat blade that is widest in its middle, no wider than three quarters of its length.
+    pub(super) fn lobe(&mut self, start: Vec3, along: Vec3, up: Vec3, breadth: f32) {
+        let segment = self.width;
+        if breadth <= NARROW {
+            self.strip(start, along, up, Vec3::ZERO, breadth * segment, 1);
+            return;
+        }
+        let width = (breadth * segment).min(0.75 * along.length()).max(segment);
+        let flat = (segment / width).powi(2);
+        self.keeled((start, along, up, Vec3::ZERO), 2, KEEL * flat, |s| {
+            width * if s == 0.0 { 0.4 } else { (1.0 - smoothstep(0.5, 1.05, s)).sqrt() }
+        });
+    }
+
     /// Adds a strip with a width that depends on the fraction of its length. The tuple holds its start, its direction
     /// times length, its upper side and its bow.
     pub(super) fn band(
         &mut self,
         (start, along, up, bow): (Vec3, Vec3, Vec3, Vec3),
         pieces: u32,
+        width: impl Fn(f32) -> f32,
+    ) {
+        self.keeled((start, along, up, bow), pieces, KEEL, width);
+    }
+
+    /// Adds such a strip whose middle is sunk by `keel` half-widths.
+    fn keeled(
+        &mut self,
+        (start, along, up, bow): (Vec3, Vec3, Vec3, Vec3),
+        pieces: u32,
+        keel: f32,
         width: impl Fn(f32) -> f32,
     ) {
         self.count += 1;
@@ -99,8 +130,8 @@ impl<'a> Ribbons<'a> {
             let tie = self.tie(centre);
             let first = self.rest.positions.len().to_u32();
             for (k, side) in [-1.0_f32, 0.0, 1.0].into_iter().enumerate() {
-                let keel = if side == 0.0 { -0.55 * half } else { 0.0 };
-                let p = centre + right * (half * side) + up * keel;
+                let sunk = if side == 0.0 { -keel * half } else { 0.0 };
+                let p = centre + right * (half * side) + up * sunk;
                 self.rest.corner(p, vec2(0.5 * k.to_f32(), 1.0 - s), tie);
             }
             if let Some(near) = previous {

@@ -357,9 +357,14 @@ fn triangles_stay_within_budget() {
             // Twenty leaves or more, and leaves on every side shoot.
             ("BEAVX", _) | ("ARHHY", 20..) | ("GALAP", 12..) => 40_000,
             // A mat: every side shoot has side shoots.
-            ("STEME", 20..) => 60_000,
-            ("TRZAX", 22..) | ("ARHHY", 14..) | ("CONAR", 16..) | ("DAUCA" | "CIRAR" | "MATIN", _) => 24_000,
-            ("BRSOB" | "CAPBP" | "ARHHY" | "GLXMA", _) => 14_000,
+            ("STEME", 20..) | ("POROL", 19..) => 60_000,
+            // Broad lobes have twice the triangles of fine ones.
+            ("DAUCA", _) => 32_000,
+            ("TRZAX" | "HORVX" | "ORYSA" | "SETVI" | "DIGSA", 22..)
+            | ("ARHHY", 14..)
+            | ("CONAR", 16..)
+            | ("CIRAR" | "MATIN", _) => 24_000,
+            ("BRSOB" | "BRSOL" | "CAPBP" | "ARHHY" | "GLXMA" | "PHSVX" | "PIBSX" | "LYPES", _) => 14_000,
             // Up to six stems.
             ("SOLTU", _) => 70_000,
             _ => 9_000,

@@ -269,6 +269,7 @@ impl<'a> AxisBuilder<'a, '_> {
                 cell: self.pen.cell,
                 rigged: self.growth.rigged,
                 stream: own,
+                plant: self.growth.stream,
             };
             let on = Some(axis.on(lerp(low, high, share)));
             let seat = leaf::Seat { point: point + out * (0.8 * radius), axis: along, out, on };

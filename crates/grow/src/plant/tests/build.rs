@@ -139,6 +139,38 @@ fn divided_blades_bend_branch_by_branch() {
     }
 }
 
+/// Rationale: cultivars of carrot have fine or broad lobes; all leaves of a plant are of one cultivar. Expected: a plant
+/// that draws its breadth is the plant with some fixed breadth, leaf by leaf, and other seeds draw other ones; a blade
+/// with lobes three segments wide has more area than a finely cut one. Source: UPOV TG/49, "Leaf: division" from fine to
+/// coarse.
+#[test]
+fn all_leaves_of_a_carrot_have_lobes_of_one_breadth() {
+    let grown = |breadth: &str, seed: u64| {
+        let leaf = |alpha: f32| format!(r#"(kind: "leaf", alpha: {alpha}, blade_mm: 60, width_mm: 32, angle_deg: 40)"#);
+        let text = format!(
+            r#"(form: Dissected, kinds: {{"leaf": (shape: Fern(pairs: 6, pinnules: 4, segment_mm: 1, breadth: {breadth}))}}, stages: [
+            (bbch: 12, days: 3, hypocotyl_mm: 4, stem_mm: 1, layers: [{}, {}])])"#,
+            leaf(0.0),
+            leaf(0.8)
+        );
+        let desc: PlantDesc = furrow_base::ron_file::RonFile::of(&text).parse().unwrap();
+        let plant = grow(&desc, Stage::Bbch(12), &stream(seed));
+        plant.organs.into_iter().filter(|o| o.kind == OrganKind::Blade).map(|o| o.mesh).collect::<Vec<_>>()
+    };
+    let area = |breadth: &str| grown(breadth, 4).iter().map(Mesh::area).sum::<f32>();
+    let ratio = area("3") / area("1");
+    assert!((1.1..2.5).contains(&ratio), "{ratio}");
+    let mut drawn = std::collections::BTreeSet::new();
+    for seed in 0..8 {
+        let blades = grown("Choice([1, 3])", seed);
+        let of = ["1", "3"]
+            .into_iter()
+            .find(|fixed| grown(fixed, seed).iter().zip(&blades).all(|(a, b)| a.positions == b.positions));
+        drawn.insert(of.unwrap_or_else(|| panic!("seed {seed}: leaves of two breadths")));
+    }
+    assert_eq!(drawn.len(), 2, "{drawn:?}");
+}
+
 /// Rationale: thistles have spines. Expected: spines of the length in the species file, some above the blade and some
 /// below, only on the leaves whose kind has them. Source: 1.5-3 mm, SLU Ogräsrådgivaren.
 #[test]
