@@ -27,6 +27,8 @@ const PIT_WETTING: f32 = 0.2;
 /// consists of smaller ones, down to grains of silt.
 const GRAINS_MM: (f32, f32) = (0.6, 4.0);
 const GRAINS_COVER: f32 = 1.2;
+/// Variation of their colour relative to that of crumbs on the ground: the soil of one clod is mixed.
+const GRAINS_TINT: f32 = 0.35;
 /// Moisture of the soil that clods consist of, in standard deviations from the mean: they come from below the surface, where
 /// no lime is deposited.
 const CLODS_MOIST: f32 = 1.0;
@@ -183,7 +185,7 @@ impl Ground {
             let weights = self.blend.weights(noise, self.blend.heights(maps, p));
             let crumb = match crumbs.tint[k] {
                 0 => Spectrum::ONE,
-                t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
+                t => (hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0)).map(|x| x.powf(GRAINS_TINT)),
             };
             let albedo = self.dry(maps, weights, p) * tints[k] * crumb * gain;
             (GroundMaps::encode(albedo), weights.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>()))

@@ -19,8 +19,16 @@ const PIVOT_MM: f32 = 5.0;
 /// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5.
 const FBM3_SD: f32 = 0.28;
 
-/// Logarithm of the brightness of a clod lying loosely on top relative to a half-sunk one.
+/// Logarithm of the brightness of a clod lying loosely on top relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) const LOOSE_GAIN: f32 = 0.14;
+
+/// Buried fraction of the height of small clods: its range, the exponent of its distribution and its mean.
+const SINK: (f32, f32) = (0.03, 0.7);
+const SINK_POWER: f32 = 1.4;
+const MEAN_SINK: f32 = SINK.0 + (SINK.1 - SINK.0) / (1.0 + SINK_POWER);
+
+/// Lengths of the aggregates that fill the gaps between clods, mm.
+const FINES_MM: (f32, f32) = (1.0, 5.0);
 
 /// Ratio of the mean area of a crumb's outline to the square of its length, measured on 4000 crumbs: the ellipse has
 /// 0.62, and a quarter is cut off.
@@ -75,20 +83,25 @@ impl SizeRange {
     }
 }
 
-/// Returns the fraction of a clod's height below the surface, from u in 0..1: 0.2–0.4 for small clods, 0.3–0.5 for
+/// Returns the fraction of a clod's height below the surface, from u in 0..1: 0.03 to 0.7 for small clods, a tenth more for
 /// those of 15 mm and more.
 pub(super) fn sink(mm: f32, u: f32) -> f32 {
-    0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
+    deeper(mm) + SINK.0 + (SINK.1 - SINK.0) * u.powf(SINK_POWER)
 }
 
-/// Returns the logarithm of a clod's brightness relative to one that is sunk by 35 %.
+/// Returns how much more of its height a clod of this length has below the surface than a small one.
+fn deeper(mm: f32) -> f32 {
+    0.1 * (mm / 15.0).min(1.0)
+}
+
+/// Returns the logarithm of a clod's brightness relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) fn loose_gain(sink: f32) -> f32 {
-    LOOSE_GAIN * (0.35 - sink) / 0.15
+    LOOSE_GAIN * (MEAN_SINK - sink) / MEAN_SINK
 }
 
 /// Returns the mean logarithm of the brightness of clods of this length relative to the ground.
 pub(super) fn mean_gain(mm: f32) -> f32 {
-    loose_gain(sink(mm, 0.5))
+    loose_gain(deeper(mm) + MEAN_SINK)
 }
 
 /// Local size distribution: the number above 5 mm, m⁻², and the exponent.
@@ -150,6 +163,14 @@ impl SizeDistribution {
             over_pivot: share * self.over_pivot * (more - 0.5 * self.clustering * self.clustering).exp(),
             exponent: self.exponent * (1.0 - coarser),
         }
+    }
+
+    /// Returns how much more of the ground's surface fine aggregates cover at `p` than on average, −1..1. `amount` is their
+    /// fraction of the number that the size distribution gives, `share` as in [`Self::at`].
+    pub(super) fn fines(&self, p: Vec2, share: f32, amount: f32) -> f32 {
+        let bare = |local: Local| (-amount * local.cover(FINES_MM)).exp();
+        let mean = Local { over_pivot: self.over_pivot, exponent: self.exponent };
+        bare(mean) - bare(self.at(p, share))
     }
 
     /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1.
@@ -465,6 +486,23 @@ mod tests {
         assert!(expected > 0.1, "{expected}");
         assert!((drawn / expected - 1.0).abs() < 0.05, "{drawn} of {expected}");
         assert!((dithered / expected - 1.0).abs() < 0.05, "{dithered} of {expected}");
+    }
+
+    /// Expected: the mean of the burial over its distribution is the one that the brightness refers to; some clods lie on
+    /// the ground, some are mostly buried.
+    #[test]
+    fn clods_are_buried_by_a_wide_range_of_their_height() {
+        let sinks: Vec<f32> = (0..1000).map(|k| sink(6.0, (k.to_f32() + 0.5) / 1000.0)).collect();
+        let mean = |of: &dyn Fn(f32) -> f32| sinks.iter().map(|s| of(*s)).sum::<f32>() / 1000.0;
+        let below = |limit: f32| sinks.iter().filter(|s| **s < limit).count();
+        assert!((mean(&|s| s) - MEAN_SINK - deeper(6.0)).abs() < 1e-3, "{}", mean(&|s| s));
+        assert!((mean(&loose_gain) - mean_gain(6.0)).abs() < 1e-3);
+        assert!(
+            (120..300).contains(&below(0.12)) && (700..900).contains(&below(0.55)),
+            "{} {}",
+            below(0.12),
+            below(0.55)
+        );
     }
 
     #[test]
