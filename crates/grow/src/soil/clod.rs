@@ -14,7 +14,7 @@ use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of broken aggregates.
 pub(super) const CUT: ShapeParameters =
-    ShapeParameters { planes: (7, 12), distance: (0.54, 0.9), sharpness: (14.0, 50.0), lumps: 0.28, rough: 0.38 };
+    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (16.0, 60.0), lumps: 0.26, rough: 0.3 };
 
 /// Number of different shapes; each clod rotates and stretches one of them.
 const SHAPES: usize = 24;
@@ -34,7 +34,7 @@ const HALF_DRY: [f32; 2] = [0.35, 0.12];
 /// Relative heights below which a clod is one level moister, and the length above which a clod has such a base and is
 /// joined to the ground, mm.
 const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
-const GRADED_MM: f32 = 3.5;
+const GRADED_MM: f32 = 5.0;
 /// Excess of fine aggregates on the ground, as [`Ground::fines`], from which a base is at most one level moister and from
 /// which it is as dry as the clod.
 const DRY_FINES: [f32; MOIST_BELOW.len()] = [0.0, 0.25];
@@ -42,7 +42,7 @@ const DRY_FINES: [f32; MOIST_BELOW.len()] = [0.0, 0.25];
 const MOIST_SUNK: f32 = 0.45;
 /// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
 const FILLET: f32 = 0.6;
-const FLARE: f32 = 0.45;
+const FLARE: f32 = 0.2;
 
 /// Grid spacing for which the levels of detail are designed, metres: about four pixels of 0.25 mm.
 const FINE_M: f32 = 0.0009;

@@ -27,6 +27,10 @@ const SINK: (f32, f32) = (0.03, 0.7);
 const SINK_POWER: f32 = 1.4;
 const MEAN_SINK: f32 = SINK.0 + (SINK.1 - SINK.0) / (1.0 + SINK_POWER);
 
+/// Fraction of the moisture that dry clods have lost that clods have lost on average: some are half dry, and bases are
+/// moist.
+pub(super) const CLODS_DRY: f32 = 0.66;
+
 /// Lengths of the aggregates that fill the gaps between clods, mm.
 const FINES_MM: (f32, f32) = (1.0, 5.0);
 
@@ -75,6 +79,8 @@ pub(super) struct SizeRange {
     pub(super) amount: f32,
     /// Mean logarithm of the brightness relative to the ground, as a function of the length in mm.
     pub(super) gain: fn(f32) -> f32,
+    /// Fraction of the moisture that dry aggregates have lost that these have lost on average.
+    pub(super) dry: f32,
 }
 
 impl SizeRange {
@@ -173,11 +179,12 @@ impl SizeDistribution {
         bare(mean) - bare(self.at(p, share))
     }
 
-    /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1.
-    fn shade(&self, u: [f32; 3], gain: f32) -> (u8, u8) {
+    /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1;
+    /// `gain` and `dry` as in [`SizeRange`].
+    fn shade(&self, u: [f32; 3], gain: f32, dry: f32) -> (u8, u8) {
         // The sum of two uniforms less one has standard deviation 0.408.
         let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma + gain).exp();
-        let dry = if u[2] < self.damp { 0 } else { (self.dryness * 255.0).trunc_to::<u8>() };
+        let dry = if u[2] < self.damp { 0 } else { (self.dryness * dry * 255.0).trunc_to::<u8>() };
         ((tint * 128.0).clamp(1.0, 255.0).trunc_to::<u8>(), dry)
     }
 
@@ -291,7 +298,7 @@ impl Crumbs {
                     part.mm,
                     &stream,
                     |p| part.amount * share(p),
-                    |p, length, s| band.add(p, length, part.gain, law, s),
+                    |p, length, s| band.add(p, length, part, law, s),
                 );
             }
             if unseen.iter().any(SizeRange::is_some) {
@@ -349,7 +356,7 @@ impl Band<'_> {
                     if self.tint[k] == 0 && s.uniform32() >= bare {
                         let part = &parts[usize::from(s.uniform32() >= first)];
                         let u = [s.uniform32(), s.uniform32(), s.uniform32()];
-                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1));
+                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1), part.dry);
                         self.hue[k] = hue(u[0] - u[1]);
                     }
                 }
@@ -357,7 +364,7 @@ impl Band<'_> {
         }
     }
 
-    fn add(&mut self, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &SizeDistribution, s: &mut Stream) {
+    fn add(&mut self, p: Vec2, length_mm: f32, part: SizeRange, law: &SizeDistribution, s: &mut Stream) {
         // Always draws the same number of values, so that a crumb outside the area does not change its neighbours.
         let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
@@ -369,7 +376,7 @@ impl Band<'_> {
         let centre = top * (0.6 - 0.6 * u[3]);
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
-        let (tint, dry) = law.shade([u[8], u[9], u[10]], gain(length_mm));
+        let (tint, dry) = law.shade([u[8], u[9], u[10]], (part.gain)(length_mm), part.dry);
         let hue = hue(u[8] - u[9]);
         // The outline is an ellipse cut by straight breaks, so that crumbs are angular and all different.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
@@ -472,7 +479,7 @@ mod tests {
     fn aggregates_cover_as_much_drawn_or_not() {
         let law = law(0.0);
         let mm = (2.5, 10.0);
-        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0 };
+        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0, dry: 1.0 };
         let none = SizeRange { mm: (2.5, 2.5), ..some };
         let covered = |step: f32, size: usize, seen: SizeRange, unseen: SizeRange| {
             let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };

@@ -2,7 +2,7 @@
 
 use super::blend::{Blend, Weights};
 use super::color::{ColorTransform, mean};
-use super::crumb::{Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
+use super::crumb::{CLODS_DRY, Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
 use super::grid::Grid;
 use super::pigments::Pigments;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
@@ -225,8 +225,8 @@ impl Ground {
     pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
         let Sizes { drawn, unseen, .. } = self.sizes;
-        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
-        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain };
+        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0, dry: 1.0 };
+        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain, dry: CLODS_DRY };
         let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
         let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
