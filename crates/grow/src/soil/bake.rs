@@ -27,6 +27,8 @@ const PIT_WETTING: f32 = 0.2;
 /// consists of smaller ones, down to grains of silt.
 const GRAINS_MM: (f32, f32) = (0.6, 4.0);
 const GRAINS_COVER: f32 = 1.2;
+/// Variation of their colour relative to that of crumbs on the ground: the soil of one clod is mixed.
+const GRAINS_TINT: f32 = 0.35;
 /// Moisture of the soil that clods consist of, in standard deviations from the mean: they come from below the surface, where
 /// no lime is deposited.
 const CLODS_MOIST: f32 = 1.0;
@@ -174,6 +176,14 @@ impl Ground {
         let gain = pits.len().to_f32() / (0..pits.len()).map(lost).sum::<f32>();
         let (hues, tints) =
             (self.crumb_hues(), self.tints(raster, (0.004 / texel).trunc_to::<usize>().max(1), |_| CLODS_MOIST));
+        let grain = |k: usize| match crumbs.tint[k] {
+            0 => Spectrum::ONE,
+            t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
+        };
+        let mixed = |k: usize| grain(k).map(|factor| factor.powf(GRAINS_TINT));
+        let sum = |of: &dyn Fn(usize) -> Spectrum| (0..side * side).fold(Spectrum::ZERO, |sum, k| sum + of(k));
+        // Mixing keeps the mean colour.
+        let gain = sum(&grain) / sum(&mixed) * gain;
         let texel_at = |k: usize| {
             let p = raster.origin + vec2((k % side).to_f32(), (k / side).to_f32()) * texel;
             let mut noise = [0.0; MAX_LAYERS];
@@ -181,11 +191,7 @@ impl Ground {
                 *n = self.blend.noise(i, p);
             }
             let weights = self.blend.weights(noise, self.blend.heights(maps, p));
-            let crumb = match crumbs.tint[k] {
-                0 => Spectrum::ONE,
-                t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
-            };
-            let albedo = self.dry(maps, weights, p) * tints[k] * crumb * gain;
+            let albedo = self.dry(maps, weights, p) * tints[k] * mixed(k) * gain;
             (GroundMaps::encode(albedo), weights.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>()))
         };
         let (albedo, weights): (Vec<_>, Vec<_>) = (0..side * side).into_par_iter().map(texel_at).unzip();
@@ -213,7 +219,7 @@ impl Ground {
         let finest = (1e3 * FINEST_TEXELS * raster.step).max(GRAINS_MM.0);
         let mm = (finest, GRAINS_MM.1.max(finest));
         let amount = GRAINS_COVER / self.law.at(Vec2::ZERO, 1.0).cover(mm).max(f32::MIN_POSITIVE);
-        let [grains, none] = [mm, (mm.1, mm.1)].map(|mm| SizeRange { mm, amount, gain: |_| 0.0 });
+        let [grains, none] = [mm, (mm.1, mm.1)].map(|mm| SizeRange { mm, amount, gain: |_| 0.0, dry: 1.0 });
         let mut crumbs = Crumbs::draw(raster, &self.law, [grains, none], [none; 2], &stream, |_| 1.0);
         let noise = Perlin::new(stream.child(Purpose::Texture, 0).seed32());
         let octaves = (ROUGH_M / (FINEST_TEXELS * raster.step)).log2().clamp(0.0, 6.0).trunc_to::<u32>();

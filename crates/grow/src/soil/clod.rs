@@ -1,8 +1,8 @@
 //! Clods: soil aggregates as separate bodies.
 //!
 //! Clods are placed on the [`Pile`], largest first, so that small ones roll into the gaps between large ones or rest on
-//! them, as on a seedbed. Each is sunk by a fifth to a half of its height, large ones deeper. Triangles that face down
-//! into the ground, about half of them, are left out because no ray can reach them.
+//! them, as on a seedbed. Some lie on top and some are mostly buried, large ones deeper. Triangles that face down into
+//! the ground, about half of them, are left out because no ray can reach them.
 
 use super::body::{self, LEVELS, Placed, Pose, Shape, ShapeParameters};
 use super::crumb::{LOOSE_GAIN, Local, loose_gain, sink};
@@ -14,7 +14,7 @@ use furrow_base::sampling::{Purpose, Stream};
 
 /// Shape parameters of broken aggregates.
 pub(super) const CUT: ShapeParameters =
-    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (24.0, 70.0), lumps: 0.26, rough: 0.3 };
+    ShapeParameters { planes: (7, 12), distance: (0.5, 0.86), sharpness: (16.0, 60.0), lumps: 0.26, rough: 0.3 };
 
 /// Number of different shapes; each clod rotates and stretches one of them.
 const SHAPES: usize = 24;
@@ -28,12 +28,18 @@ const HUES: usize = 6;
 /// Ratio of the middle and the short axis to the long one. Source: Aubertot et al. 1999.
 const AXES: (f32, f32) = (0.77, 0.55);
 
-/// Fraction of the dry clods that have kept a part of the ground's moisture.
-const HALF_DRY: f32 = 0.25;
+/// Fractions of the dry clods that have kept at least one third and at least two thirds of the moisture that others have
+/// lost.
+const HALF_DRY: [f32; 2] = [0.35, 0.12];
 /// Relative heights below which a clod is one level moister, and the length above which a clod has such a base and is
 /// joined to the ground, mm.
 const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
-const GRADED_MM: f32 = 6.0;
+const GRADED_MM: f32 = 5.0;
+/// Excess of fine aggregates on the ground, as [`Ground::fines`], from which a base is at most one level moister and from
+/// which it is as dry as the clod.
+const DRY_FINES: [f32; MOIST_BELOW.len()] = [0.0, 0.25];
+/// Buried fraction of its height from which a clod is one level moister.
+const MOIST_SUNK: f32 = 0.45;
 /// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
 const FILLET: f32 = 0.6;
 const FLARE: f32 = 0.2;
@@ -110,12 +116,13 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let sink = sink(clod.mm, s.uniform32());
         let tint = ground.law.tint_sigma * s.normal().to_f32() + loose_gain(sink);
         let sink = sink * (1.0 - ground.law.loose);
+        let sunk = usize::from(sink > MOIST_SUNK);
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
         let from = vec2(s.uniform32(), s.uniform32());
         let iron = ground.pigments.clod(clod.at, s.normal().to_f32());
         let hue = (rank(iron) * HUES.to_f32()).trunc_to::<usize>().min(HUES - 1);
-        let moisture = if damp { MOISTURE_LEVELS - 1 } else { usize::from(s.uniform32() < HALF_DRY) };
+        let moisture = if damp { MOISTURE_LEVELS - 1 } else { (sunk + kept(s.uniform32())).min(MOISTURE_LEVELS - 2) };
 
         let radius = 0.5 * (axes.x + axes.y);
         let at = if clod.mm < 15.0 { pile.settle(clod.at, radius, 0.75) } else { Some(clod.at) };
@@ -145,13 +152,14 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
                     corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 3e-4)
                 }
             };
-            // The base is moister than the top.
+            // The base is moister than the top, as the ground is that it stands in.
+            let fines = ground.fines(at);
+            let bases = DRY_FINES.iter().filter(|dry| graded && fines < **dry).count();
             let moister = |corners: [Vec3; 3]| {
                 let relative = (corners.iter().map(|c| c.z).sum::<f32>() / 3.0 - support) / top;
                 let steps = MOIST_BELOW.iter().filter(|below| relative < **below).count();
-                (moisture + steps).min(MOISTURE_LEVELS - 1)
+                (moisture + steps.min(bases)).min(MOISTURE_LEVELS - 1)
             };
-            let bases = if graded { MOIST_BELOW.len() } else { 0 };
             for level in moisture..MOISTURE_LEVELS.min(moisture + bases + 1) {
                 body.emit(
                     &mut groups[(level * HUES + hue) * TONES + tone(tint, ground.law.tint_sigma)],
@@ -168,6 +176,11 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
     (groups.into_iter().enumerate().filter(|(_, mesh)| !mesh.triangles.is_empty()))
         .map(|(g, mesh)| Clods { tint: hues[g / TONES % HUES] * brightness(g), moisture: g / (HUES * TONES), mesh })
         .collect()
+}
+
+/// Returns the level of moisture of a dry clod, from u in 0..1.
+fn kept(u: f32) -> usize {
+    HALF_DRY.iter().filter(|share| u < **share).count()
 }
 
 /// Draws factors on the reflectance in R, G, B; near infrared has no hue.

@@ -19,8 +19,20 @@ const PIVOT_MM: f32 = 5.0;
 /// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5.
 const FBM3_SD: f32 = 0.28;
 
-/// Logarithm of the brightness of a clod lying loosely on top relative to a half-sunk one.
+/// Logarithm of the brightness of a clod lying loosely on top relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) const LOOSE_GAIN: f32 = 0.14;
+
+/// Buried fraction of the height of small clods: its range, the exponent of its distribution and its mean.
+const SINK: (f32, f32) = (0.03, 0.7);
+const SINK_POWER: f32 = 1.4;
+const MEAN_SINK: f32 = SINK.0 + (SINK.1 - SINK.0) / (1.0 + SINK_POWER);
+
+/// Fraction of the moisture that dry clods have lost that clods have lost on average: some are half dry, and bases are
+/// moist.
+pub(super) const CLODS_DRY: f32 = 0.66;
+
+/// Lengths of the aggregates that fill the gaps between clods, mm.
+const FINES_MM: (f32, f32) = (1.0, 5.0);
 
 /// Ratio of the mean area of a crumb's outline to the square of its length, measured on 4000 crumbs: the ellipse has
 /// 0.62, and a quarter is cut off.
@@ -67,6 +79,8 @@ pub(super) struct SizeRange {
     pub(super) amount: f32,
     /// Mean logarithm of the brightness relative to the ground, as a function of the length in mm.
     pub(super) gain: fn(f32) -> f32,
+    /// Fraction of the moisture that dry aggregates have lost that these have lost on average.
+    pub(super) dry: f32,
 }
 
 impl SizeRange {
@@ -75,20 +89,25 @@ impl SizeRange {
     }
 }
 
-/// Returns the fraction of a clod's height below the surface, from u in 0..1: 0.2–0.4 for small clods, 0.3–0.5 for
+/// Returns the fraction of a clod's height below the surface, from u in 0..1: 0.03 to 0.7 for small clods, a tenth more for
 /// those of 15 mm and more.
 pub(super) fn sink(mm: f32, u: f32) -> f32 {
-    0.2 + 0.1 * (mm / 15.0).min(1.0) + 0.2 * u
+    deeper(mm) + SINK.0 + (SINK.1 - SINK.0) * u.powf(SINK_POWER)
 }
 
-/// Returns the logarithm of a clod's brightness relative to one that is sunk by 35 %.
+/// Returns how much more of its height a clod of this length has below the surface than a small one.
+fn deeper(mm: f32) -> f32 {
+    0.1 * (mm / 15.0).min(1.0)
+}
+
+/// Returns the logarithm of a clod's brightness relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) fn loose_gain(sink: f32) -> f32 {
-    LOOSE_GAIN * (0.35 - sink) / 0.15
+    LOOSE_GAIN * (MEAN_SINK - sink) / MEAN_SINK
 }
 
 /// Returns the mean logarithm of the brightness of clods of this length relative to the ground.
 pub(super) fn mean_gain(mm: f32) -> f32 {
-    loose_gain(sink(mm, 0.5))
+    loose_gain(deeper(mm) + MEAN_SINK)
 }
 
 /// Local size distribution: the number above 5 mm, m⁻², and the exponent.
@@ -152,11 +171,20 @@ impl SizeDistribution {
         }
     }
 
-    /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1.
-    fn shade(&self, u: [f32; 3], gain: f32) -> (u8, u8) {
+    /// Returns how much more of the ground's surface fine aggregates cover at `p` than on average, −1..1. `amount` is their
+    /// fraction of the number that the size distribution gives, `share` as in [`Self::at`].
+    pub(super) fn fines(&self, p: Vec2, share: f32, amount: f32) -> f32 {
+        let bare = |local: Local| (-amount * local.cover(FINES_MM)).exp();
+        let mean = Local { over_pivot: self.over_pivot, exponent: self.exponent };
+        bare(mean) - bare(self.at(p, share))
+    }
+
+    /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1;
+    /// `gain` and `dry` as in [`SizeRange`].
+    fn shade(&self, u: [f32; 3], gain: f32, dry: f32) -> (u8, u8) {
         // The sum of two uniforms less one has standard deviation 0.408.
         let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma + gain).exp();
-        let dry = if u[2] < self.damp { 0 } else { (self.dryness * 255.0).trunc_to::<u8>() };
+        let dry = if u[2] < self.damp { 0 } else { (self.dryness * dry * 255.0).trunc_to::<u8>() };
         ((tint * 128.0).clamp(1.0, 255.0).trunc_to::<u8>(), dry)
     }
 
@@ -270,7 +298,7 @@ impl Crumbs {
                     part.mm,
                     &stream,
                     |p| part.amount * share(p),
-                    |p, length, s| band.add(p, length, part.gain, law, s),
+                    |p, length, s| band.add(p, length, part, law, s),
                 );
             }
             if unseen.iter().any(SizeRange::is_some) {
@@ -328,7 +356,7 @@ impl Band<'_> {
                     if self.tint[k] == 0 && s.uniform32() >= bare {
                         let part = &parts[usize::from(s.uniform32() >= first)];
                         let u = [s.uniform32(), s.uniform32(), s.uniform32()];
-                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1));
+                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1), part.dry);
                         self.hue[k] = hue(u[0] - u[1]);
                     }
                 }
@@ -336,7 +364,7 @@ impl Band<'_> {
         }
     }
 
-    fn add(&mut self, p: Vec2, length_mm: f32, gain: fn(f32) -> f32, law: &SizeDistribution, s: &mut Stream) {
+    fn add(&mut self, p: Vec2, length_mm: f32, part: SizeRange, law: &SizeDistribution, s: &mut Stream) {
         // Always draws the same number of values, so that a crumb outside the area does not change its neighbours.
         let mut u = [0.0; 18];
         u.fill_with(|| s.uniform32());
@@ -348,7 +376,7 @@ impl Band<'_> {
         let centre = top * (0.6 - 0.6 * u[3]);
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
-        let (tint, dry) = law.shade([u[8], u[9], u[10]], gain(length_mm));
+        let (tint, dry) = law.shade([u[8], u[9], u[10]], (part.gain)(length_mm), part.dry);
         let hue = hue(u[8] - u[9]);
         // The outline is an ellipse cut by straight breaks, so that crumbs are angular and all different.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
@@ -451,7 +479,7 @@ mod tests {
     fn aggregates_cover_as_much_drawn_or_not() {
         let law = law(0.0);
         let mm = (2.5, 10.0);
-        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0 };
+        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0, dry: 1.0 };
         let none = SizeRange { mm: (2.5, 2.5), ..some };
         let covered = |step: f32, size: usize, seen: SizeRange, unseen: SizeRange| {
             let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };
@@ -465,6 +493,23 @@ mod tests {
         assert!(expected > 0.1, "{expected}");
         assert!((drawn / expected - 1.0).abs() < 0.05, "{drawn} of {expected}");
         assert!((dithered / expected - 1.0).abs() < 0.05, "{dithered} of {expected}");
+    }
+
+    /// Expected: the mean of the burial over its distribution is the one that the brightness refers to; some clods lie on
+    /// the ground, some are mostly buried.
+    #[test]
+    fn clods_are_buried_by_a_wide_range_of_their_height() {
+        let sinks: Vec<f32> = (0..1000).map(|k| sink(6.0, (k.to_f32() + 0.5) / 1000.0)).collect();
+        let mean = |of: &dyn Fn(f32) -> f32| sinks.iter().map(|s| of(*s)).sum::<f32>() / 1000.0;
+        let below = |limit: f32| sinks.iter().filter(|s| **s < limit).count();
+        assert!((mean(&|s| s) - MEAN_SINK - deeper(6.0)).abs() < 1e-3, "{}", mean(&|s| s));
+        assert!((mean(&loose_gain) - mean_gain(6.0)).abs() < 1e-3);
+        assert!(
+            (120..300).contains(&below(0.12)) && (700..900).contains(&below(0.55)),
+            "{} {}",
+            below(0.12),
+            below(0.55)
+        );
     }
 
     #[test]

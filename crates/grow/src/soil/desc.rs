@@ -267,8 +267,8 @@ pub struct ClodsDesc {
     pub dryness: Vary<Fraction>,
     /// Fraction of clods and crumbs that were turned up recently and are still as wet as the ground.
     pub damp: Vary<Fraction>,
-    /// Looseness of the clods: at 0 a fifth to a half of their height is sunk, as after harrow and rain; at 1 they lie
-    /// on top.
+    /// Looseness of the clods: at 0 they are sunk by 3 to 80 % of their height, 40 % on average, as after harrow and
+    /// rain; at 1 they lie on top.
     pub loose: Vary<Fraction>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::blend::{Blend, Weights};
 use super::color::{ColorTransform, mean};
-use super::crumb::{Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
+use super::crumb::{CLODS_DRY, Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
 use super::grid::Grid;
 use super::pigments::Pigments;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
@@ -24,6 +24,9 @@ const BLOCK_ROWS: usize = 64;
 
 /// Standard deviation of [`Perlin::fbm2`] with four octaves and gain 0.6.
 const FBM4_SD: f32 = 0.245;
+
+/// Fraction of its moisture that ground under a complete cover of dry fine aggregates has lost relative to bare ground.
+const MULCH: f32 = 1.2;
 
 /// Data at each vertex of the fine grid.
 #[derive(Clone, Debug, Default)]
@@ -222,8 +225,8 @@ impl Ground {
     pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
         let Sizes { drawn, unseen, .. } = self.sizes;
-        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0 };
-        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain };
+        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0, dry: 1.0 };
+        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain, dry: CLODS_DRY };
         let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
         let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
@@ -253,8 +256,12 @@ impl Ground {
             let (x, y) = (f64::from(p.x) * frequency, f64::from(p.y) * frequency);
             patches.fbm2(x + 0.5, y + 0.5, 4, 0.6).to_f32() / FBM4_SD
         });
-        let moisture = (patches.iter().zip(&out))
-            .map(|(patch, out)| (mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0)).clamp(0.0, 1.0))
+        let fines = slowly(raster, self.every(), |p| self.fines(p));
+        let moisture = (patches.iter().zip(&out).zip(&fines))
+            .map(|((patch, out), fines)| {
+                let wet = mean + spread * patch - drying * (out / sd).clamp(-2.0, 2.0);
+                (wet * (1.0 - MULCH * self.law.dryness * fines)).clamp(0.0, 1.0)
+            })
             .collect();
         let tint = self.tints(raster, self.every(), |k| patches[k]);
         Appearance { moisture, tint }
@@ -398,6 +405,11 @@ impl Ground {
     pub fn uv(&self, x: f32, y: f32) -> Vec2 {
         let area = self.area();
         (self.mirrored(vec2(x, y)) - area.corners()[0]) / area.size()
+    }
+
+    /// Returns how much more of the ground's surface fine aggregates cover at `p` than on average, −1..1.
+    pub(super) fn fines(&self, p: Vec2) -> f32 {
+        self.law.fines(p, self.share(p), self.crumbs_amount)
     }
 
     /// Returns the fraction of the aggregates that the layers hold at `p`.

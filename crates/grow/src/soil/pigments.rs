@@ -63,8 +63,8 @@ impl Default for PigmentsDesc {
             lime: Vary::uniform(0.0, 0.12),
             algae: Vary::fixed(0.0),
             patch_m: Vary::uniform(0.15, 0.4),
-            aggregates: Num::new(1.0),
-            mixing: Num::new(0.6),
+            aggregates: Num::new(0.6),
+            mixing: Num::new(0.8),
         }
     }
 }
@@ -210,7 +210,12 @@ mod tests {
             ..PigmentsDesc::default()
         };
         assert_eq!(pigments(&none).place([1.0, -1.0, 2.0], 0.0), Spectrum::ONE);
-        let some = pigments(&PigmentsDesc { iron: Vary::fixed(1.0), mixing: Num::new(0.6), ..none });
+        let some = pigments(&PigmentsDesc {
+            iron: Vary::fixed(1.0),
+            aggregates: Num::new(1.0),
+            mixing: Num::new(0.6),
+            ..none
+        });
         let [red, pale] = [1.0, -1.0].map(|iron| some.aggregate(iron, 0.0).to_array());
         assert!(red[0] / red[2] > 1.2 && (0.7..0.9).contains(&(pale[0] / pale[2])), "{red:?} {pale:?}");
         let mut stream = Stream::of(9, 0, Purpose::Test, 0);

@@ -516,3 +516,54 @@ fn the_material_of_clods_is_porous_and_as_bright_as_the_soil() {
     let [coarse, ..] = ground.fabrics(&maps, 0.01);
     assert!(coarse.slope.iter().flatten().all(|s| s.abs() < 12), "{:?}", coarse.slope);
 }
+
+/// Rationale: between dry clods, photographs show dry fines and, where these are few, moist ground. Expected: ground with
+/// more fines than the mean is drier and ground with fewer is moister, with about the same mean; the moist bases of clods
+/// stand in the latter.
+#[test]
+fn ground_is_dry_under_fines_and_moist_between_them() {
+    let mut page = page();
+    page.layers.truncate(1);
+    (page.moisture.mean, page.moisture.spread) = (Vary::fixed(0.5), Vary::fixed(0.0));
+    page.moisture.drying = Num::new(0.0);
+    (page.clods.dryness, page.clods.damp) = (Vary::fixed(0.9), Vary::fixed(0.0));
+    (page.clods.clustering, page.clods.exponent) = (Vary::fixed(0.7), Vary::fixed(2.7));
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let ground = Ground::new(&page, &[], &maps, &site(0.4), &stream()).unwrap();
+    let place = |k: usize| vec2((k % 60).to_f32(), (k / 60).to_f32()) / 75.0 - 0.39;
+    let mean = |of: &dyn Fn(Vec2) -> Option<f32>| {
+        let some: Vec<f32> = (0..3600).filter_map(|k| of(place(k))).collect();
+        some.iter().sum::<f32>() / some.len().to_f32()
+    };
+    let moisture = |p: Vec2| ground.moisture(p.x, p.y);
+    let [few, many] = [-1.0, 1.0].map(|sign| mean(&|p| (sign * ground.fines(p) > 0.1).then(|| moisture(p))));
+    assert!(few > many + 0.15, "{few} {many}");
+    assert!((mean(&|p| Some(moisture(p))) - 0.5).abs() < 0.06, "{}", mean(&|p| Some(moisture(p))));
+    let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
+    let under = |level: usize| {
+        let of_level = groups.iter().filter(|group| group.moisture == level);
+        let fines: Vec<f32> = of_level.flat_map(|g| &g.mesh.positions).map(|p| ground.fines(p.truncate())).collect();
+        fines.iter().sum::<f32>() / fines.len().to_f32()
+    };
+    assert!(under(MOISTURE_LEVELS - 1) < under(0) - 0.05, "{} {}", under(MOISTURE_LEVELS - 1), under(0));
+}
+
+/// Rationale: grains of many colours make a clod look like a rock. Expected: the colour within a clod varies less than half
+/// as much as that from crumb to crumb on the ground.
+#[test]
+fn the_soil_within_a_clod_is_mixed() {
+    let mut page = page();
+    page.layers.truncate(1);
+    (page.pigments.iron, page.pigments.lime) = (Vary::fixed(0.3), Vary::fixed(0.0));
+    page.clods.tint_sigma = Num::new(0.2);
+    page.crumbs.amount = Vary::fixed(1.0);
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let ground = Ground::new(&page, &[], &maps, &site(0.05), &stream()).unwrap();
+    let spread = |maps: &GroundMaps| {
+        let logs: Vec<f32> = maps.albedo.iter().map(|texel| GroundMaps::decode(*texel).0.y.max(1e-3).ln()).collect();
+        let mean = logs.iter().sum::<f32>() / logs.len().to_f32();
+        (logs.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / logs.len().to_f32()).sqrt()
+    };
+    let [within, among] = [spread(&ground.fabrics(&maps, 5e-4)[0]), spread(&ground.bake(&maps, 5e-4))];
+    assert!(within < 0.5 * among, "{within} {among}");
+}
