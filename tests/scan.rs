@@ -481,6 +481,9 @@ fn errors_are_reported_and_write_nothing() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     assert_eq!(names(&out), ["scan.las", "scan.ply"]);
     las_is_the_ply(&std::fs::read(out.join("scan.las")).unwrap(), &found);
+    // A file of an earlier scan beside this one's would show another field.
+    assert!(scan(&good, &[]).output().unwrap().status.success());
+    assert_eq!(names(&out), ["scan.ply"]);
 }
 
 /// Compares a LAS file with the columns of the PLY file of the same scan. Expected: the same points, to half a step of

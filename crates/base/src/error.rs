@@ -217,10 +217,11 @@ impl Error {
     }
 
     /// Adds the further mistakes that were found in `file`. They are displayed after this one, followed by their number,
-    /// and by a note unless they are `complete`.
+    /// and by a note unless they are `complete`. Nothing is added if there are none and that is complete.
     #[must_use]
     pub fn with_others(mut self, others: Vec<Self>, file: &Path, complete: bool) -> Self {
-        self.0.others = (!others.is_empty()).then(|| Others { errors: others, file: file.to_path_buf(), complete });
+        let some = !others.is_empty() || !complete;
+        self.0.others = some.then(|| Others { errors: others, file: file.to_path_buf(), complete });
         self
     }
 
@@ -344,8 +345,9 @@ impl fmt::Display for Error {
         for other in errors {
             write!(f, "\nerror: {other}")?;
         }
-        let more = if *complete { "" } else { "; correct them and run it again: there may be more" };
-        write!(f, "\n{} mistakes in {}{more}", errors.len() + 1, file.display())
+        let (mistakes, them) = if errors.is_empty() { ("mistake", "it") } else { ("mistakes", "them") };
+        write!(f, "\n{} {mistakes} in {}", errors.len() + 1, file.display())?;
+        if *complete { Ok(()) } else { write!(f, "; correct {them} and run it again: there may be more") }
     }
 }
 
@@ -436,7 +438,9 @@ mod tests {
         assert_eq!(Error::input("a").help("").advice(), None);
         let all = Error::input("a").with_others(vec![Error::input("b").help("c")], Path::new("d.ron"), true);
         assert_eq!(all.to_string(), "a\nerror: b\n help: c\n2 mistakes in d.ron");
-        assert_eq!(Error::input("a").with_others(Vec::new(), Path::new("d.ron"), false).to_string(), "a");
+        let one = |complete| Error::input("a").with_others(Vec::new(), Path::new("d.ron"), complete).to_string();
+        assert_eq!(one(true), "a");
+        assert_eq!(one(false), "a\n1 mistake in d.ron; correct it and run it again: there may be more");
         let some = Error::input("a").with_others(vec![Error::input("b")], Path::new("d.ron"), false);
         assert!(some.to_string().ends_with("2 mistakes in d.ron; correct them and run it again: there may be more"));
         let error = Error::missing("no x").in_file("c").help("get x").within("image 3");

@@ -2,13 +2,15 @@
 
 use super::cloud::{Cloud, Column, Point, Value};
 use super::{las, write_together};
-use furrow_base::Result;
 use furrow_base::math::{ToInt, Vec3};
+use furrow_base::{Error, Result};
 use furrow_field::Field;
 use furrow_optics::sensor::Lidar;
 use furrow_optics::texture::ColorSpace;
 use furrow_render::render::Echo;
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Additional properties of a scan's points.
@@ -66,15 +68,20 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
     cloud
 }
 
-/// Writes `scan.ply` into `folder`, and `scan.las` if `las` is set.
+/// Writes `scan.ply` into `folder`, and `scan.las` if `las` is set; otherwise removes the one of an earlier scan.
 pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo], las: bool) -> Result<Vec<PathBuf>> {
     let version = env!("CARGO_PKG_VERSION");
     let file = cloud(field, lidar, echoes).file(version);
-    write_together(folder, |together| {
+    let other = folder.join("scan.las");
+    let paths = write_together(folder, |together| {
         together.add(&folder.join("scan.ply"), &file)?;
         if las {
-            together.add(&folder.join("scan.las"), &las::file(field, echoes, version))?;
+            together.add(&other, &las::file(field, echoes, version))?;
         }
         Ok(())
-    })
+    })?;
+    match if las { Ok(()) } else { fs::remove_file(&other) } {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(Error::io(&other)(error)),
+        _ => Ok(paths),
+    }
 }

@@ -95,6 +95,8 @@ impl Repair {
                 };
                 all.extend(fits.map(quoted));
             }
+            // No value helps a field that does not exist.
+            Some(_) if error.message().starts_with("unknown field") => {}
             Some(_) => {
                 // The numbers of a distribution depend on each other, so it is replaced as a whole.
                 let drawn = around.iter().position(|member| is_distribution(written(member)));

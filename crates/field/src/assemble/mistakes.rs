@@ -30,7 +30,9 @@ impl Source {
         }
         let mut search = Search::new(text, library, options);
         let (found, complete) = search.mistakes();
-        let others = found.into_iter().filter(|error| !same(error, &first)).collect();
+        let others: Vec<Error> = found.into_iter().filter(|error| !same(error, &first)).collect();
+        // Where no repair helps, a single mistake is usually the only one.
+        let complete = complete || others.is_empty() && !search.limited();
         first.with_others(others, &text.page.path, complete)
     }
 }
@@ -106,7 +108,7 @@ impl<'a> Search<'a> {
             let after = repair.apply(text);
             let before = self.texts.insert(repair.file().to_owned(), after);
             let next = self.read();
-            if self.readings > MOST_READINGS || self.bytes > MOST_BYTES {
+            if self.limited() {
                 return None;
             }
             let causes = |next: &Error| repair.causes(next, self.spot(next).as_ref());
@@ -116,6 +118,11 @@ impl<'a> Search<'a> {
             self.texts.extend(before.map(|text| (repair.file().to_owned(), text)));
         }
         None
+    }
+
+    /// Returns `true` once as much was read as is allowed.
+    fn limited(&self) -> bool {
+        self.readings > MOST_READINGS || self.bytes > MOST_BYTES
     }
 
     /// Returns the position of an error in the repaired text of its file.
