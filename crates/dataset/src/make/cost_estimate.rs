@@ -323,6 +323,8 @@ impl Images {
         let field = kept.at(&self.set, &scene, index)?.field;
         let captures = field.grown().captures.iter().take_while(|capture| capture.frame == 0);
         let cameras = captures.map(|capture| capture.name.clone()).collect();
+        // Once for each field: counted with the first rendering, it would hide the time of the samples.
+        kept.measure_traits();
         let grown = cpu()?;
         let mut draw = |renderer: &Renderer| {
             let begin = cpu()?;

@@ -129,6 +129,14 @@ impl CachedField {
         let grow = if new { grow + build } else { Duration::ZERO };
         Ok(FieldAtCamera { field: self.field.insert(field), traits: &mut self.traits, grow })
     }
+
+    /// Measures the traits of the plants in the field, which its images share.
+    pub(crate) fn measure_traits(&mut self) {
+        if let Some(field) = &self.field {
+            let before = self.traits.take().unwrap_or_default();
+            self.traits = Some(field.threads().install(|| before.of_next_image(field.grown())));
+        }
+    }
 }
 
 /// Splits the number of a capture of a field into its number within the day and the day.

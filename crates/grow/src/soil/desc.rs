@@ -267,7 +267,7 @@ pub struct ClodsDesc {
     pub dryness: Vary<Fraction>,
     /// Fraction of clods and crumbs that were turned up recently and are still as wet as the ground.
     pub damp: Vary<Fraction>,
-    /// Looseness of the clods: at 0 they are sunk by 3 to 80 % of their height, 40 % on average, as after harrow and
+    /// Looseness of the clods: at 0 they are sunk by 3 to 80 % of their height, 31 to 41 % on average, as after harrow and
     /// rain; at 1 they lie on top.
     pub loose: Vary<Fraction>,
 }
