@@ -57,6 +57,8 @@ fn images_of_a_preset_name_it_and_keep_the_labels() {
     };
     assert!(!comment(&folders[0]).contains("quality"), "{}", comment(&folders[0]));
     assert!(comment(&folders[1]).contains("\nquality: dataset (biased: "), "{}", comment(&folders[1]));
+    let page = std::fs::read_to_string(folders[1].join("report.html")).unwrap();
+    assert!(page.contains("--spp 4 --quality dataset --out"), "the command of an image leaves out the preset");
     // A dataset keeps the quality it was started with.
     assert!(fail(make(&folders[1], &["--spp", "4", "--max-depth", "2"]), 2).contains("quality"));
 }

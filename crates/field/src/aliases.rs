@@ -1,7 +1,7 @@
 //! Names that people use for species besides those of the species files.
 
-/// Names in American and British English, German, French and Spanish, by the species file's name without `.ron`. Crops have
-/// the EPPO codes of their species and varieties too.
+/// Names in American and British English, German, French and Spanish, by the species file's name without `.ron`. Some
+/// crops have the EPPO codes of varieties too.
 pub(super) const ALIASES: [(&str, &[&str]); 45] = [
     (
         "alopecurus",
@@ -127,7 +127,7 @@ pub(super) const ALIASES: [(&str, &[&str]); 45] = [
     ("stellaria", &["common chickweed", "Vogelmiere", "mouron des oiseaux", "stellaire intermédiaire", "pamplina"]),
     ("sugar_beet", &["sugarbeet", "beet", "Zuckerrübe", "Rübe", "betterave", "betterave sucrière", "remolacha"]),
     ("sunflower", &["Sonnenblume", "tournesol", "girasol"]),
-    ("tomato", &["Tomate", "Paradeiser", "tomate"]),
+    ("tomato", &["Tomate", "Paradeiser"]),
     (
         "tripleurospermum",
         &["false mayweed", "scentless chamomile", "Geruchlose Kamille", "matricaire inodore", "manzanilla inodora"],

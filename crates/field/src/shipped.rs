@@ -100,7 +100,7 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
     }
 }
 
-/// Finds the species of which this is a name.
+/// Finds the species with this name.
 fn named<'a>(all: &'a [Shipped], wanted: &str) -> Option<&'a Shipped> {
     all.iter().find(|species| species.names().iter().any(|own| aliases::same(own, wanted)))
 }

@@ -9,7 +9,7 @@ use furrow_report::number;
 const ASKED: u64 = 64;
 /// Ratio of the high to the low number of plants above which a warning is given.
 const WIDE: f64 = 3.0;
-/// Number of fields from which on percentiles are stated instead of the range.
+/// Smallest number of fields with percentiles; fewer have their range.
 const MANY: usize = 20;
 
 /// Distribution over fields of the expected number of plants in view.

@@ -17,7 +17,6 @@ use furrow_base::math::{RoundTo, ToInt, Vec3};
 use furrow_field::Field;
 use furrow_render::render::Echo;
 use furrow_render::scene::tag::Class;
-use std::collections::BTreeMap;
 
 /// Metres per step of a coordinate.
 const STEP: f64 = 1e-4;
@@ -97,14 +96,13 @@ pub(super) fn file(field: &Field, echoes: &[Echo], version: &str) -> Vec<u8> {
         out.extend(text::<32>(words));
     }
 
-    let ids: BTreeMap<u32, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
+    let ids = field.identities();
     for echo in echoes {
         let part = echo.part.to_usize();
         let tag = field.scene.parts[part].tag;
-        let reflectance = echo.intensity * echo.range * echo.range;
         let pulse = &echo.pulse;
         out.extend(steps(echo.at()).map(i32::to_le_bytes).concat());
-        out.extend((reflectance * f32::from(u16::MAX)).round_to::<u16>().to_le_bytes());
+        out.extend((echo.apparent_reflectance() * f32::from(u16::MAX)).round_to::<u16>().to_le_bytes());
         out.push(return_number(echo.number) | return_number(echo.count) << 4);
         out.extend([0, class(tag.class), field.kinds[part].number()]);
         out.extend((wrapped(pulse.azimuth_deg) / ANGLE_STEP).round_to::<i16>().to_le_bytes());

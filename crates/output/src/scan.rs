@@ -8,7 +8,6 @@ use furrow_field::Field;
 use furrow_optics::sensor::Lidar;
 use furrow_optics::texture::ColorSpace;
 use furrow_render::render::Echo;
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -36,7 +35,7 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
         cloud.comment(&vector(name, axis));
     }
     cloud.comment(&vector("velocity_m_s", lidar.velocity));
-    let ids: BTreeMap<u32, u32> = field.plants.iter().map(|plant| (plant.number, plant.id)).collect();
+    let ids = field.identities();
     for echo in echoes {
         let part = &field.scene.parts[echo.part.to_usize()];
         let [r, g, b, nir] = echo.reflectance.to_array().map(|linear| ColorSpace::Srgb.encode(linear));
@@ -55,7 +54,7 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
             &[
                 Value::Float(echo.range),
                 Value::Float(echo.intensity),
-                Value::Float(echo.intensity * echo.range * echo.range),
+                Value::Float(echo.apparent_reflectance()),
                 Value::Float(pulse.azimuth_deg),
                 Value::Float(pulse.time_s),
                 Value::Int(pulse.beam.into()),

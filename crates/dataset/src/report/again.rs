@@ -40,7 +40,10 @@ fn command(recipe: &Recipe) -> Option<String> {
     if !made.without.is_empty() {
         option("--without", &made.without.iter().map(|technique| technique.name()).collect::<Vec<_>>().join(","));
     }
-    if let Some(depth) = made.max_depth {
+    // The preset sets the maximum depth.
+    if let Some(preset) = made.quality {
+        option("--quality", &preset.name());
+    } else if let Some(depth) = made.max_depth {
         option("--max-depth", &depth);
     }
     if let Some(clamp) = made.clamp {

@@ -81,6 +81,11 @@ impl Field {
         Some((self.scanners.get(frame.to_usize())?, stream))
     }
 
+    /// Returns the identities of the plants by their numbers in label maps.
+    pub fn identities(&self) -> BTreeMap<u32, u32> {
+        self.plants.iter().map(|plant| (plant.number, plant.id)).collect()
+    }
+
     /// Returns the field's provenance, one `key: value` per line: program, hash of the scene files, seed, index.
     pub fn provenance(&self) -> String {
         let Self { hash, seed, index, .. } = self;

@@ -20,7 +20,7 @@ const CURL: f32 = 0.2;
 /// Maximum number of ribbons of one blade, a guard against species files that ask for a million lobes.
 pub(super) const MOST: usize = 600;
 
-/// Width up to which a lobe is a strip, in segments.
+/// Largest width of a lobe that is a strip, in segments.
 const NARROW: f32 = 1.4;
 /// Depth of a ribbon's keel, in half-widths.
 const KEEL: f32 = 0.55;

@@ -181,9 +181,10 @@ impl Ground {
             t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
         };
         let mixed = |k: usize| grain(k).map(|factor| factor.powf(GRAINS_TINT));
-        let sum = |of: &dyn Fn(usize) -> Spectrum| (0..side * side).fold(Spectrum::ZERO, |sum, k| sum + of(k));
+        let mixed: Vec<Spectrum> = (0..side * side).into_par_iter().map(mixed).collect();
         // Mixing keeps the mean colour.
-        let gain = sum(&grain) / sum(&mixed) * gain;
+        let plain = (0..side * side).fold(Spectrum::ZERO, |sum, k| sum + grain(k));
+        let gain = plain / mixed.iter().fold(Spectrum::ZERO, |sum, colour| sum + *colour) * gain;
         let texel_at = |k: usize| {
             let p = raster.origin + vec2((k % side).to_f32(), (k / side).to_f32()) * texel;
             let mut noise = [0.0; MAX_LAYERS];
@@ -191,7 +192,7 @@ impl Ground {
                 *n = self.blend.noise(i, p);
             }
             let weights = self.blend.weights(noise, self.blend.heights(maps, p));
-            let albedo = self.dry(maps, weights, p) * tints[k] * mixed(k) * gain;
+            let albedo = self.dry(maps, weights, p) * tints[k] * mixed[k] * gain;
             (GroundMaps::encode(albedo), weights.map(|w| (w * 255.0 + 0.5).trunc_to::<u8>()))
         };
         let (albedo, weights): (Vec<_>, Vec<_>) = (0..side * side).into_par_iter().map(texel_at).unzip();

@@ -35,10 +35,10 @@ const HALF_DRY: [f32; 2] = [0.35, 0.12];
 /// joined to the ground, mm.
 const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
 const GRADED_MM: f32 = 5.0;
-/// Excess of fine aggregates on the ground, as [`Ground::fines`], from which a base is at most one level moister and from
-/// which it is as dry as the clod.
+/// Excess of fine aggregates on the ground, as [`Ground::fines`]. Above the first, a base is at most one level moister;
+/// above the second it is as dry as the clod.
 const DRY_FINES: [f32; MOIST_BELOW.len()] = [0.0, 0.25];
-/// Buried fraction of its height from which a clod is one level moister.
+/// Buried fraction of the height above which a clod is one level moister.
 const MOIST_SUNK: f32 = 0.45;
 /// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
 const FILLET: f32 = 0.6;
@@ -152,7 +152,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
                     corners.iter().all(|c| c.z < ground.height(c.x, c.y) - 3e-4)
                 }
             };
-            // The base is moister than the top, as the ground is that it stands in.
+            // The base is as moist as the ground around it.
             let fines = ground.fines(at);
             let bases = DRY_FINES.iter().filter(|dry| graded && fines < **dry).count();
             let moister = |corners: [Vec3; 3]| {

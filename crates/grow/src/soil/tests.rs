@@ -518,8 +518,8 @@ fn the_material_of_clods_is_porous_and_as_bright_as_the_soil() {
 }
 
 /// Rationale: between dry clods, photographs show dry fines and, where these are few, moist ground. Expected: ground with
-/// more fines than the mean is drier and ground with fewer is moister, with about the same mean; the moist bases of clods
-/// stand in the latter.
+/// more fines than the mean is drier and ground with fewer is moister, with about the same mean; moist bases of clods
+/// are where fines are few.
 #[test]
 fn ground_is_dry_under_fines_and_moist_between_them() {
     let mut page = page();
@@ -548,8 +548,8 @@ fn ground_is_dry_under_fines_and_moist_between_them() {
     assert!(under(MOISTURE_LEVELS - 1) < under(0) - 0.05, "{} {}", under(MOISTURE_LEVELS - 1), under(0));
 }
 
-/// Rationale: grains of many colours make a clod look like a rock. Expected: the colour within a clod varies less than half
-/// as much as that from crumb to crumb on the ground.
+/// Rationale: grains of many colours make a clod look like a rock. Expected: the colour within a clod has less than half of
+/// the variation between crumbs on the ground.
 #[test]
 fn the_soil_within_a_clod_is_mixed() {
     let mut page = page();

@@ -61,6 +61,11 @@ impl Echo {
     pub fn at(&self) -> Vec3 {
         self.pulse.origin + self.pulse.direction * self.range
     }
+
+    /// Apparent reflectance: that of a white Lambertian surface at normal incidence is 1.
+    pub fn apparent_reflectance(&self) -> f32 {
+        self.intensity * self.range * self.range
+    }
 }
 
 /// Energy returned by one ray of a pulse.

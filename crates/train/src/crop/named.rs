@@ -50,7 +50,7 @@ pub fn exported(trained: TrainedModel, names: &[String]) -> Result<TrainedModel>
 /// Returns an error if `auto` is given beside other names, which it contradicts.
 fn check_auto(names: &[String]) -> Result<()> {
     if names.iter().any(|name| name == AUTO) && names.iter().any(|name| name != AUTO) {
-        return Err(Error::misuse("--crop auto stands for crops of any kind and takes no others beside it")
+        return Err(Error::misuse("--crop auto means crops of any kind and cannot be combined with names")
             .help("name the crops, or give --crop auto alone"));
     }
     Ok(())
