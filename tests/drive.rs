@@ -522,7 +522,11 @@ fn a_table_of_poses_is_read_by_the_names_of_its_columns() {
     std::fs::create_dir_all(&folder).unwrap();
     let flown = |name: &str, poses: &[u8]| {
         std::fs::write(folder.join(name), poses).unwrap();
-        along(&folder, &format!("{name}.ron"), 2, &format!("Poses(\"{name}\")"))
+        let page = along(&folder, &format!("{name}.ron"), 2, &format!("Poses(\"{name}\")"));
+        // Cameras do not depend on clods, which take most of the time.
+        let bare = std::fs::read_to_string(&page).unwrap().replace("over_5mm_per_m2: 4000", "over_5mm_per_m2: 0");
+        std::fs::write(&page, bare).unwrap();
+        page
     };
     let cameras = |page: &Path| SceneFile::open(page).unwrap().cameras(0).unwrap();
     let tum = "0 0 0 0.9 0.92388 0.382683 0 0\n0.25 0 0.1 0.9 0.92388 0.382683 0 0\n";

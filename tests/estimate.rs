@@ -46,13 +46,16 @@ fn with_soil(soil: &str) -> (tempfile::TempDir, PathBuf) {
     (keep, path)
 }
 
-/// Expected: besides the estimate, every field has parts, lights and sound meshes, and no unintended warning.
+/// Expected: besides the estimate, every field has parts, lights and sound meshes, no unintended warning, and the same labels
+/// from the raster engine, for which the fields would otherwise be built again.
 #[test]
-fn the_scene_files_that_ship_build_as_estimated() {
-    let options = Options { width: Some(96), ..Options::default() };
+fn the_scene_files_that_ship_build_as_estimated_and_have_the_same_labels_from_both_engines() {
+    let options = Options { width: Some(160), ..Options::default() };
     let scenes = std::fs::read_dir("scenes").expect("scenes").map(|e| e.expect("an entry").path());
     let scenes: Vec<PathBuf> = scenes.filter(|path| path.extension().is_some_and(|e| e == "ron")).collect();
     assert!(scenes.len() >= 15);
+    #[cfg(feature = "raster")]
+    let mut too_large = 0;
     for path in scenes {
         let name = path.display().to_string();
         let (field, ratio) = built(&path, &options);
@@ -64,7 +67,13 @@ fn the_scene_files_that_ship_build_as_estimated() {
         for part in &field.scene.parts {
             assert_eq!(part.mesh.fault(), None, "{name}");
         }
+        #[cfg(feature = "raster")]
+        if !crate::raster::labels_are_those_of_the_rays(&name, &field.scene) {
+            too_large += 1;
+        }
     }
+    #[cfg(feature = "raster")]
+    assert!(too_large <= 1, "{too_large} fields exceed the limits of the raster engine");
 }
 
 /// Each soil is as dense as a test can afford; the same rule estimates soils a thousand times denser.

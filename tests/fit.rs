@@ -291,8 +291,8 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let folder = scratch.path();
     let set = set(folder, 4);
     let (three, two) = (folder.join("three"), folder.join("two"));
-    succeed(&mut fit(&set, &three, "--network unet --steps 1"));
-    succeed(fit(&set, &two, "--network unet --steps 1").args(["--classes", "soil; plant=crop,weed"]));
+    succeed(&mut fit(&set, &three, "--network tiny-unet --steps 1"));
+    succeed(fit(&set, &two, "--network tiny-unet --steps 1").args(["--classes", "soil; plant=crop,weed"]));
     assert_eq!(TrainedModel::open(&two).unwrap().card.classes.names(), ["soil", "plant"]);
     let kept = folder.join("kept.safetensors");
     fs::copy(three.join(run::WEIGHTS), &kept).unwrap();
@@ -300,14 +300,20 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
     let eval = |run: &Path| train(&format!("eval {} --set {} --threads 1", run.display(), set.display()));
     let error = refuse(&mut eval(&three), 1);
     assert!(error.contains("not the weights that model.json"), "{error}");
-    let error =
-        refuse(&mut fit(&set, &folder.join("on"), &format!("--network unet --steps 1 --init {}", two.display())), 2);
-    assert!(error.contains("not those of unet with 3 bands and 3 classes") && error.contains("head.conv"), "{error}");
+    let error = refuse(
+        &mut fit(&set, &folder.join("on"), &format!("--network tiny-unet --steps 1 --init {}", two.display())),
+        2,
+    );
+    assert!(
+        error.contains("not those of tiny-unet with 3 bands and 3 classes") && error.contains("head.conv"),
+        "{error}"
+    );
     // No file is left that would block the corrected command.
     assert!(!folder.join("on").exists());
-    for (other, stated) in
-        [("--network segnet", "--network unet"), ("--network unet --normalization fixed", "--normalization band")]
-    {
+    for (other, stated) in [
+        ("--network segnet", "--network tiny-unet"),
+        ("--network tiny-unet --normalization fixed", "--normalization band"),
+    ] {
         let other = format!("{other} --steps 1 --init {}", three.display());
         fs::copy(&kept, three.join(run::WEIGHTS)).unwrap();
         let error = refuse(&mut fit(&set, &folder.join("on"), &other), 2);
@@ -323,7 +329,7 @@ fn weights_of_other_classes_and_damaged_ones_are_refused() {
         ("bands", "\"green\"", "\"red\"", "are not valid bands"),
         ("classes", "\"name\": \"plant\"", "\"name\": \"soil\"", "each class needs a name of its own"),
         ("labels", "\"crop\",", "\"soil\",", "a label belongs to one class alone"),
-        ("network", "\"unet\"", "\"segnet\"", "parameters: this network"),
+        ("network", "\"tiny-unet\"", "\"segnet\"", "parameters: this network"),
         (
             "normalisation",
             "\"normalisation\": \"band\"",
@@ -511,7 +517,7 @@ fn calibrated_a_network_overlaps_better() {
     let folder = scratch.path();
     let set = set(folder, 6);
     let (plain, both, even) = (folder.join("plain"), folder.join("both"), folder.join("even"));
-    let more = "--network unet --steps 30 --class-weights median";
+    let more = "--network tiny-unet --steps 30 --class-weights median";
     succeed(&mut fit(&set, &plain, more));
     succeed(&mut fit(&set, &both, &format!("{more} --calibrate 6")));
     let calibrate = || {

@@ -83,7 +83,7 @@ fn has_several_stems(page: &Page, stage: &StageDesc) -> bool {
 fn everywhere(mut look: impl FnMut(&Page, &StageDesc, &Plant)) {
     for page in pages() {
         for stage in &page.plant.stages {
-            let seeds = if stage.inflorescences.is_empty() { 20 } else { 3 };
+            let seeds = if stage.inflorescences.is_empty() { 10 } else { 3 };
             for seed in 0..seeds {
                 look(&page, stage, &grow(&page.plant, Stage::Bbch(stage.bbch), &stream(seed)));
             }
@@ -184,16 +184,19 @@ fn distance_to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
 }
 
 fn distance(points: &[Vec3], mesh: &Mesh) -> f32 {
+    // No point of a triangle is farther from its first vertex than the longer of the two sides that meet there.
+    let sides = (0..mesh.triangles.len().to_u32()).map(|i| {
+        let [a, b, c] = mesh.corners(i);
+        a.distance_squared(b).max(a.distance_squared(c))
+    });
+    let side = sides.fold(0.0, f32::max).sqrt();
     let mut least = f32::MAX;
-    for i in 0..mesh.triangles.len().to_u32() {
-        let corners = mesh.corners(i);
-        // No point of a triangle is farther from a vertex than the longer of the two sides that meet there.
-        let side = corners[1].distance(corners[0]).max(corners[2].distance(corners[0]));
-        for p in points {
-            if p.distance(corners[0]) >= least + side {
-                continue;
+    for p in points {
+        for (i, triangle) in (0..).zip(&mesh.triangles) {
+            let far = p.distance_squared(mesh.positions[triangle[0].to_usize()]);
+            if far < (least + side) * (least + side) {
+                least = least.min(far.sqrt()).min(distance_to_triangle(*p, mesh.corners(i)));
             }
-            least = least.min(distance_to_triangle(*p, corners));
         }
     }
     least

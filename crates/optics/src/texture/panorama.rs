@@ -101,7 +101,7 @@ mod tests {
     fn fine_pictures_keep_their_light() {
         // Mantissas 250, 0 and 125 under 2²⁰: about 10⁶.
         let sun = |row: usize| move |k: usize| if k == row * 8192 + 5000 { [250, 0, 125, 148] } else { [0; 4] };
-        for row in [0, 1, 2, 7, 700, 2048, 4095] {
+        for row in [0, 1, 700, 4095] {
             let bytes = radiance(8192, 4096, sun(row));
             let of = Panorama::decode(&bytes).unwrap();
             assert_eq!((of.width, of.height), (2048, 1024));

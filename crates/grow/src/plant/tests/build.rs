@@ -208,7 +208,8 @@ fn a_potato_has_several_stems_that_stay_what_they_are() {
     for seed in 0..60 {
         let stream = stream(seed);
         let (mut counts, mut feet) = (Vec::new(), BTreeMap::<u16, Vec3>::new());
-        for day in 5..36 {
+        // Later days of the first seeds only: they differ in positions, not in the number of stems.
+        for day in 5..if seed < 12 { 36 } else { 6 } {
             let [plant, first] = [&desc, &single].map(|desc| grow(desc, Stage::Age(day.to_f32()), &stream));
             assert_eq!(plant.organs[..first.organs.len()], first.organs, "seed {seed}, day {day}");
             let hypocotyls = || plant.organs.iter().filter(|o| o.kind == OrganKind::Hypocotyl);
