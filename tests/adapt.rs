@@ -71,7 +71,7 @@ static TRAINED: LazyLock<PathBuf> = LazyLock::new(|| {
         fs::remove_dir_all(&folder).unwrap();
     }
     let (set, out) = (set(&folder.join("day"), DAY, 0, true), folder.join("run"));
-    let how = "--network tiny-unet --size 64x48 --steps 120 --rate 0.005 --augment flip,crop --normalization image";
+    let how = "--network tiny-unet --size 64x48 --steps 300 --rate 0.005 --augment flip,crop --normalization image";
     succeed(&format!("fit --set {}@all --out {} {how} --batch 4", set.display(), out.display()));
     out
 });

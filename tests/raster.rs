@@ -60,7 +60,7 @@ fn near(scene: &Scene, geometry: &EmbreeAccel, tag: Tag, x: u32, y: u32) -> bool
 
 /// Checks labels, depths and normals of a field of a shipped scene file, as [`crate::estimate`] builds them. Returns `false` if
 /// the field exceeds the GPU's limits.
-pub fn labels_are_those_of_the_rays(name: &str, scene: &Scene) -> bool {
+pub(crate) fn labels_are_those_of_the_rays(name: &str, scene: &Scene) -> bool {
     let geometry = EmbreeAccel::build(&scene.surfaces(), 2).expect("an accelerator");
     // These effects change no label: `each_effect_changes_the_picture_and_no_label`.
     let plain = Techniques::without(&[Technique::Shadows, Technique::Ssao, Technique::Msaa]);
