@@ -379,8 +379,8 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, MOST_CALIBRATION).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
-        Calibration::read(&text).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+        let read = input::utf8_lossy(&bytes).and_then(|text| Calibration::read(&text));
+        read.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
     /// Notes a warning about the file that `page` names, once.
@@ -399,8 +399,8 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let text = String::from_utf8_lossy(&bytes);
-        measured::reflectance(&text).map_err(|e| at_its_place(page, path, "", e.in_file(full)))
+        let read = input::utf8_lossy(&bytes).and_then(|text| measured::reflectance(&text));
+        read.map_err(|e| at_its_place(page, path, "", e.in_file(full)))
     }
 
     /// Resolves the texture files of a soil layer, counts them, and returns their key among the counted images.
