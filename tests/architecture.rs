@@ -91,6 +91,8 @@ const ALLOWED: &[(&str, &str)] = &[
     // Photographs (input), and thumbnails for HTML pages (output).
     ("image", "texture/ output/photo.rs"),
     ("indicatif", "bin/"),
+    // Compressed point clouds.
+    ("laz", "output/las.rs"),
     // Open Image Denoise, if installed.
     ("libloading", "output/denoise/oidn/"),
     // HTML pages: the modules that write them, and the parts they share.

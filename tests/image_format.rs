@@ -40,11 +40,12 @@ fn apart(a: &[u8], b: &[u8]) -> f64 {
 }
 
 /// Format files, without their extension, that are copies of image 0.
-const COPIES: [&str; 6] = [
+const COPIES: [&str; 7] = [
     "coco/images/train/000000",
     "panoptic/images/train/000000",
     "yolo/images/train/000000",
     "yolo-detect/images/train/000000",
+    "yolo-obb/images/train/000000",
     "yolo-pose/images/train/000000",
     "imagefolder/train/images/000000",
 ];
@@ -53,8 +54,7 @@ const COPIES: [&str; 6] = [
 fn all_readers_have_the_pixels_of_the_file() {
     let (_keep, base) = scratch();
     let (jpeg, png) = (base.join("jpeg"), base.join("png"));
-    let formats =
-        "cityscapes,coco,colmap,cropandweed,imagefolder,nerf,panoptic,phenobench,voc,yolo,yolo-detect,yolo-pose";
+    let formats = "cityscapes,coco,colmap,cropandweed,imagefolder,nerf,panoptic,phenobench,voc,yolo,yolo-detect,yolo-obb,yolo-pose";
     succeed(make(&jpeg, 2, &["--image-format", "jpeg90", "--format", formats]));
     succeed(make(&png, 2, &["--format", formats]));
     let read = |folder: &Path| native::read(folder, "000000").unwrap();

@@ -446,8 +446,9 @@ fn label_files_read_back_as_the_label_map() {
         kernels: "none".into(),
     };
     let (_keep, out) = program::scratch();
-    furrow_output::write_files(&out, &furrow_output::image_files(&film, &map, &photograph, &provenance).unwrap())
-        .unwrap();
+    let tags = furrow_output::CameraTags::of(&field);
+    let files = furrow_output::image_files(&film, &map, &photograph, &provenance, &tags).unwrap();
+    furrow_output::write_files(&out, &files).unwrap();
     let (sw, sh, classes) = furrow_output::read_indexed(&out.join("semantics.png")).unwrap();
     assert_eq!((sw, sh), (w, h));
     let of = |f: fn(&Tag) -> u32| map.tags.iter().map(f).collect::<Vec<u32>>();

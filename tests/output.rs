@@ -6,10 +6,11 @@
 //! and `furrow_output::exr`.
 
 use crate::common::program::{FILES, SMALL, bits, field, names, run, scratch, shoot, small_text, trace};
+use crate::common::python::python;
 use exr::prelude::*;
 use furrow_base::math::Spectrum;
 use furrow_field::assemble::Options;
-use furrow_output::{Provenance, Spp};
+use furrow_output::{CameraTags, Provenance, Spp};
 use furrow_render::film::Film;
 use furrow_render::render::{LabelMap, label::NONE};
 use std::collections::BTreeMap;
@@ -33,11 +34,9 @@ fn written() -> (tempfile::TempDir, std::path::PathBuf, Film, LabelMap, Provenan
     let (film, labels) = shoot(&field, 3, 2);
     let provenance = provenance(&field.hash);
     let (keep, out) = scratch();
-    furrow_output::write_files(
-        &out,
-        &furrow_output::image_files(&film, &labels, &field.photograph(&film), &provenance).unwrap(),
-    )
-    .unwrap();
+    let (photograph, tags) = (field.photograph(&film), CameraTags::of(&field));
+    let files = furrow_output::image_files(&film, &labels, &photograph, &provenance, &tags).unwrap();
+    furrow_output::write_files(&out, &files).unwrap();
     (keep, out, film, labels, provenance)
 }
 
@@ -136,8 +135,13 @@ fn text_of(path: &File) -> Vec<(String, String)> {
 fn a_pngs_text_has_its_origin_but_no_path_and_no_time() {
     let (_keep, out, .., provenance) = written();
     for name in FILES.iter().filter(|f| **f != "radiance.exr") {
-        let texts = text_of(&out.join(name));
+        let (texts, tags): (Vec<_>, Vec<_>) =
+            text_of(&out.join(name)).into_iter().partition(|(kind, _)| kind == "tEXt");
         assert_eq!(texts, [("tEXt".to_string(), format!("Comment\0{}", provenance.text()))], "{name}");
+        // Images of the sensor have the camera's tags too.
+        let kinds: Vec<&str> = tags.iter().map(|(kind, _)| kind.as_str()).collect();
+        let is_photograph = name.starts_with("rgb") || name.starts_with("nir");
+        assert_eq!(kinds, if is_photograph { &["eXIf", "iTXt"][..] } else { &[] }, "{name}");
     }
     let text = provenance.text();
     for key in
@@ -149,6 +153,31 @@ fn a_pngs_text_has_its_origin_but_no_path_and_no_time() {
     let prose = text.replace(&text.lines().nth(1).unwrap()["scene: sha256 ".len()..], "");
     for hint in ["/", "\\", ".ron", &year.to_string()] {
         assert!(!prose.contains(hint), "`{hint}` in\n{text}");
+    }
+}
+
+/// Expected: Pillow reads lens, exposure, place and time as the scene file gives them, and the band from the XMP packet.
+#[test]
+fn pillow_reads_the_tags_of_the_camera() {
+    let Some(python) = python("import PIL") else { return };
+    let (keep, out) = scratch();
+    let page = keep.path().join("tags.ron");
+    let text = "Field(seed: 1, camera: JaiAd130(focal_mm: 8, height_m: 0.5, f_number: 4, motion: (exposure_ms: 2)), \
+                lights: [Daylight(sun: At(latitude_deg: 50.6, longitude_deg: -7.25, utc: \"2016-05-27T09:30:00Z\", later_h: 1))])";
+    std::fs::write(&page, text).unwrap();
+    let args = ["--scene", page.to_str().unwrap(), "--spp", "1", "--width", "32", "--quiet", "--out"];
+    let done = trace(&args).arg(&out).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let script = "import sys; from PIL import Image; i = Image.open(sys.argv[1]); e = i.getexif(); s = e.get_ifd(0x8769); \
+                  g = e.get_ifd(0x8825); print(e[271], float(s[0x920a]), float(s[0x829d]), float(s[0x829a]), s[0x9003], \
+                  [float(x) for x in g[2]], g[3], [float(x) for x in g[4]], s[0xa002], s[0xa405]); \
+                  print(i.info['XML:com.adobe.xmp'].split('BandName>')[1])";
+    for (name, band) in [("rgb.png", "Red"), ("nir.png", "NIR")] {
+        let read = std::process::Command::new(&python).args(["-c", script]).arg(out.join(name)).output().unwrap();
+        let words = String::from_utf8_lossy(&read.stdout).into_owned();
+        let tags = "Furrow 8.0 4.0 0.002 2016:05:27 10:30:00 [50.0, 36.0, 0.0] W [7.0, 15.0, 0.0] 32 59\n";
+        assert!(words.starts_with(tags), "{words}{}", String::from_utf8_lossy(&read.stderr));
+        assert!(words.contains(&format!("<rdf:li>{band}</rdf:li>")), "{words}");
     }
 }
 

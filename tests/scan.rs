@@ -482,6 +482,8 @@ fn errors_are_reported_and_write_nothing() {
     assert_eq!(names(&out), ["scan.las", "scan.ply"]);
     las_is_the_ply(&std::fs::read(out.join("scan.las")).unwrap(), &found);
     // A file of an earlier scan beside this one's would show another field.
+    assert!(scan(&good, &["--laz"]).output().unwrap().status.success());
+    assert_eq!(names(&out), ["scan.laz", "scan.ply"]);
     assert!(scan(&good, &[]).output().unwrap().status.success());
     assert_eq!(names(&out), ["scan.ply"]);
 }
@@ -496,13 +498,17 @@ fn las_is_the_ply(file: &[u8], ply: &BTreeMap<String, Vec<f64>>) {
     let u32_at = |at: usize| u32::from_le_bytes(bytes(file, at)) as usize;
     let f64_at = |at: usize| f64::from_le_bytes(bytes(file, at));
     assert_eq!((&file[..4], &file[24..26], u16_at(94)), (&b"LASF"[..], &[1, 4][..], 375));
-    assert_eq!((u16_at(6), file[104], u32_at(100), u32_at(107)), (16, 6, 1, 0));
+    assert_eq!((u16_at(6), file[104], u32_at(100), u32_at(107)), (16, 6, 2, 0));
     let (begin, length) = (u32_at(96), u16_at(105));
     let count = u64::from_le_bytes(bytes(file, 247)) as usize;
     assert_eq!((count, file.len()), (ply["x"].len(), begin + count * length));
-    // The record of extra bytes fills the space between the header and the points.
-    assert_eq!((&file[377..386], u16_at(393), 375 + 54 + u16_at(395)), (&b"LASF_Spec"[..], 4, begin));
-    let extra: Vec<(u8, String)> = (375 + 54..begin)
+    // The bit of a text for the coordinate system has its record, the first one; the record of extra bytes follows.
+    let system = 375 + 54 + u16_at(395);
+    assert_eq!((&file[377..392], u16_at(393)), (&b"LASF_Projection"[..], 2112));
+    assert!(file[375 + 54..].starts_with(b"LOCAL_CS[") && file[system - 1] == 0);
+    assert_eq!((&file[system + 2..system + 11], u16_at(system + 18)), (&b"LASF_Spec"[..], 4));
+    assert_eq!(system + 54 + u16_at(system + 20), begin);
+    let extra: Vec<(u8, String)> = (system + 54..begin)
         .step_by(192)
         .map(|at| (file[at + 2], String::from_utf8_lossy(&file[at + 4..at + 36]).trim_end_matches('\0').to_owned()))
         .collect();

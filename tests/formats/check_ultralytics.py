@@ -1,4 +1,4 @@
-"""Opens DATASET/yolo, yolo-detect and yolo-pose with Ultralytics' own dataset class and compares the result with the native maps;
+"""Opens DATASET/yolo, yolo-detect, yolo-obb and yolo-pose with Ultralytics' own dataset class and compares the result with the native maps;
 loss.json must state the loss of the masks that it rasterizes."""
 
 import json
@@ -56,7 +56,24 @@ def keypoint(point, size):
     return [point["x"] / size[0], point["y"] / size[1], 2 if point["state"] == "visible" else 1]
 
 
-for name, task in [("yolo", "segment"), ("yolo-detect", "detect"), ("yolo-pose", "pose")]:
+def check_oriented(own, segments):
+    """Each rectangle contains all pixels of its plant, and is at most as large as the upright box."""
+    height, width = own.plants.shape
+    for plant, segment in zip(own.seen(), segments, strict=True):
+        corners = segment * [width, height]
+        assert corners.shape == (4, 2)
+        sides = np.roll(corners, -1, 0) - corners
+        lengths = np.hypot(*sides.T)
+        assert abs(sides[0] @ sides[1]) < 1e-4 * lengths[0] * lengths[1]
+        rows, columns = np.nonzero(own.plant_mask(plant))
+        pixels = np.concatenate([np.stack([columns + dx, rows + dy], 1) for dx in (0, 1) for dy in (0, 1)])
+        along = (pixels - corners[0]) @ (sides[:2] / lengths[:2, None]).T
+        assert (along > -1e-3).all() and (along < lengths[:2] + 1e-3).all()
+        box = plant["seen"]["box"]
+        assert lengths[0] * lengths[1] < box[2] * box[3] + 1e-3
+
+
+for name, task in [("yolo", "segment"), ("yolo-detect", "detect"), ("yolo-obb", "obb"), ("yolo-pose", "pose")]:
     # Ultralytics leaves a cache beside the labels.
     root = Path(scratch) / name
     shutil.copytree(dataset / name, root)
@@ -76,6 +93,9 @@ for name, task in [("yolo", "segment"), ("yolo-detect", "detect"), ("yolo-pose",
             assert label["shape"] == (height, width)
             seen = own.seen()
             assert [data["names"][int(c)] for c in label["cls"][:, 0]] == [p["class"] for p in seen]
+            if task == "obb":
+                check_oriented(own, label["segments"])
+                continue
             boxes = np.array([p["seen"]["box"] for p in seen], float).reshape(-1, 4)
             boxes[:, :2] += boxes[:, 2:] / 2
             error = np.abs(label["bboxes"] * [width, height, width, height] - boxes)

@@ -10,7 +10,7 @@ use super::species_text::SpeciesFile;
 use furrow_base::error::{Kind, Place};
 use furrow_base::geometry::{AlphaMask, Margin};
 use furrow_base::input::{self, Outside, Scope, shipped};
-use furrow_base::math::{Spectrum, ToFloat};
+use furrow_base::math::{Spectrum, ToFloat, ToInt};
 use furrow_base::ron_file::{Pick, RonFile, nearest};
 use furrow_base::{Error, Result};
 use furrow_grow::model::{Model, Up};
@@ -98,6 +98,11 @@ pub(super) struct Library {
     pub(super) growing: SceneEdit,
     /// Texts to read in place of those of scene and species files, by path.
     pub(super) replaced: BTreeMap<PathBuf, String>,
+    /// Whether images and maps whose hash the previous library knows are not read again: `true` while a search for mistakes
+    /// reads the same files many times.
+    trusts_images: bool,
+    /// Bytes of the files that this library has read.
+    bytes_read: u64,
     /// Library of the previous field: its entries are reused if the contents of their files have not changed.
     before: Option<Arc<Library>>,
 }
@@ -113,6 +118,13 @@ impl Library {
         let (scope, growing) = (self.scope.clone(), self.growing);
         let before = Some(Arc::new(Self { before: None, ..self }));
         Self { scope, growing, before, ..Self::default() }
+    }
+
+    /// Like [`Library::renewed`], for reading the same files many times at one moment: images are not hashed and names of
+    /// built-in files not looked up again.
+    pub(super) fn renewed_at_once(self) -> Self {
+        let shipped = self.shipped.clone();
+        Self { shipped, trusts_images: true, ..self.renewed() }
     }
 
     /// Returns the decoded data of the previous library if none of `files` has changed. All that exist must have been noted before.
@@ -166,7 +178,13 @@ impl Library {
     /// Notes the hash of `text` as the contents of `path`, and returns the text with its path.
     pub(super) fn page_of(&mut self, path: &Path, text: &str) -> RonFile {
         self.files.insert(path.into(), Sha256::digest(text.as_bytes()).into());
+        self.bytes_read += text.len().to_u64();
         RonFile { path: path.into(), text: text.to_owned() }
+    }
+
+    /// Returns the number of bytes of the files that this library has read.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.bytes_read
     }
 
     /// Returns the paths of all files that were read, sorted.
@@ -379,8 +397,8 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, MOST_CALIBRATION).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes));
-        Calibration::read(&text).map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
+        let read = input::utf8_lossy(&bytes).and_then(|text| Calibration::read(&text));
+        read.map_err(|e| at_its_place(page, path, "", e.in_file(&full)))
     }
 
     /// Notes a warning about the file that `page` names, once.
@@ -399,8 +417,8 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let text = String::from_utf8_lossy(&bytes);
-        measured::reflectance(&text).map_err(|e| at_its_place(page, path, "", e.in_file(full)))
+        let read = input::utf8_lossy(&bytes).and_then(|text| measured::reflectance(&text));
+        read.map_err(|e| at_its_place(page, path, "", e.in_file(full)))
     }
 
     /// Resolves the texture files of a soil layer, counts them, and returns their key among the counted images.
@@ -455,7 +473,15 @@ impl Library {
     }
 
     fn note(&mut self, path: &Path) -> Result<()> {
-        self.files.insert(path.into(), digest(path)?);
+        let known = self.before.as_deref().filter(|_| self.trusts_images).and_then(|before| before.files.get(path));
+        let digest = match known {
+            Some(known) => *known,
+            None => {
+                self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
+                digest(path)?
+            }
+        };
+        self.files.insert(path.into(), digest);
         Ok(())
     }
 }
@@ -579,6 +605,22 @@ mod tests {
         let mut fresh = Library::default();
         read(&mut fresh);
         assert_eq!(third.hash(), fresh.hash());
+    }
+
+    /// Rationale: the search for mistakes reads the same files up to 150 times. Expected: it reads images once; a later search,
+    /// or the next field, reads them again.
+    #[test]
+    fn one_search_reads_images_once() {
+        let page = RonFile::of("Species()");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../textures/leaf/sugar_beet.png");
+        let read = |mut library: Library| {
+            library.picture(&page, path, 0.02).unwrap();
+            (library.bytes_read(), library)
+        };
+        let (first, library) = read(Library::default());
+        let (again, library) = read(library.renewed_at_once());
+        let (next, _) = read(library.renewed());
+        assert!(first > 0 && again == 0 && next == first, "{first} {again} {next}");
     }
 
     #[test]

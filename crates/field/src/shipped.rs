@@ -8,6 +8,9 @@ use furrow_base::{Error, Result};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
+/// Fewest letters of a word of a name in another language that finds a species: `de` and `des` say nothing.
+const SHORTEST_WORD: usize = 4;
+
 /// A species that ships with the program.
 pub struct Shipped {
     /// Path of the species file.
@@ -30,9 +33,18 @@ impl Shipped {
         own.into_iter().chain(aliases::of(&self.stem()).iter().map(|name| (*name).to_owned())).collect()
     }
 
-    /// Returns `true` if `word` is one of the words of the English name, such as `thistle` in "creeping thistle".
+    /// Returns `true` if this is one of the names, regardless of case, signs and accents.
+    fn is_called(&self, name: &str) -> bool {
+        self.names().iter().any(|own| aliases::same(own, name))
+    }
+
+    /// Returns `true` if `word` is one of the words of the English name, such as `thistle` in "creeping thistle", or of
+    /// another name. Only the English name is split at hyphens: a sow-thistle is no thistle.
     fn has_word(&self, word: &str) -> bool {
-        self.desc.name.split(|c: char| !c.is_alphanumeric() && c != '\'').any(|own| own.eq_ignore_ascii_case(word))
+        let english = self.desc.name.split(|c: char| !c.is_alphanumeric() && c != '\'');
+        let others = aliases::of(&self.stem()).iter().filter(|name| name.contains(' '));
+        let others = others.flat_map(|name| name.split(' ')).filter(|own| own.chars().count() >= SHORTEST_WORD);
+        english.chain(others).any(|own| aliases::same(own, word))
     }
 }
 
@@ -70,46 +82,56 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
         return Ok(None);
     }
     let (all, faults) = all_species()?;
-    if let Some(species) = named(&all, wanted) {
-        return Ok(Some(species.file.clone()));
-    }
-    if Path::new(wanted).extension().is_some() {
-        return Ok(None);
-    }
-    let with_word: Vec<&Shipped> = all.iter().filter(|species| species.has_word(wanted)).collect();
-    match with_word.as_slice() {
+    match called(&all, wanted).as_slice() {
         [one] => Ok(Some(one.file.clone())),
+        [] if Path::new(wanted).extension().is_some() => Ok(None),
         [] => {
-            let words = |species: &Shipped| species.desc.name.split(' ').map(str::to_owned).collect::<Vec<_>>();
-            let mut names: Vec<String> =
-                all.iter().flat_map(|species| [species.names(), words(species)].concat()).collect();
-            names.retain(|name| !name.is_empty());
             // The wanted species may be in a file that cannot be read.
             if let Some((_, fault)) = faults.into_iter().next() {
                 return Err(fault);
             }
-            let near = nearest(&names, wanted).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
-            Err(Error::input(format!("no built-in species is called `{wanted}`"))
-                .help(format!("{near}`trace species` lists them; a species file of your own ends in .ron")))
+            Err(unknown(&all, wanted))
         }
-        several => {
-            let names: Vec<&str> = several.iter().map(|species| species.desc.name.as_str()).collect();
-            Err(Error::input(format!("several species are called `{wanted}`"))
-                .help(format!("write {}", names.join(" or "))))
-        }
+        several => Err(ambiguous(several, wanted)),
     }
 }
 
-/// Finds the species with this name.
-fn named<'a>(all: &'a [Shipped], wanted: &str) -> Option<&'a Shipped> {
-    all.iter().find(|species| species.names().iter().any(|own| aliases::same(own, wanted)))
+/// Returns `true` if several species have this name, or a name with this word.
+pub fn is_ambiguous(name: &str) -> Result<bool> {
+    let is_file = shipped::species_files()?.iter().any(|file| file.file_stem().is_some_and(|stem| stem == name));
+    Ok(!is_file && called(&all_species()?.0, name).len() > 1)
+}
+
+/// Returns the species that have this name; if there is none, those that have a name with this word.
+fn called<'a>(all: &'a [Shipped], wanted: &str) -> Vec<&'a Shipped> {
+    let exact: Vec<&Shipped> = all.iter().filter(|species| species.is_called(wanted)).collect();
+    if exact.is_empty() { all.iter().filter(|species| species.has_word(wanted)).collect() } else { exact }
+}
+
+/// Returns the error about a name that no species has.
+fn unknown(all: &[Shipped], wanted: &str) -> Error {
+    let words = |species: &Shipped| species.desc.name.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    let mut names: Vec<String> = all.iter().flat_map(|species| [species.names(), words(species)].concat()).collect();
+    names.retain(|name| !name.is_empty());
+    let near = nearest(&names, wanted).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+    Error::input(format!("no built-in species is called `{wanted}`"))
+        .help(format!("{near}`trace species` lists them; a species file of your own ends in .ron"))
+}
+
+/// Returns the error about a name that several species have.
+fn ambiguous(several: &[&Shipped], wanted: &str) -> Error {
+    let names: Vec<&str> = several.iter().map(|species| species.desc.name.as_str()).collect();
+    Error::input(format!("several species are called `{wanted}`")).help(format!("write {}", names.join(" or ")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Expected: every shipped species has further names, and none of them is a name of another one.
+    /// Names that two species share; the error lists both.
+    const SHARED: [&str; 2] = ["BRSOX", "Brassica oleracea"];
+
+    /// Expected: every shipped species has further names, and none of them is a name of another one, but for [`SHARED`].
     #[test]
     fn no_name_means_two_species() {
         let all = all_species().unwrap().0;
@@ -117,7 +139,7 @@ mod tests {
         assert_eq!(stems, aliases::ALIASES.map(|(stem, _)| stem));
         for one in &all {
             for other in all.iter().filter(|other| other.file != one.file) {
-                let twice = one.names().into_iter().find(|a| other.names().iter().any(|b| aliases::same(a, b)));
+                let twice = one.names().into_iter().find(|a| other.is_called(a) && !SHARED.contains(&a.as_str()));
                 assert_eq!(twice, None, "{} and {}", one.stem(), other.stem());
             }
         }
@@ -129,7 +151,9 @@ mod tests {
         for species in &all {
             for name in species.names() {
                 assert!(!name.is_empty(), "{}", species.file.display());
-                assert_eq!(named(&all, &name).map(|found| &found.file), Some(&species.file), "{name}");
+                let found: Vec<String> = called(&all, &name).into_iter().map(Shipped::stem).collect();
+                assert!(found.contains(&species.stem()), "{name}: {found:?}");
+                assert!(found.len() == 1 || SHARED.contains(&name.as_str()), "{name}: {found:?}");
             }
         }
         let stem = |name| species(name).unwrap().map(|file| file.file_stem().unwrap().to_str().unwrap().to_owned());
@@ -145,6 +169,15 @@ mod tests {
             ("betterave sucriere", "sugar_beet"),
             ("Shepherds-purse", "capsella"),
             ("trigo", "wheat"),
+            ("haricot vert", "bean"),
+            ("haricots verts", "bean"),
+            ("spring onion", "onion"),
+            ("winter barley", "barley"),
+            ("Beta vulgaris var. altissima", "sugar_beet"),
+            ("mustard", "sinapis"),
+            ("PHSVN", "bean"),
+            ("horvw", "barley"),
+            ("BEAVA", "sugar_beet"),
         ] {
             assert_eq!(stem(name).as_deref(), Some(file), "{name}");
         }
@@ -183,5 +216,11 @@ mod tests {
         let message = |name| species(name).unwrap_err().to_string();
         assert!(message("thistel").contains("did you mean"), "{}", message("thistel"));
         assert!(message("grass").contains("barnyard grass or annual meadow-grass"), "{}", message("grass"));
+        for (name, both) in
+            [("foxtail", "write black-grass or green foxtail"), ("BRSOX", "write white cabbage or cauliflower")]
+        {
+            assert!(message(name).ends_with(both), "{}", message(name));
+            assert!(is_ambiguous(name).unwrap() && !is_ambiguous("thistle").unwrap(), "{name}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use super::field::PreparedField;
 use furrow_base::{Error, Result};
 use furrow_field::profile::Phase;
 use furrow_optics::sensor::Photograph;
-use furrow_output::Provenance;
+use furrow_output::{CameraTags, Provenance};
 use furrow_render::film::Film;
 use furrow_render::render::LabelMap;
 use std::path::{Path, PathBuf};
@@ -88,11 +88,12 @@ impl<'f> Image<'f> {
         self.field.threads().install(|| {
             let photograph = self.expose(film);
             profiler.enter(Phase::Files);
-            let mut files = furrow_output::image_files(film, labels, &photograph, provenance)?;
+            let tags = CameraTags::of(self.field.grown());
+            let mut files = furrow_output::image_files(film, labels, &photograph, provenance, &tags)?;
             if let Some(clean) = &self.denoised {
                 let photograph = self.expose(clean);
                 profiler.enter(Phase::Files);
-                files.extend(furrow_output::denoised_files(clean, &photograph, provenance)?);
+                files.extend(furrow_output::denoised_files(clean, &photograph, provenance, &tags)?);
             }
             let paths = furrow_output::write_files(folder, &files)?;
             profiler.enter(Phase::Other);

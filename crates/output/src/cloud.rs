@@ -1,4 +1,4 @@
-//! Point cloud sampled uniformly from a scene's surfaces, including hidden ones.
+//! Point cloud sampled uniformly from a scene's surfaces, including hidden ones, as PLY, LAS and LAZ.
 //!
 //! A part of area A gets n = ⌊A d⌋ or ⌈A d⌉ points, d points/m² on average. Point i is placed at the fraction (i + ξ)/n
 //! of the part's area, in triangle order, so neighbouring triangles have neither gaps nor clusters. Within the triangle
@@ -8,9 +8,10 @@
 //! Colours are reflectances of the upper side seen along its normal, averaged over the mean distance between points, as
 //! 8-bit sRGB codes; near infrared is encoded with the same curve.
 
+use super::las::{self, Extra, Las};
 use super::{Export, write_atomically};
 use furrow_base::geometry::Hit;
-use furrow_base::math::{RoundTo, ToFloat, ToInt};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec3};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_field::Field;
@@ -202,20 +203,66 @@ pub fn write(folder: &Path, field: &Field, density: f64) -> Result<Export> {
     Ok(Export { paths: vec![path], warnings: Vec::new(), amount: Some(amount) })
 }
 
+/// Extra attributes of a cloud's points in LAS files.
+const EXTRA: [Extra; 6] = [
+    Extra::long("plant_id", "identity of the plant, 0 none"),
+    Extra::long("plant", "number of the plant, 0 none"),
+    Extra::short("leaf", "number of the leaf, 0 none"),
+    Extra::float("nx", "normal, east"),
+    Extra::float("ny", "normal, north"),
+    Extra::float("nz", "normal, up"),
+];
+
+/// Writes `points.las`, or `points.laz` if `compressed`, into `folder`, with `density` points per square metre on all
+/// surfaces of a field. Each point is the only return of its pulse, without an intensity.
+pub fn write_las(folder: &Path, field: &Field, density: f64, compressed: bool) -> Result<Export> {
+    let ids = field.identities();
+    let (mut las, mut points) = (Las::new(&EXTRA, true), 0_u64);
+    each(field, density, &mut |point| {
+        let [r, g, b] = point.rgb;
+        let written = las::Point {
+            at: Vec3::from_array(point.at),
+            intensity: 0.0,
+            returns: [1, 1],
+            kind: point.kind,
+            azimuth_deg: 0.0,
+            time_s: 0.0,
+            colors: Some([r, g, b, point.nir]),
+        };
+        let id = ids.get(&point.plant).copied().unwrap_or(0);
+        let mut extra = [id.to_le_bytes(), point.plant.to_le_bytes()].concat();
+        extra.extend(point.leaf.to_le_bytes());
+        extra.extend(point.normal.map(f32::to_le_bytes).as_flattened());
+        las.add(&written, &extra);
+        points += 1;
+    })?;
+    let path = folder.join(if compressed { "points.laz" } else { "points.las" });
+    let file = las.file("sampled surfaces", env!("CARGO_PKG_VERSION"), compressed)?;
+    write_atomically(&path, &file)?;
+    let amount = format!("{points} points, {:.1} MB,", file.len().to_f64() * 1e-6);
+    Ok(Export { paths: vec![path], warnings: Vec::new(), amount: Some(amount) })
+}
+
 /// Samples `density` points per square metre on all surfaces of a field. Returns an error if there are too many.
 pub fn sample(field: &Field, density: f64) -> Result<Cloud> {
+    let mut cloud = Cloud::default();
+    each(field, density, &mut |point| cloud.add(point))?;
+    Ok(cloud)
+}
+
+/// Calls `add` with `density` points per square metre on all surfaces of a field. Returns an error if there are too many.
+fn each(field: &Field, density: f64, add: &mut dyn FnMut(&Point)) -> Result<()> {
     let area: f64 = field.scene.parts.iter().map(|part| areas(part).last().copied().unwrap_or(0.0)).sum();
     if area * density > MOST_POINTS {
         let words = format!("{:.0} points on {area:.1} m² are more than {MOST_POINTS:.0}", area * density);
         let help = format!("use a density of at most {:.0} points/m²", (MOST_POINTS / area).floor());
         return Err(Error::input(words).help(help));
     }
-    let mut cloud = Cloud::default();
     for k in 0..field.scene.parts.len() {
         let mut stream = Stream::of(field.seed, field.index, Purpose::Cloud, k.to_u64());
-        on_part(field, k, density, &mut stream, &mut cloud);
+        on_part(field, k, density, &mut stream, add);
     }
-    Ok(cloud)
+    Ok(())
 }
 
 /// Returns the cumulative area of a part's triangles, m².
@@ -230,7 +277,7 @@ fn areas(part: &Part) -> Vec<f64> {
     triangles.map(add).collect()
 }
 
-fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &mut Cloud) {
+fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, add: &mut dyn FnMut(&Point)) {
     let part = &field.scene.parts[k];
     let areas = areas(part);
     let Some(area) = areas.last().copied().filter(|area| *area > 0.0) else { return };
@@ -250,7 +297,7 @@ fn on_part(field: &Field, k: usize, density: f64, stream: &mut Stream, cloud: &m
         }
         let colors = material.scatter(&at, at.ng).0.reflectance(1.0).to_array();
         let [r, g, b, nir] = colors.map(|linear| ColorSpace::Srgb.encode(linear));
-        cloud.add(&Point {
+        add(&Point {
             at: at.p.to_array(),
             normal: at.ns.to_array(),
             rgb: [r, g, b],

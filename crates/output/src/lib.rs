@@ -1,8 +1,10 @@
 //! Output files: images, radiance and labels. Each file appears completely or not at all. Files contain no timestamps
 //! or paths, so equal runs write equal bytes.
 
+mod camera_tags;
 pub mod cloud;
 mod denoise;
+mod exif;
 mod exr;
 pub mod gltf;
 mod las;
@@ -14,6 +16,8 @@ mod photo;
 mod png;
 pub mod scan;
 
+use self::camera_tags::Bands;
+use self::png::Metadata;
 use furrow_base::Result;
 use furrow_optics::light::{Form, Light};
 use furrow_optics::sensor::{Deep, Photograph};
@@ -30,6 +34,7 @@ pub use self::png::{
     ImageData, Map, decode_gray, decode_gray16, decode_indexed, decode_numbers, decode_rgb, encode as encode_png,
     packed, read_gray, read_gray16, read_indexed, read_map, read_numbers, read_rgb,
 };
+pub use camera_tags::CameraTags;
 pub use denoise::Denoiser;
 pub use furrow_base::atomic_file::{
     FileSet, create_atomically, is_unfinished, place_atomically, remove_unfinished, remove_unfinished_in,
@@ -138,11 +143,41 @@ pub fn write_png(path: &Path, width: u32, height: u32, picture: &ImageData<'_>, 
 /// Files to be written together: name and content.
 pub type Files = Vec<(&'static str, Vec<u8>)>;
 
+/// Encodes sensor images of one photograph, with the camera's tags.
+struct Photographed<'a> {
+    crop: [u32; 4],
+    photograph: &'a Photograph,
+    tags: &'a CameraTags,
+    comment: &'a str,
+}
+
+impl Photographed<'_> {
+    fn png(&self, picture: &ImageData<'_>, bands: Bands) -> Result<Vec<u8>> {
+        let exif = self.tags.exif(self.photograph, bands, self.crop);
+        let xmp = self.tags.xmp(self.photograph, bands, self.crop);
+        let [_, _, width, height] = self.crop;
+        png::encode_with(width, height, picture, Metadata { comment: self.comment, exif: &exif, xmp: &xmp })
+    }
+}
+
+/// Returns left, top, width and height of a film.
+fn crop(film: &Film) -> [u32; 4] {
+    let window = &film.window;
+    [window.x0, window.y0, window.width(), window.height()]
+}
+
 /// Returns all files of one image: `rgb.png`, `nir.png`, `radiance.exr`, `semantics.png`, `plants.png`, `leaves.png`,
 /// `overlay.png`; also `rgb16.png` and `nir16.png` for a sensor with more than 8 bits.
-pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
+pub fn image_files(
+    film: &Film,
+    labels: &LabelMap,
+    photograph: &Photograph,
+    provenance: &Provenance,
+    tags: &CameraTags,
+) -> Result<Files> {
     let (w, h) = (film.window.width(), film.window.height());
     let text = provenance.text();
+    let taken = Photographed { crop: crop(film), photograph, tags, comment: &text };
     let classes: Vec<u8> = labels.tags.iter().map(|t| t.class as u8).collect();
     let palette: Vec<[u8; 3]> = Class::ALL.iter().map(|c| c.color()).collect();
     let plants: Vec<u32> = labels.tags.iter().map(|t| t.plant).collect();
@@ -150,8 +185,8 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
     let rgb = photograph.rgb.as_chunks::<3>().0;
     let overlay = overlay::draw(rgb, labels);
     let mut files = vec![
-        ("rgb.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
-        ("nir.png", png::encode(w, h, &ImageData::Brightness(&photograph.nir), &text)?),
+        ("rgb.png", taken.png(&ImageData::Rgb(rgb), Bands::Rgb)?),
+        ("nir.png", taken.png(&ImageData::Brightness(&photograph.nir), Bands::Nir)?),
         ("radiance.exr", exr::encode(film, labels, matches!(provenance.spp, Spp::Adaptive { .. }), &text)?),
         ("semantics.png", png::encode(w, h, &ImageData::Indexed(&classes, &palette), &text)?),
         ("plants.png", png::encode(w, h, &ImageData::Numbers(&plants), &text)?),
@@ -159,20 +194,24 @@ pub fn image_files(film: &Film, labels: &LabelMap, photograph: &Photograph, prov
         ("overlay.png", png::encode(w, h, &ImageData::Rgb(&overlay), &text)?),
     ];
     if let Some(Deep { rgb, nir }) = &photograph.deep {
-        files.push(("rgb16.png", png::encode(w, h, &ImageData::Rgb16(rgb.as_chunks::<3>().0), &text)?));
-        files.push(("nir16.png", png::encode(w, h, &ImageData::Gray16(nir), &text)?));
+        files.push(("rgb16.png", taken.png(&ImageData::Rgb16(rgb.as_chunks::<3>().0), Bands::Rgb)?));
+        files.push(("nir16.png", taken.png(&ImageData::Gray16(nir), Bands::Nir)?));
     }
     Ok(files)
 }
 
 /// Returns the files of a denoised image: `rgb_denoised.png`, `nir_denoised.png`, `denoised.exr` (R, G, B, NIR only).
-pub fn denoised_files(film: &Film, photograph: &Photograph, provenance: &Provenance) -> Result<Files> {
-    let (w, h) = (film.window.width(), film.window.height());
+pub fn denoised_files(
+    film: &Film,
+    photograph: &Photograph,
+    provenance: &Provenance,
+    tags: &CameraTags,
+) -> Result<Files> {
     let text = provenance.photograph_text(true);
-    let rgb = photograph.rgb.as_chunks::<3>().0;
+    let taken = Photographed { crop: crop(film), photograph, tags, comment: &text };
     Ok(vec![
-        ("rgb_denoised.png", png::encode(w, h, &ImageData::Rgb(rgb), &text)?),
-        ("nir_denoised.png", png::encode(w, h, &ImageData::Brightness(&photograph.nir), &text)?),
+        ("rgb_denoised.png", taken.png(&ImageData::Rgb(photograph.rgb.as_chunks::<3>().0), Bands::Rgb)?),
+        ("nir_denoised.png", taken.png(&ImageData::Brightness(&photograph.nir), Bands::Nir)?),
         ("denoised.exr", exr::encode_radiance(film, &text)?),
     ])
 }

@@ -50,10 +50,33 @@ fn failed(error: impl std::fmt::Display) -> Error {
     Error::failed(format!("cannot encode a PNG: {error}"))
 }
 
-/// Encodes an image; `text` is stored as its `Comment`.
+/// Texts and tags of an image.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Metadata<'a> {
+    /// Text chunk `Comment`; none if it is empty.
+    pub(super) comment: &'a str,
+    /// EXIF block, as the chunk `eXIf`; none if it is empty.
+    pub(super) exif: &'a [u8],
+    /// XMP packet; none if it is empty.
+    pub(super) xmp: &'a str,
+}
+
+/// Encodes an image; `text` is stored as its `Comment`, unless it is empty.
 pub fn encode(width: u32, height: u32, picture: &ImageData<'_>, text: &str) -> Result<Vec<u8>> {
+    encode_with(width, height, picture, Metadata { comment: text, ..Metadata::default() })
+}
+
+/// Encodes an image with metadata.
+pub(super) fn encode_with(
+    width: u32,
+    height: u32,
+    picture: &ImageData<'_>,
+    Metadata { comment, exif, xmp }: Metadata<'_>,
+) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let mut info = png::Info::with_size(width, height);
+    info.exif_metadata = (!exif.is_empty()).then_some(exif.into());
+    let mut encoder = png::Encoder::with_info(&mut bytes, info).map_err(failed)?;
     if let Some((filter, level)) = picture.effort() {
         encoder.set_filter(filter);
         encoder.set_deflate_compression(DeflateCompression::Level(level));
@@ -106,7 +129,12 @@ pub fn encode(width: u32, height: u32, picture: &ImageData<'_>, text: &str) -> R
             pixels.to_vec()
         }
     };
-    encoder.add_text_chunk("Comment".into(), text.into()).map_err(failed)?;
+    if !comment.is_empty() {
+        encoder.add_text_chunk("Comment".into(), comment.into()).map_err(failed)?;
+    }
+    if !xmp.is_empty() {
+        encoder.add_itxt_chunk("XML:com.adobe.xmp".into(), xmp.into()).map_err(failed)?;
+    }
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(&data).map_err(failed)?;
     writer.finish().map_err(failed)?;
@@ -310,6 +338,18 @@ mod tests {
 
     fn of(numbers: &[u32]) -> Result<Vec<u8>> {
         encode(numbers.len().to_u32(), 1, &ImageData::Numbers(numbers), "")
+    }
+
+    /// Expected: a chunk for each text that is not empty, and none besides.
+    #[test]
+    fn empty_metadata_has_no_chunk() {
+        let chunks = |metadata: Metadata<'_>| {
+            let bytes = encode_with(1, 1, &ImageData::Gray(&[7]), metadata).unwrap();
+            [&b"tEXt"[..], b"iTXt", b"eXIf"].map(|name| bytes.windows(4).any(|four| four == name))
+        };
+        assert_eq!(chunks(Metadata::default()), [false; 3]);
+        assert_eq!(chunks(Metadata { comment: "a", ..Metadata::default() }), [true, false, false]);
+        assert_eq!(chunks(Metadata { exif: b"II*\0", xmp: "<x/>", ..Metadata::default() }), [false, true, true]);
     }
 
     /// Rationale: datasets of fields with few plants keep their bytes. Expected: those of a 16-bit gray image up to the

@@ -1,7 +1,9 @@
-//! `scan.ply`: LiDAR measurements of a field, with the properties of a [cloud](super::cloud) and additional ones.
+//! `scan.ply`: LiDAR measurements of a field, with the properties of a [cloud](super::cloud) and additional ones; and the
+//! same points as LAS and LAZ.
 
 use super::cloud::{Cloud, Column, Point, Value};
-use super::{las, write_together};
+use super::las::{self, Extra, Las};
+use super::write_together;
 use furrow_base::math::{ToInt, Vec3};
 use furrow_base::{Error, Result};
 use furrow_field::Field;
@@ -67,20 +69,66 @@ pub fn cloud(field: &Field, lidar: &Lidar, echoes: &[Echo]) -> Cloud {
     cloud
 }
 
-/// Writes `scan.ply` into `folder`, and `scan.las` if `las` is set; otherwise removes the one of an earlier scan.
-pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo], las: bool) -> Result<Vec<PathBuf>> {
+/// Extra attributes of a scan's points in LAS files.
+const EXTRA: [Extra; 3] = [
+    Extra::long("plant_id", "identity of the plant, 0 none"),
+    Extra::short("leaf", "number of the leaf, 0 none"),
+    Extra::short("beam", "number of the beam, from 0"),
+];
+
+/// Returns the points of a scan as LAS. The intensity is the apparent reflectance, the scan angle the azimuth of the pulse,
+/// the time that since the start of the rotation.
+fn las(field: &Field, echoes: &[Echo]) -> Las {
+    let mut las = Las::new(&EXTRA, false);
+    let ids = field.identities();
+    for echo in echoes {
+        let part = echo.part.to_usize();
+        let tag = field.scene.parts[part].tag;
+        let pulse = &echo.pulse;
+        let point = las::Point {
+            at: echo.at(),
+            intensity: echo.apparent_reflectance(),
+            returns: [echo.number, echo.count],
+            kind: [tag.class as u8, field.kinds[part].number()],
+            azimuth_deg: pulse.azimuth_deg,
+            time_s: pulse.time_s.into(),
+            colors: None,
+        };
+        let id = ids.get(&tag.plant).copied().unwrap_or(0);
+        las.add(&point, &[&id.to_le_bytes()[..], &tag.leaf.to_le_bytes(), &pulse.beam.to_le_bytes()].concat());
+    }
+    las
+}
+
+/// Further files of a scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Further {
+    /// Whether `scan.las` is written.
+    pub las: bool,
+    /// Whether `scan.laz` is written.
+    pub laz: bool,
+}
+
+/// Writes `scan.ply` into `folder`, and the further files; removes those of an earlier scan.
+pub fn write(folder: &Path, field: &Field, lidar: &Lidar, echoes: &[Echo], further: Further) -> Result<Vec<PathBuf>> {
     let version = env!("CARGO_PKG_VERSION");
     let file = cloud(field, lidar, echoes).file(version);
-    let other = folder.join("scan.las");
+    let points = (further != Further::default()).then(|| las(field, echoes));
+    let others = [("scan.las", further.las), ("scan.laz", further.laz)].map(|(name, is)| (folder.join(name), is));
     let paths = write_together(folder, |together| {
         together.add(&folder.join("scan.ply"), &file)?;
-        if las {
-            together.add(&other, &las::file(field, echoes, version))?;
+        for (compressed, (path, wanted)) in [false, true].into_iter().zip(&others) {
+            if let Some(points) = points.as_ref().filter(|_| *wanted) {
+                together.add(path, &points.file("simulated LiDAR", version, compressed)?)?;
+            }
         }
         Ok(())
     })?;
-    match if las { Ok(()) } else { fs::remove_file(&other) } {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(Error::io(&other)(error)),
-        _ => Ok(paths),
+    for (path, _) in others.iter().filter(|(_, wanted)| !wanted) {
+        match fs::remove_file(path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(Error::io(path)(error)),
+            _ => {}
+        }
     }
+    Ok(paths)
 }

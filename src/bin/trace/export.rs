@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// `--format gltf`.
     #[arg(long)]
     skins: bool,
-    /// Points per square metre of surface; with `--format ply`. Default: 100000.
+    /// Points per square metre of surface; with `--format ply`, `las` and `laz`. Default: 100000.
     #[arg(long, value_name = "POINTS", value_parser = density)]
     density: Option<f64>,
     /// Number of threads; 0 for one per core. The files do not depend on it.
@@ -47,6 +47,11 @@ enum Format {
     Mitsuba,
     /// Point cloud of all surfaces, including hidden ones: points.ply with position, normal, colour and labels.
     Ply,
+    /// The same points as LAS 1.4: points.las with position, colour, near infrared, class and, as extra bytes, plant, leaf
+    /// and normal.
+    Las,
+    /// The same as LAZ, compressed LAS: points.laz.
+    Laz,
 }
 
 /// Default number of points per square metre: 3 mm apart.
@@ -62,9 +67,15 @@ impl Format {
     fn write(self, folder: &Path, field: &Field, density: f64) -> Result<Export> {
         match self {
             Self::Ply => furrow_output::cloud::write(folder, field, density),
+            Self::Las | Self::Laz => furrow_output::cloud::write_las(folder, field, density, matches!(self, Self::Laz)),
             Self::Gltf => furrow_output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
             Self::Mitsuba => furrow_job::mitsuba::export(folder, &field.scene, &field.provenance()),
         }
+    }
+
+    /// Returns `true` if the export has points.
+    fn has_points(self) -> bool {
+        matches!(self, Self::Ply | Self::Las | Self::Laz)
     }
 
     fn name(self) -> String {
@@ -86,9 +97,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
         let words = format!("--skins has no effect with --format {}, which has no joints", args.format.name());
         return Err(Error::misuse(words).help("use --format gltf, or leave --skins out"));
     }
-    if args.density.is_some() && !matches!(args.format, Format::Ply) {
+    if args.density.is_some() && !args.format.has_points() {
         let words = format!("--density has no effect with --format {}, which contains surfaces", args.format.name());
-        return Err(Error::misuse(words).help("use --format ply, or leave --density out"));
+        return Err(Error::misuse(words).help("use --format ply, las or laz, or leave --density out"));
     }
     let density = args.density.unwrap_or(DENSITY);
     let threads = Threads::new(args.threads)?;

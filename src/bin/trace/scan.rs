@@ -10,6 +10,7 @@ use furrow_field::ablation::FULL;
 use furrow_field::assemble::Scanner;
 use furrow_job::{SceneFile, Threads};
 use furrow_optics::sensor::{LIDARS, LidarDesc};
+use furrow_output::scan::Further;
 use std::path::PathBuf;
 
 /// The field and the LiDAR.
@@ -26,6 +27,9 @@ pub(crate) struct Args {
     /// Also write `scan.las`: LAS 1.4, point format 6.
     #[arg(long)]
     las: bool,
+    /// Also write `scan.laz`, which is `scan.las` compressed.
+    #[arg(long)]
+    laz: bool,
     /// Number of threads; 0 for one per core. The file does not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
@@ -57,7 +61,8 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     if echoes.is_empty() {
         print_warning("there are no echoes; see range, beams and min_intensity of the LiDAR: trace explain lidar");
     }
-    let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes, args.las)?;
+    let further = Further { las: args.las, laz: args.laz };
+    let paths = furrow_output::scan::write(&out, field.grown(), lidar, &echoes, further)?;
     let pulses = u64::from(lidar.columns()) * u64::from(lidar.beams());
     note(&format!("{}: {} echoes of {pulses} pulses in {}", args.field.path().display(), echoes.len(), out.display()));
     Ok(paths)

@@ -10,7 +10,7 @@ mod text;
 
 pub use guard::{caught, guarded};
 pub use scope::{Outside, Scope, tidy};
-pub use text::{read_text, utf8, wide};
+pub use text::{read_text, utf8, utf8_lossy, wide};
 
 use crate::math::ToInt;
 use crate::{Error, Result};

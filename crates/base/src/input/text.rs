@@ -2,6 +2,7 @@
 
 use super::{Refusal, read};
 use crate::{Error, Result};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Help of the errors about encodings.
@@ -25,6 +26,14 @@ pub fn utf8(bytes: &[u8]) -> Result<&str> {
         let line = bytes[..e.valid_up_to()].split(|byte| *byte == b'\n').count();
         Error::input(format!("line {line} is not UTF-8 text: byte {:#04x}", bytes[e.valid_up_to()])).help(HELP)
     })
+}
+
+/// Like [`utf8`], for files whose comments may be in any encoding of single bytes: bytes that are not UTF-8 become U+FFFD.
+pub fn utf8_lossy(bytes: &[u8]) -> Result<Cow<'_, str>> {
+    match utf8(bytes) {
+        Err(wrong) if wide(bytes).is_some() => Err(wrong),
+        _ => Ok(String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))),
+    }
 }
 
 /// Returns the name of an encoding of two or four bytes a character: by its byte order mark, or by the zero bytes of
@@ -57,6 +66,8 @@ mod tests {
         let utf32: Vec<u8> = "{}".chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
         assert_eq!(utf8(&utf32).unwrap_err().message(), "this is UTF-32 text, not UTF-8");
         assert_eq!(utf8(b"a\nb\xe4").unwrap_err().message(), "line 2 is not UTF-8 text: byte 0xe4");
+        assert_eq!(utf8_lossy(b"\xef\xbb\xbf# \xe4").unwrap(), "# \u{fffd}");
+        assert!(utf8_lossy(&utf16("# a")).is_err());
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub struct Quantity {
     pub at: Range<usize>,
     /// Its value.
     pub value: Value,
-    /// Names of the fields and variants that lead to it, as in the schema.
+    /// Names of the fields and variants that lead to it, as in the schema; places in lists and tuples as `#0`.
     names: Vec<String>,
 }
 
@@ -61,12 +61,11 @@ pub fn quantities(text: &str) -> Vec<Quantity> {
 }
 
 /// Collects the quantities of the value at `whole`, which has the path `path` and these names on it.
-fn gather(text: &str, whole: &Range<usize>, (path, names): (String, &[&str]), depth: usize, all: &mut Vec<Quantity>) {
+fn gather(text: &str, whole: &Range<usize>, (path, names): (String, &[String]), depth: usize, all: &mut Vec<Quantity>) {
     let raw = &text[whole.clone()];
     let name = name_of(raw);
     if let Some(value) = value(raw, name) {
-        let names = names.iter().copied().map(str::to_owned).collect();
-        all.push(Quantity { path, at: whole.clone(), value, names });
+        all.push(Quantity { path, at: whole.clone(), value, names: names.to_vec() });
         return;
     }
     if depth == 0 || name.is_some_and(|name| DISTRIBUTIONS.contains(&name)) {
@@ -76,8 +75,11 @@ fn gather(text: &str, whole: &Range<usize>, (path, names): (String, &[&str]), de
     let alone = inner.len() == 1;
     for (number, (key, at)) in inner.into_iter().enumerate() {
         let dot = if path.is_empty() { "" } else { "." };
-        let field = key.filter(|key| !key.starts_with('"'));
-        let names: Vec<&str> = names.iter().copied().chain(name).chain(field).collect();
+        let step = match key {
+            Some(key) => (!key.starts_with('"')).then(|| key.to_owned()),
+            None => Some(schema::item(number)),
+        };
+        let names: Vec<String> = names.iter().cloned().chain(name.map(str::to_owned)).chain(step).collect();
         let path = match (key, name) {
             (Some(key), _) => format!("{path}{dot}{}", key.trim_matches('"')),
             // A variant with a single value: `AgeDays(20)`.
@@ -139,6 +141,7 @@ Field(
             share: Num<Fraction>,
             parts: Vec<Part>,
             name: String,
+            place: (Num<Fraction>, Vary<Signed<90>>),
         }
         #[derive(JsonSchema)]
         #[allow(dead_code)]
@@ -146,10 +149,11 @@ Field(
             Flat { size: Option<Vary<Positive<20>>> },
             Aged(Vary<Signed<90>>),
         }
-        let text = "Page(share: 0.5, parts: [Flat(size: Uniform(1, 2)), Aged(3)], name: 4)";
+        let text = "Page(share: 0.5, parts: [Flat(size: Uniform(1, 2)), Aged(3)], name: 4, place: (0, 2, 9))";
         let found = limits::<Page>(&quantities(text));
         let limits = |min, max, above_min| Some(Limits { min, max, above_min });
-        assert_eq!(found, [limits(0.0, 1.0, false), limits(0.0, 20.0, true), limits(-90.0, 90.0, false), None]);
+        let (share, angle) = (limits(0.0, 1.0, false), limits(-90.0, 90.0, false));
+        assert_eq!(found, [share, limits(0.0, 20.0, true), angle, None, share, angle, None]);
     }
 
     proptest! {

@@ -81,12 +81,25 @@ pub(super) fn limits(root: &Value, path: &[String]) -> Option<Limits> {
     Some(Limits { min: lowest.or(above)?, max: number("maximum")?, above_min: lowest.is_none() })
 }
 
+/// Returns the step of a path to an item of a list or a tuple, which no name can be.
+pub(super) fn item(place: usize) -> String {
+    format!("#{place}")
+}
+
 /// Returns the schema at the end of a path, or of the number there; otherwise the number of names on the path that exist.
 fn at_end<'a>(root: &'a Value, path: &[&str]) -> Result<&'a Value, usize> {
     let mut at = resolved(root, root);
     for (k, step) in path.iter().enumerate() {
         if at.get(KIND).is_some() {
             break;
+        }
+        if let Some(place) = step.strip_prefix('#') {
+            // Lists are resolved to their items already; a variant's only value has no schema of its own.
+            let items = at.get("prefixItems").and_then(Value::as_array);
+            if let Some(inner) = place.parse().ok().and_then(|place: usize| items?.get(place)) {
+                at = resolved(root, inner);
+            }
+            continue;
         }
         match within(at, step) {
             Some(inner) => at = resolved(root, inner),

@@ -171,6 +171,8 @@ formats! {
         r#"supervision.DetectionDataset.from_yolo("yolo/images/train", "yolo/labels/train", "yolo/data.yaml", force_masks=True)"#;
     "yolo-detect" => yolo_detect: "YOLO detection: one box per plant, for Ultralytics and `supervision`",
         r#"supervision.DetectionDataset.from_yolo("yolo-detect/images/train", "yolo-detect/labels/train", "yolo-detect/data.yaml")"#;
+    "yolo-obb" => yolo_obb: "YOLO oriented boxes: one turned rectangle per plant, for Ultralytics",
+        r#"ultralytics.data.dataset.YOLODataset(img_path="yolo-obb/images/train", data=data, task="obb")"#;
     "yolo-pose" => yolo_pose: "YOLO pose: one box per plant with its stem and the tips of its leaves, for Ultralytics",
         r#"ultralytics.data.dataset.YOLODataset(img_path="yolo-pose/images/train", data=data, task="pose")"#;
 }

@@ -391,7 +391,7 @@ fn in_words(key: &str) -> &str {
 }
 
 /// Returns the recipe's values by name, including those of its rendering.
-fn fields(recipe: &Recipe) -> Result<std::collections::BTreeMap<String, String>> {
+pub(crate) fn fields(recipe: &Recipe) -> Result<std::collections::BTreeMap<String, String>> {
     let mut all = std::collections::BTreeMap::new();
     let mut todo = vec![(String::new(), serde_json::to_value(recipe).map_err(failed)?)];
     while let Some((name, value)) = todo.pop() {

@@ -54,6 +54,7 @@ impl Source {
         let estimate = estimate::estimate(drawn, library, &sight)?;
         estimate.check(drawn.memory()).map_err(|(at, error)| self.page().blame(&at, error))?;
         found.extend(estimate::slow(drawn, &estimate));
+        found.extend(library.warnings());
         Ok(found)
     }
 

@@ -16,6 +16,8 @@ use furrow_optics::sensor::{Camera, LIDARS, Lidar, LidarDesc};
 const LIDAR: u64 = 5 << 32;
 /// Number of columns of a turn that are sampled to find the ground in view.
 const LOOKED_AT: u32 = 120;
+/// The same for a beam behind prisms, whose columns cover a circle instead of a line.
+const LOOKED_AT_WITH_PRISMS: u32 = 4000;
 
 /// Field of the scene file that errors about the LiDAR point at.
 const AT: [Step<'static>; 1] = [Step::Field("lidar")];
@@ -82,7 +84,7 @@ pub(super) fn spacing_at(lidars: &[Lidar], at: Vec2) -> Option<f32> {
 /// Returns origin and direction of the pulses of all beams, for columns that are evenly spaced over the turn.
 pub(super) fn view_rays(lidar: &Lidar) -> impl Iterator<Item = ViewRay> {
     let columns = lidar.columns();
-    let some = columns.min(LOOKED_AT);
+    let some = columns.min(if lidar.has_prisms() { LOOKED_AT_WITH_PRISMS } else { LOOKED_AT });
     let column = move |k: u32| (u64::from(k) * u64::from(columns - 1) / u64::from((some - 1).max(1))).to_u32();
     (0..some).flat_map(move |k| (0..lidar.beams()).map(move |beam| lidar.pulse(column(k), beam))).map(|pulse| {
         let furrow_optics::sensor::Pulse { origin, direction, .. } = pulse;

@@ -7,6 +7,7 @@ use super::{Options, SceneEdit, Source};
 use crate::library::Library;
 use furrow_base::Error;
 use furrow_base::error::Kind;
+use furrow_base::math::ToInt;
 use furrow_base::ron_file::{Repair, RonFile, Spliced, Spot};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,8 +16,9 @@ use std::path::{Path, PathBuf};
 const MOST: usize = 40;
 /// Maximum number of readings of the files.
 const MOST_READINGS: usize = 150;
-/// Maximum number of bytes of the scene file that are read in total, so that the search in a long file takes about a second.
-const MOST_BYTES: usize = 16 << 20;
+/// Maximum number of bytes of scene, species and table files that are read in total, so that the search in a long file, or
+/// in one of many species, takes about a second.
+const MOST_BYTES: u64 = 16 << 20;
 /// Fields and shipped files to try in place of a file that is missing or cannot be used.
 const SHIPPED: [(&str, &str); 3] = [("species", "sugar_beet"), ("albedo", "dirt.png"), ("height", "dirt.height.png")];
 
@@ -52,8 +54,8 @@ struct Search<'a> {
     growing: SceneEdit,
     options: &'a Options,
     readings: usize,
-    /// Bytes of the scene file read so far.
-    bytes: usize,
+    /// Bytes of files read so far.
+    bytes: u64,
 }
 
 impl<'a> Search<'a> {
@@ -146,16 +148,18 @@ impl<'a> Search<'a> {
     /// Reads the repaired files, and returns the first error.
     fn read(&mut self) -> Option<Error> {
         self.readings += 1;
-        self.bytes += self.texts.get(&self.scene).map_or(0, |text| text.page.text.len());
         let texts = self.texts.iter().map(|(path, text)| (path.clone(), text.page.text.clone())).collect();
-        let mut library = self.library.clone().renewed();
+        let mut library = self.library.clone().renewed_at_once();
         library.replaced = texts;
         let page = library.page(&self.scene).ok()?;
+        self.bytes += page.text.len().to_u64();
+        let before = library.bytes_read();
         let source = match Source::parsed(Spliced::of(page), library) {
             Ok(source) => source.growing(self.growing),
             Err(error) => return Some(error),
         };
         let (done, library) = source.tried(self.options);
+        self.bytes += library.bytes_read().saturating_sub(before);
         // A reading that failed early has decoded less than one before it.
         if library.files().len() >= self.library.files().len() {
             self.library = library;

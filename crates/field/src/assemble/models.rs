@@ -23,6 +23,10 @@ use std::sync::Arc;
 
 /// Mean visible reflectance of a model above which a warning is given: photographs used as colours, and white paint.
 const BRIGHT: f32 = 0.6;
+/// Sizes in metres beyond which a warning is given: of plants, of other models, and of any.
+const LARGEST_PLANT_M: f32 = 10.0;
+const LARGEST_M: f32 = 100.0;
+const SMALLEST_M: f32 = 5e-4;
 /// Mean visible reflectance of a green leaf.
 const LEAF: f32 = 0.1;
 
@@ -80,6 +84,9 @@ fn place(
     let materials: Vec<u32> = surfaces.into_iter().map(|s| all.material(Material::ModelSurface(s))).collect();
     let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     let meshes = meshes(drawn, k, &PlacedModel { model: model.clone(), turn, scale, foot });
+    if let Some(words) = odd_size(&meshes, desc.class) {
+        library.warn(drawn.page, &desc.file, &words)?;
+    }
     for (part, mesh) in model.parts.iter().zip(meshes) {
         let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
             let words = format!("label maps can number at most {MOST_PLANTS} plants; this model exceeds that");
@@ -107,6 +114,21 @@ fn place(
         record((number, id), &parts, called(desc), foot, &model)
     });
     Ok(plants.collect())
+}
+
+/// Returns a warning if the size of a model suggests that its file is in another unit than metres.
+fn odd_size(meshes: &[Arc<Mesh>], class: Option<Class>) -> Option<String> {
+    let largest = if matches!(class, Some(Class::Crop | Class::Weed)) { LARGEST_PLANT_M } else { LARGEST_M };
+    let bounds = meshes.iter().filter_map(|mesh| mesh.bounds());
+    let (lo, hi) = bounds.reduce(|(lo, hi), (low, high)| (lo.min(low), hi.max(high)))?;
+    let size = (hi - lo).max_element();
+    if size > largest {
+        Some(format!("it is {size:.0} m large; lengths are in metres: a file in millimetres needs scale: 0.001"))
+    } else if size < SMALLEST_M {
+        Some(format!("it is {size:.2e} m large; lengths are in metres: scale enlarges it"))
+    } else {
+        None
+    }
 }
 
 /// Returns a warning if a model reflects more of the visible light than plants and ground do. Objects that are painted

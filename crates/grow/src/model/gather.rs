@@ -82,17 +82,22 @@ pub(super) fn moved(at: DVec3) -> String {
     )
 }
 
-/// Warns of parts that are cut away by the opacity of their pictures.
+/// Warns of parts without area, and of those that are cut away by the opacity of their pictures.
 fn warn_of_invisible(model: &Model, notes: &mut Notes) {
     let gone =
         |part: &&ModelPart| model.surfaces[part.surface].mask.as_deref().is_some_and(|mask| is_cut_away(part, mask));
     let all: Vec<&ModelPart> = model.parts.iter().filter(|part| !part.mesh.triangles.is_empty()).collect();
-    let invisible: Vec<&ModelPart> = all.iter().copied().filter(gone).collect();
+    let (flat, others): (Vec<&ModelPart>, Vec<&ModelPart>) =
+        all.iter().copied().partition(|part| part.mesh.area() == 0.0);
+    for part in &flat {
+        notes.about("parts whose triangles have no area", &part.name);
+    }
+    let invisible: Vec<&ModelPart> = others.into_iter().filter(gone).collect();
     for part in &invisible {
         let Surface { name, .. } = &model.surfaces[part.surface];
         notes.about(format!("the opacity of the material `{name}` cuts away every triangle"), &part.name);
     }
-    if !all.is_empty() && all.len() == invisible.len() {
+    if !all.is_empty() && all.len() == invisible.len() + flat.len() {
         notes.add("it has no visible surface: no pixel of any label will show it");
     }
 }

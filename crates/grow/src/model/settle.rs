@@ -14,6 +14,13 @@ pub(super) fn fraction(x: f32) -> f32 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }
 
+/// Warns of a colour with numbers that are not reflectances, such as those from 0 to 255.
+pub(super) fn warn_of_color(color: [f32; 3], material: &str, notes: &mut Notes) {
+    if !color.iter().all(|share| (0.0..=1.0).contains(share)) {
+        notes.about("colours that are not between 0 and 1, cut to them", material);
+    }
+}
+
 /// Transforms a part into the model's frame and checks it. Returns an error message for an invalid mesh.
 pub(super) fn settle(mesh: &mut Mesh, to: &DMat4, name: &str) -> Result<(), String> {
     // Exact, so that meshes exported by this program are read back bit-identically.

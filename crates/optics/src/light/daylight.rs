@@ -133,6 +133,20 @@ pub struct DaylightRecord {
     pub sun_irradiance_w_m2_nm: Spectrum,
     /// Irradiance of the ground from the sky.
     pub sky_irradiance_w_m2_nm: Spectrum,
+    /// Place and time; left out if the scene file gives the sun's direction instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moment: Option<MomentRecord>,
+}
+
+/// Place and time of a field.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MomentRecord {
+    /// Degrees north.
+    pub latitude_deg: f64,
+    /// Degrees east.
+    pub longitude_deg: f64,
+    /// Universal time, rounded to seconds.
+    pub utc: Utc,
 }
 
 impl Recorded for DaylightRecord {
@@ -146,7 +160,7 @@ impl Described for DaylightDesc {
     type Sources = (Option<Sun>, Option<Box<Sky>>);
 
     fn draw(&self, stream: &mut Stream, _: &mut Open<'_>) -> Result<(Self::Record, Self::Sources)> {
-        let at = self.sun.draw(stream)?;
+        let (at, moment) = self.sun.draw(stream)?;
         let (turbidity, cloud) = (self.turbidity.draw(stream), self.cloud.draw32(stream));
         let (sun, sky) = daylight(at.elevation_deg, at.azimuth_deg, turbidity, cloud);
         let record = DaylightRecord {
@@ -156,6 +170,7 @@ impl Described for DaylightDesc {
             cloud,
             sun_irradiance_w_m2_nm: irradiance(sun.as_ref()),
             sky_irradiance_w_m2_nm: irradiance(sky.as_ref()),
+            moment,
         };
         Ok((record, (sun, sky.map(Box::new))))
     }
@@ -176,12 +191,14 @@ impl Described for DaylightDesc {
 }
 
 impl SunDesc {
-    /// Samples the sun's elevation and azimuth in degrees. Returns a [`Kind::Input`](furrow_base::error::Kind::Input)
+    /// Samples the sun's position, and its place and time if there are any. Returns a [`Kind::Input`](furrow_base::error::Kind::Input)
     /// error if the sun is below the horizon at the place and time: twilight is not modelled.
-    pub fn draw(&self, stream: &mut Stream) -> Result<SunPosition> {
+    pub fn draw(&self, stream: &mut Stream) -> Result<(SunPosition, Option<MomentRecord>)> {
         match self {
             Self::Angles { elevation_deg, azimuth_deg } => {
-                Ok(SunPosition { elevation_deg: elevation_deg.draw(stream), azimuth_deg: azimuth_deg.draw(stream) })
+                let at =
+                    SunPosition { elevation_deg: elevation_deg.draw(stream), azimuth_deg: azimuth_deg.draw(stream) };
+                Ok((at, None))
             }
             Self::At { latitude_deg, longitude_deg, utc, later_h } => {
                 let (latitude, longitude) = (latitude_deg.draw(stream), longitude_deg.draw(stream));
@@ -192,7 +209,8 @@ impl SunDesc {
                     let moment = if later == 0.0 { utc.to_string() } else { format!("{utc} and {later:.2} h") };
                     return Err(Error::input(format!("the sun is {:.1} degrees below the horizon at {moment}, latitude {latitude}, longitude {longitude}", -at.elevation_deg)).help("choose a time of day (UTC, not local), or light the field with Overcast or Lamp"));
                 }
-                Ok(at)
+                let utc = utc.later(later);
+                Ok((at, Some(MomentRecord { latitude_deg: latitude, longitude_deg: longitude, utc })))
             }
         }
     }

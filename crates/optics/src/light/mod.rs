@@ -25,7 +25,8 @@ mod sun;
 
 pub use constant::{Constant, ConstantDesc, ConstantRecord};
 pub use daylight::{
-    AboveHorizon, DaylightDesc, DaylightRecord, Latitude, Longitude, SunDesc, Turbidity, daylight, overcast_irradiance,
+    AboveHorizon, DaylightDesc, DaylightRecord, Latitude, Longitude, MomentRecord, SunDesc, Turbidity, daylight,
+    overcast_irradiance,
 };
 pub use described::{Described, Open, Recorded};
 pub use environment::{EnvironmentMapDesc, EnvironmentMapRecord, InfraredDesc};

@@ -1,7 +1,7 @@
 //! Position of the sun, by NREL's algorithm (Reda & Andreas 2004, "Solar position algorithm for solar radiation
 //! applications") in `solar-positioning`, and the only time format of scene files: `2016-05-27T14:30:00Z`.
 
-use furrow_base::math::ToInt;
+use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::ron_file::{from_raw, parse_in, whole};
 use furrow_base::{Error, Result};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -66,6 +66,59 @@ impl Utc {
         check("second", time.second, 0, 59)?;
         Ok(time)
     }
+}
+
+impl Utc {
+    /// Returns the time this number of hours later, rounded to seconds; the time itself if that is not between the
+    /// years 0 and 9999.
+    #[must_use]
+    pub fn later(self, hours: f64) -> Self {
+        let seconds = self.seconds() + (hours * 3600.0).round_to::<i64>();
+        let (day, of_day) = (seconds.div_euclid(DAY_S), seconds.rem_euclid(DAY_S).to_u32());
+        let Some((year, month, day)) = date(day) else { return self };
+        Self { year, month, day, hour: of_day / 3600, minute: of_day / 60 % 60, second: of_day % 60 }
+    }
+
+    /// Returns year, month and day.
+    pub fn date(self) -> [u32; 3] {
+        [self.year.unsigned_abs(), self.month, self.day]
+    }
+
+    /// Returns hour, minute and second.
+    pub fn time(self) -> [u32; 3] {
+        [self.hour, self.minute, self.second]
+    }
+
+    /// Returns the seconds since the start of the year 0.
+    fn seconds(self) -> i64 {
+        let years: i64 = (0..self.year).map(|year| days_of(year).to_i64()).sum();
+        let months: u32 = (1..self.month).map(|month| days_in(self.year, month)).sum();
+        let days = years + (months + self.day - 1).to_i64();
+        days * DAY_S + (self.hour * 3600 + self.minute * 60 + self.second).to_i64()
+    }
+}
+
+/// Seconds of a day.
+const DAY_S: i64 = 86_400;
+
+/// Returns year, month and day of a number of days since the start of the year 0; `None` outside the years 0 to 9999.
+fn date(days: i64) -> Option<(i32, u32, u32)> {
+    let mut left = u32::try_from(days).ok()?;
+    let mut year = 0;
+    while left >= days_of(year) {
+        left -= days_of(year);
+        year += 1;
+    }
+    let mut month = 1;
+    while left >= days_in(year, month) {
+        left -= days_in(year, month);
+        month += 1;
+    }
+    (year <= 9999).then_some((year, month, left + 1))
+}
+
+fn days_of(year: i32) -> u32 {
+    337 + days_in(year, 2)
 }
 
 fn days_in(year: i32, month: u32) -> u32 {
@@ -142,4 +195,27 @@ pub fn sun_position(
     let refraction = refracted.then(RefractionCorrection::standard);
     let position = SolarPositions::new().at_from_julian(time, place, 0.0, refraction).map_err(refused)?;
     Ok(SunPosition { elevation_deg: position.elevation_angle(), azimuth_deg: position.azimuth() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Expected: times across the ends of hours, days, months, leap years and centuries, by a calendar; a time beyond the
+    /// year 9999 stays.
+    #[test]
+    fn hours_later_is_a_time_of_the_calendar() {
+        for (from, hours, to) in [
+            ("2016-05-27T11:30:00Z", 0.0, "2016-05-27T11:30:00Z"),
+            ("2016-05-27T11:30:00Z", 1.5, "2016-05-27T13:00:00Z"),
+            ("2016-05-27T11:30:00Z", -0.5 / 3600.0 * 2.0, "2016-05-27T11:29:59Z"),
+            ("2016-02-28T20:00:00Z", 6.0, "2016-02-29T02:00:00Z"),
+            ("2100-02-28T20:00:00Z", 6.0, "2100-03-01T02:00:00Z"),
+            ("1999-12-31T23:59:59Z", 1.0 / 3600.0, "2000-01-01T00:00:00Z"),
+            ("2016-01-01T00:00:00Z", -48.0, "2015-12-30T00:00:00Z"),
+            ("9999-12-31T23:00:00Z", 2.0, "9999-12-31T23:00:00Z"),
+        ] {
+            assert_eq!(Utc::parse(from).unwrap().later(hours).to_string(), to, "{from} and {hours} h");
+        }
+    }
 }

@@ -20,13 +20,9 @@ pub fn reflectance(text: &str) -> Result<Spectrum> {
 /// Parses the wavelength and reflectance of each line.
 fn points(text: &str) -> Result<Vec<(f64, f64)>> {
     let wrong = |what: String| Error::input(what).help(FORM);
-    let delimiter = if text.contains(';') {
-        b';'
-    } else if text.contains('\t') {
-        b'\t'
-    } else {
-        b','
-    };
+    let has = |sign: char| text.lines().any(|line| !line.starts_with('#') && line.contains(sign));
+    let delimiter =
+        [(';', b';'), ('\t', b'\t')].into_iter().find(|(sign, _)| has(*sign)).map_or(b',', |(_, byte)| byte);
     let mut table = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .delimiter(delimiter)
@@ -36,6 +32,11 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (line, row) in (1..).zip(table.records()) {
         let row = row.map_err(|e| wrong(format!("it is not a table: {e}")))?;
+        // Of decimal commas between cells, `400,0,25`, the share would be read as 0.
+        if row.len() > 2 {
+            let comma = if delimiter == b',' { "; are its commas decimal commas?" } else { "" };
+            return Err(wrong(format!("row {line} has {} cells, not two{comma}", row.len())));
+        }
         let number = |column: usize| row.get(column).and_then(|cell| cell.parse::<f64>().ok());
         match (number(0), number(1)) {
             (Some(nm), Some(share)) => points.push((nm, share)),
@@ -86,6 +87,7 @@ mod tests {
         assert!(red[0] > 0.4 && red[1] < 0.15 && red[2] < 0.05 && (red[3] - 0.5).abs() < 1e-6, "{red:?}");
         let slope = |text: &str| reflectance(text).unwrap();
         let line = slope("400\t0.1\n1000\t0.4\n");
+        assert_eq!(line, slope("# a; b\n400,0.1\n1000,0.4\n"));
         assert_eq!(line, slope("wavelength,reflectance\n400,0.1\n700,0.25\n1000,0.4\n"));
         assert_eq!(line, bands::weigh(|nm| 0.1 + 0.3 * (f64::from(nm) - 400.0) / 600.0));
     }
@@ -95,6 +97,9 @@ mod tests {
         for (text, words) in [
             ("", "no line with numbers"),
             ("400,0.1\n700,x\n", "row 2 is not two numbers"),
+            ("400,0,1\n1000,0,4\n", "row 1 has 3 cells, not two; are its commas decimal commas?"),
+            ("400;0,1\n1000;0,4\n", "row 2 is not two numbers"),
+            ("400;0.1;0.01\n1000;0.4;0.01\n", "row 1 has 3 cells, not two"),
             ("400,10\n1000,40\n", "in percent?"),
             ("0.4,0.1\n1.0,0.4\n", "in micrometres?"),
             ("400,0.1\n700,0.2\n", "goes from 400 to 700 nm"),

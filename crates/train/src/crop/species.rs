@@ -3,7 +3,7 @@
 use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 use furrow_field::desc::{Role, SpeciesDesc};
-use furrow_field::shipped::{Shipped, all_species, species};
+use furrow_field::shipped::{all_species, is_ambiguous, species};
 use std::path::{Path, PathBuf};
 
 /// Number of similar names that the error about an unknown name lists.
@@ -47,8 +47,8 @@ impl Species {
                 let written = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 Ok(Self { desc: SpeciesDesc::read(&file)?, file, written })
             }
-            // The error about a word that several English names contain lists them.
-            Err(error) if is_shared(name)? => Err(error),
+            // The error about a name of several species lists them.
+            Err(error) if is_ambiguous(name)? => Err(error),
             Ok(None) | Err(_) => Err(unknown(name)?),
         }
     }
@@ -57,13 +57,6 @@ impl Species {
     pub(super) fn genus(&self) -> &str {
         self.desc.scientific.split_whitespace().next().unwrap_or_default()
     }
-}
-
-/// Returns `true` if `word` is a word of the English names of several species, such as `grass`.
-fn is_shared(word: &str) -> Result<bool> {
-    let (all, _) = all_species()?;
-    let has_word = |species: &&Shipped| species.desc.name.split(['-', ' ']).any(|own| own.eq_ignore_ascii_case(word));
-    Ok(all.iter().filter(has_word).count() > 1)
 }
 
 /// Lists the crops that ship, by English name and EPPO code.

@@ -1,6 +1,7 @@
 //! `trace dataset`: renders many fields with all labels, in the formats of other tools.
 
 pub(crate) mod cost_estimate;
+mod diff;
 mod emit;
 mod finish;
 mod import;
@@ -60,6 +61,8 @@ enum Verb {
     Status(status::Args),
     /// Check every file and every label, and render some images again.
     Verify(verify::Args),
+    /// Print what differs between two datasets: values of recipes and scene files, and the files that these read.
+    Diff(diff::Args),
     /// Write job files for a cluster: Slurm, Kubernetes, or GNU parallel.
     Emit(emit::Args),
 }
@@ -109,6 +112,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         Some(Verb::Import(args)) => import::run(args, signals),
         Some(Verb::Status(args)) => status::run(args, signals),
         Some(Verb::Verify(args)) => verify::run(args, signals),
+        Some(Verb::Diff(args)) => diff::run(args),
         Some(Verb::Emit(args)) => emit::run(args),
         None if cli.make.dry.dry_run && cli.make.profile.profile => {
             Err(Error::misuse("--profile has no effect with --dry-run").help("leave one of them out"))

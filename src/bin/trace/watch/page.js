@@ -243,6 +243,9 @@ function slider(about) {
   const tell = () => {
     const all = { ...state.values, ...(wanted?.values ?? {}) };
     if (local === null) delete all[path]; else all[path] = local;
+    // An editor may have removed numbers from the file meanwhile.
+    const known = new Set(state.sliders.map((of) => of.path));
+    for (const old of Object.keys(all)) if (!known.has(old)) delete all[old];
     state.values = all;
     row.refresh();
     wish({ values: all });

@@ -248,6 +248,9 @@ impl ServerState {
         let asked = match name {
             "wish" => {
                 let change: Change = serde_json::from_slice(body).map_err(wrong)?;
+                if let Some(values) = &change.values {
+                    self.session.shown(|shown| sliders::check_paths(&shown.sliders, values))?;
+                }
                 self.session.wish(|wish| {
                     wish.index = change.index.unwrap_or(wish.index);
                     wish.seed = change.seed.map_or(wish.seed, Seed::instead);

@@ -2,7 +2,7 @@
 
 use super::contact_sheet::ContactSheet;
 use super::live_image::LiveImage;
-use super::sliders::Slider;
+use super::sliders::{self, Slider};
 use furrow_base::ron_file::Assignment;
 use furrow_base::shell::quoted;
 use furrow_base::{Error, Result};
@@ -130,6 +130,16 @@ impl Session {
             asked = inner.asked;
         });
         asked
+    }
+
+    /// Replaces text and sliders of the scene file. Removes the values of numbers that it no longer has, if it is
+    /// `complete`: the numbers of a text with a syntax error may come back.
+    pub(super) fn read(&self, text: &str, sliders: Vec<Slider>, complete: bool) {
+        self.turn(|inner| {
+            inner.wish.values.retain(|path, _| !complete || sliders::has(&sliders, path));
+            (inner.shown.sliders, inner.shown.text) = (sliders, text.to_owned());
+            inner.version += 1;
+        });
     }
 
     /// Ends the threads that render and watch files.

@@ -61,7 +61,7 @@ fn slider(text: &str, quantity: &Quantity, limits: Option<Limits>) -> Option<Sli
     let whole = !says.contains('.');
     let mut values = Vec::new();
     let (drawn, low, high, at) = match &quantity.value {
-        // Seed and image size have their own controls in the page.
+        // The seed has its own control in the page.
         Value::Fixed { .. } if quantity.path == "seed" => return None,
         Value::Fixed { number, whole } => {
             let [low, high] = range(quantity, *number, *whole, limits);
@@ -101,8 +101,23 @@ fn range(quantity: &Quantity, number: f64, whole: bool, limits: Option<Limits>) 
     let Some(Limits { min, max, above_min }) = limits else { return usual };
     // All values of an angle are usual.
     let all = quantity.path.ends_with("_deg") || max - min <= WIDEST * far;
-    let [low, high] = if all { [min, max] } else { [usual[0].max(min), usual[1].min(max)] };
+    let least = if min < 0.0 { -far } else { usual[0] };
+    let [low, high] = if all { [min, max] } else { [least.max(min), far.min(max)] };
     [if above_min && low <= min { low + (high - low) / STEPS } else { low }, high]
+}
+
+/// Returns an error about the first of these values that has no slider, so that nothing is shown that is not rendered.
+pub(super) fn check_paths(sliders: &[Slider], values: &BTreeMap<String, f64>) -> Result<()> {
+    match values.keys().find(|path| !has(sliders, path)) {
+        Some(path) => Err(Error::misuse(format!("the scene file has no number `{path}`"))
+            .help("the page lists all numbers of the file; reload it after the file has changed")),
+        None => Ok(()),
+    }
+}
+
+/// Returns `true` if one of the sliders is that of this path.
+pub(super) fn has(sliders: &[Slider], path: &str) -> bool {
+    sliders.iter().any(|slider| slider.path == path)
 }
 
 /// Replaces the values at these paths in the text. Paths that do not exist are ignored.
@@ -195,6 +210,25 @@ mod tests {
         assert!(of("camera.pose.yaw_deg").high >= 180.0);
         let height = of("camera.pose.height_m");
         assert!(height.low > 0.0 && height.low < 0.02 && height.high == 1.7, "{height:?}");
+        let size = of("camera.size[1]");
+        assert_eq!((size.low, size.high, size.step), (1.0, 96.0, 1.0));
+        // Each number of a tuple has its own limits.
+        let lidar = "Field(lidar: (position_m: (2, -3, 1.5)))";
+        let lows: Vec<f64> = sliders(lidar, &[]).into_iter().map(|s| s.low).collect();
+        assert!(lows[0] < 0.0 && lows[1] < 0.0 && lows[2] > 0.0 && lows[2] < 0.1, "{lows:?}");
+    }
+
+    /// Expected: a value of a number in the file is accepted, one of a misspelt path or of an assigned number is an error
+    /// that names it.
+    #[test]
+    fn only_numbers_of_the_file_take_values() {
+        let all = sliders(TEXT, &[Assignment::parse("camera.yaw_deg=1").unwrap()]);
+        let check = |path: &str| check_paths(&all, &BTreeMap::from([(path.to_owned(), 1.0)]));
+        assert!(check("crops[0].n").is_ok() && check_paths(&all, &BTreeMap::new()).is_ok());
+        for path in ["crops[1].n", "camera.yaw_deg", "camera.hieght_m"] {
+            let shown = check(path).unwrap_err().to_string();
+            assert!(shown.contains(&format!("no number `{path}`")), "{shown}");
+        }
     }
 
     /// Expected: distributions with empty bounds have no slider; they are reported when the file is read as a scene.

@@ -97,14 +97,12 @@ impl Worker {
         let (begin, written) = (Instant::now(), SystemTime::now());
         let session = self.session.clone();
         self.files.expect(session.path());
-        let text = RonFile::read(session.path())?.text;
-        session.show(|shown| {
-            if shown.text != text || shown.sliders.is_empty() {
-                shown.sliders = sliders(&text, session.assigned());
-                shown.text.clone_from(&text);
-            }
-            shown.doing = "building the scene";
-        });
+        let page = RonFile::read(session.path())?;
+        let (complete, text) = (page.check_syntax().is_ok(), page.text);
+        if session.shown(|shown| shown.text != text || shown.sliders.is_empty()) {
+            session.read(&text, sliders(&text, session.assigned()), complete);
+        }
+        session.show(|shown| shown.doing = "building the scene");
         let text = with(&text, &wish.values);
         let scene = match &self.known {
             Some(known) => known.reread(Some(&text))?,

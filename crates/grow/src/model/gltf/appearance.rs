@@ -6,7 +6,7 @@ use super::super::document::{
 };
 use super::super::files::Files;
 use super::super::notes::Notes;
-use super::super::settle::{ModelError, fraction};
+use super::super::settle::{ModelError, fraction, warn_of_color};
 use super::super::uri::{Target, follow};
 use super::accessors::Accessors;
 use super::passed_over::warn_of_material;
@@ -134,6 +134,7 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
             _ => 0.0,
         };
         let Base { factor: [r, g, b, opacity], picture: info, roughness } = Base::of(material)?;
+        warn_of_color([r, g, b], &name, &mut self.notes);
         let base = [r, g, b].map(fraction);
         let mut slots = Slots::default();
         let slot = info.as_ref().map(|info| Slot::of(info.tex_coord, &info.extensions)).transpose()?;

@@ -6,6 +6,7 @@ use super::super::document::{
 use super::super::notes::Notes;
 use super::super::settle::ModelError;
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// Extensions that are read.
 const READ: [&str; 6] = [
@@ -57,12 +58,21 @@ pub(super) fn warn_of_contents(document: &Document, notes: &mut Notes) {
     if !words.is_empty() {
         notes.add(format!("passed over: {}", words.join(", ")));
     }
-    for name in &document.extensions_used {
-        let name = name.as_str();
+    for name in used(document) {
         if !READ.contains(&name) && !HARMLESS.contains(&name) && !WITH_FALLBACK.contains(&name) {
             notes.about("passed over: extensions of glTF", name);
         }
     }
+}
+
+/// Returns the names of the extensions that a file lists, and of those that its nodes, primitives and materials have without
+/// being listed.
+fn used(document: &Document) -> BTreeSet<&str> {
+    let primitives = document.meshes.iter().flat_map(|mesh| &mesh.primitives).map(|primitive| &primitive.extensions);
+    let nodes = document.nodes.iter().map(|node| &node.extensions);
+    let materials = document.materials.iter().map(|material| &material.extensions);
+    let objects = primitives.chain(nodes).chain(materials).flat_map(|extensions| extensions.keys());
+    document.extensions_used.iter().chain(objects).map(String::as_str).collect()
 }
 
 /// Warns of what a material loses; `name` is its name.

@@ -81,7 +81,7 @@ impl Faces {
                 "v" => {
                     all.positions.push(DVec3::from(statement.numbers::<3>(3)?));
                     // Four numbers are a weight; six have a colour.
-                    if statement.rest.split_whitespace().nth(5).is_some() {
+                    if statement.words().nth(5).is_some() {
                         notes.add("passed over: colours of vertices");
                     }
                 }
@@ -121,8 +121,7 @@ impl Faces {
         notes: &mut Notes,
     ) -> Result<Option<Polygon>, ModelError> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
-        let corners: Vec<Corner> =
-            of.rest.split_whitespace().map(|word| corner(of, word, counts)).collect::<Result<_, _>>()?;
+        let corners: Vec<Corner> = of.words().map(|word| corner(of, word, counts)).collect::<Result<_, _>>()?;
         if corners.len() < 3 {
             notes.about("passed over: faces with fewer than three corners", &state.name);
             return Ok(None);

@@ -53,6 +53,11 @@ impl Statement<'_> {
         format!("line {}: {what}", self.line)
     }
 
+    /// Returns the words before a comment. Names may contain `#`, so they are not read by words.
+    pub(super) fn words(&self) -> impl Iterator<Item = &str> {
+        self.rest.split_whitespace().take_while(|word| !word.starts_with('#'))
+    }
+
     /// Reads a number.
     pub(super) fn number(&self, word: &str) -> Result<f64, String> {
         word.parse().map_err(|_| self.wrong(&format!("`{word}` is not a number")))
@@ -62,7 +67,7 @@ impl Statement<'_> {
     pub(super) fn numbers<const N: usize>(&self, few: usize) -> Result<[f64; N], String> {
         let mut numbers = [0.0; N];
         let mut count = 0;
-        for (number, word) in numbers.iter_mut().zip(self.rest.split_whitespace()) {
+        for (number, word) in numbers.iter_mut().zip(self.words()) {
             *number = self.number(word)?;
             count += 1;
         }
@@ -92,5 +97,7 @@ mod tests {
             .collect();
         assert_eq!(all, [(2, "f".into(), "1 2  3 4".into()), (5, "v".into(), "1".into())]);
         assert_eq!(statements("v 1\rv 2\\").count(), 2);
+        let commented = statements("Kd 0.5 # grey").next().unwrap();
+        assert_eq!((commented.words().count(), commented.numbers::<3>(1).unwrap()), (1, [0.5, 0.0, 0.0]));
     }
 }

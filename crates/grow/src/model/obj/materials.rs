@@ -5,7 +5,7 @@
 
 use super::super::files::Files;
 use super::super::notes::Notes;
-use super::super::settle::{ModelError, fraction};
+use super::super::settle::{ModelError, fraction, warn_of_color};
 use super::lines::{Statement, statements, text};
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::{ToFloat, Vec2};
@@ -194,12 +194,16 @@ fn materials(text: &str, notes: &mut Notes) -> Result<Vec<Material>, String> {
 }
 
 fn read(material: &mut Material, of: &Statement<'_>, notes: &mut Notes) -> Result<(), String> {
-    let last = || of.number(of.rest.split_whitespace().last().unwrap_or_default()).map(ToFloat::to_f32);
+    let last = || of.number(of.words().last().unwrap_or_default()).map(ToFloat::to_f32);
     match of.keyword {
         "Kd" if of.rest.starts_with("spectral") || of.rest.starts_with("xyz") => {
             notes.about("passed over: colours as spectra or XYZ", &material.name);
         }
-        "Kd" => material.color = Some(color(of)?),
+        "Kd" => {
+            let color = color(of)?;
+            warn_of_color(color, &material.name, notes);
+            material.color = Some(color);
+        }
         "d" => {
             if of.rest.starts_with("-halo") {
                 notes.about("passed over: the option -halo of `d`", &material.name);
@@ -220,7 +224,7 @@ fn read(material: &mut Material, of: &Statement<'_>, notes: &mut Notes) -> Resul
 
 /// Reads one number for grey, or three.
 fn color(of: &Statement<'_>) -> Result<[f32; 3], String> {
-    let few = if of.rest.split_whitespace().count() == 1 { 1 } else { 3 };
+    let few = if of.words().count() == 1 { 1 } else { 3 };
     let [r, g, b] = of.numbers::<3>(few)?.map(ToFloat::to_f32);
     Ok(if few == 1 { [r; 3] } else { [r, g, b] })
 }

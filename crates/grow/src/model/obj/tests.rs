@@ -66,6 +66,21 @@ fn text_of_other_programs_is_read() {
     assert!(load(b"\xff\xfev\0", b"").unwrap_err().to_string().contains("UTF-16"));
 }
 
+/// Rationale: colours from 0 to 255 would all become white without a word. Expected: a warning, and the colour cut; comments
+/// behind numbers change nothing, and a name may contain their sign.
+#[test]
+fn colours_beyond_one_are_reported_and_comments_left_out() {
+    let bytes = read(SQUARE, "newmtl green\nKd 26 128 0.5\n");
+    assert_eq!(bytes.surfaces[0].color, [1.0, 1.0, 0.5]);
+    assert_eq!(bytes.warnings, ["colours that are not between 0 and 1, cut to them: `green`"]);
+    let named = |text: &str| text.replace("green", "leaf #2");
+    let commented =
+        named(SQUARE).replace("4/4\n", "4/4 # the leaf\n").replace("v 1 1 0\n", "v 1 1 0 # a corner of it\n");
+    let model = read(&commented, &(named(GREEN).replace("0.1\n", "0.1 # green\n") + "d 1 # solid\n"));
+    assert_eq!((model.surfaces[0].color, area(&model)), ([0.1, 0.5, 0.1], 1.0));
+    assert_eq!(model.warnings, Vec::<String>::new());
+}
+
 #[test]
 fn missing_materials_and_coordinates_are_reported() {
     let white = read(&SQUARE.replace("usemtl green", "usemtl blue"), GREEN);

@@ -27,6 +27,8 @@ pub struct Camera {
     /// Upper bounds of the lens's first and second derivatives within the horizon.
     pub(super) bend: [f64; 2],
     aperture: Option<Aperture>,
+    /// Focal length in millimetres, if the scene file gives it.
+    focal_mm: Option<f64>,
     pub(super) pose: Pose,
     pub(super) motion: Motion,
 }
@@ -51,9 +53,9 @@ impl Camera {
         }
         let distortion = distortion.into();
         let (horizon, bend, aperture, motion) = (f64::INFINITY, [1.0, 0.0], None, Motion::default());
-        let scale = 1.0;
+        let (scale, focal_mm) = (1.0, None);
         let mut camera =
-            Self { width, height, scale, focal, centre, distortion, horizon, bend, aperture, pose, motion };
+            Self { width, height, scale, focal, centre, distortion, horizon, bend, aperture, focal_mm, pose, motion };
         if !distortion.is_none() {
             camera.horizon = camera.check_distortion()?;
             camera.bend = distortion.bend(camera.horizon.sqrt());
@@ -65,6 +67,13 @@ impl Camera {
     #[must_use]
     pub fn with_aperture(mut self, aperture: Option<Aperture>) -> Self {
         self.aperture = aperture;
+        self
+    }
+
+    /// Returns the camera with a focal length in millimetres, which changes no ray.
+    #[must_use]
+    pub fn with_focal_mm(mut self, focal_mm: Option<f64>) -> Self {
+        self.focal_mm = focal_mm;
         self
     }
 
@@ -116,6 +125,11 @@ impl Camera {
     /// Returns the thin lens; `None` for a pinhole.
     pub fn aperture(&self) -> Option<Aperture> {
         self.aperture
+    }
+
+    /// Returns the focal length in millimetres; `None` if only its ratio to the pixels is known.
+    pub fn focal_mm(&self) -> Option<f64> {
+        self.focal_mm
     }
 
     /// Returns the f-number of the lens; `None` for a pinhole.

@@ -115,7 +115,8 @@ macro_rules! cameras {
                         let distortion = lens.unwrap_or(Lens::BrownConrady(distortion.draw(stream)));
                         let aperture = aperture.as_ref().map(|of| of.draw(focal_mm, stream)).transpose()?;
                         let camera = Camera::new(size, focal, centre, distortion, pose)?;
-                        Ok(camera.with_aperture(aperture).with_motion(motion.draw(0.0, stream)))
+                        let camera = camera.with_aperture(aperture).with_focal_mm(focal_mm);
+                        Ok(camera.with_motion(motion.draw(0.0, stream)))
                     }
                 }
             }
@@ -266,7 +267,8 @@ impl Named<'_> {
         let aperture = self.f_number.map(|f| Aperture::new(focal, f.draw(stream), pose.height()));
         let pixels = focal * 1e3 / pixel_um;
         let camera = Camera::new(size, [pixels; 2], middle(size), distortion, pose)?;
-        Ok(camera.with_aperture(aperture).with_motion(self.motion.draw(readout_ms, stream)))
+        let camera = camera.with_aperture(aperture).with_focal_mm(Some(focal));
+        Ok(camera.with_motion(self.motion.draw(readout_ms, stream)))
     }
 }
 

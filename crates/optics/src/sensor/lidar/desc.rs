@@ -1,6 +1,6 @@
 //! LiDAR description in a scene file.
 
-use super::{HALF_LIGHT_M_NS, Lidar, Returns};
+use super::{HALF_LIGHT_M_NS, Lidar, Returns, Rosette};
 use crate::sensor::given::{Given, layered};
 use furrow_base::math::{Mat3, RoundTo, ToFloat, Vec3, vec3};
 use furrow_base::ron_file::{Elevation, NonNegative, Num, Positive, PositiveCount, Signed, Vary};
@@ -14,7 +14,7 @@ const MOST_BEAMS: usize = 1024;
 const MOST_PULSES: f64 = 1e7;
 
 layered! {
-    /// Rotating LiDAR: a name, `Vlp16` or `Os164`, or a name with fields that override its values. Without a name the
+    /// LiDAR: a name, `Vlp16`, `Os164` or `Mid40`, or a name with fields that override its values. Without a name the
     /// values are those of `Vlp16`.
     ///
     /// ```
@@ -23,6 +23,7 @@ layered! {
     /// for text in [
     ///     "Vlp16",
     ///     "Os164(position_m: (0, 0.4, 1.6), pitch_deg: -15, returns: All)",
+    ///     "Mid40(pitch_deg: -40, rotation_hz: 2)",
     ///     "(
     ///         position_m: (0, 0, Uniform(1.4, 1.6)),
     ///         beams: Angles([-40, -30, -20]),
@@ -58,10 +59,10 @@ layered! {
         #[schemars(extend("x-example" = "Fan(count: 32, from_deg: -30, to_deg: 10)"))]
         pub beams: BeamsDesc = Given<BeamsDesc>,
         /// Range of azimuths in which it emits pulses, degrees clockwise from its front, from -360 to 360; default a
-        /// full turn from 0 to 360.
+        /// full turn from 0 to 360. Without effect for a `Rosette`.
         #[schemars(extend("x-example" = "(-60, 60)"))]
         pub azimuth_deg: (Num<Signed<360>>, Num<Signed<360>>) = Given<(Num<Signed<360>>, Num<Signed<360>>)>,
-        /// Rotation rate, turns per second; default 10.
+        /// Rotation rate, turns per second, or scans per second of a `Rosette`; default 10.
         pub rotation_hz: Num<Positive<1000>> = Given<Num<Positive<1000>>>,
         /// Pulse rate; default 18,084 per second for each beam.
         #[schemars(extend("x-example" = "StepDeg(0.2)"))]
@@ -108,6 +109,16 @@ pub enum BeamsDesc {
     /// List of elevations, degrees above its horizon.
     #[schemars(extend("x-example" = "([-30, -20, -12, -6])"))]
     Angles(Vec<Num<Elevation>>),
+    /// One beam behind two rotating prisms, which covers a circle around its front with a rosette. The phases of the
+    /// prisms are drawn for each field; `pulses` must be `PerSecond`.
+    Rosette {
+        /// Largest angle from its front, degrees.
+        #[schemars(extend("x-example" = "19.2"))]
+        radius_deg: Num<Positive<80>>,
+        /// Turns per second of the prisms, of opposite signs if they turn against each other.
+        #[schemars(extend("x-example" = "(121.57, -77.73)"))]
+        speeds_hz: (Num<Signed<10_000>>, Num<Signed<10_000>>),
+    },
 }
 
 /// Pulse rate of a LiDAR.
@@ -125,6 +136,7 @@ impl BeamsDesc {
     fn elevations_deg(&self) -> Vec<f64> {
         match self {
             Self::Angles(all) => all.iter().map(|angle| angle.get()).collect(),
+            Self::Rosette { .. } => vec![0.0],
             Self::Fan { count, from_deg, to_deg } => {
                 let (last, from, to) = (count.get().trunc_to::<u32>() - 1, from_deg.get(), to_deg.get());
                 if last == 0 {
@@ -139,8 +151,22 @@ impl BeamsDesc {
     fn count(&self) -> usize {
         match self {
             Self::Angles(all) => all.len(),
+            Self::Rosette { .. } => 1,
             Self::Fan { count, .. } => count.get().trunc_to::<usize>(),
         }
+    }
+}
+
+impl BeamsDesc {
+    /// Samples the prisms, if there are any.
+    fn rosette(&self, pulses: PulsesDesc, stream: &mut Stream) -> Result<Option<Rosette>> {
+        let Self::Rosette { radius_deg, speeds_hz } = self else { return Ok(None) };
+        if matches!(pulses, PulsesDesc::StepDeg(_)) {
+            return Err(Error::input("a Rosette has no rotating head, so its pulses have no step in degrees")
+                .help("write pulses: PerSecond(100000)"));
+        }
+        let phases = [stream.uniform(), stream.uniform()];
+        Ok(Some(Rosette { radius_deg: radius_deg.get(), speeds_hz: [speeds_hz.0.get(), speeds_hz.1.get()], phases }))
     }
 }
 
@@ -170,7 +196,11 @@ impl LidarDesc {
             return Err(Error::input(format!("two of its beams have the elevation {twice} degrees"))
                 .help("list each elevation in `Angles` once; the first and the last of a `Fan` must differ"));
         }
-        let (from, to) = (self.azimuth_deg.0.get(), self.azimuth_deg.1.get());
+        let rosette = self.beams.rosette(self.pulses, stream)?;
+        let (from, to) = match rosette {
+            Some(_) => (0.0, 360.0),
+            None => (self.azimuth_deg.0.get(), self.azimuth_deg.1.get()),
+        };
         if !(to > from && to - from <= 360.0) {
             let words = format!("azimuth_deg goes from {from} to {to}");
             return Err(Error::input(words)
@@ -202,6 +232,7 @@ impl LidarDesc {
             step_deg,
             columns: columns.trunc_to::<u32>(),
             rotation_hz,
+            rosette,
             divergence: (1e-3 * self.divergence_mrad.get()).to_f32(),
             exit: (1e-3 * self.exit_mm.get()).to_f32(),
             noise: self.range_noise_m.get(),
@@ -221,6 +252,21 @@ mod tests {
 
     fn built(text: &str) -> Result<Lidar> {
         RonFile::of(text).parse::<LidarDesc>()?.build(&mut Stream::of(1, 0, Purpose::Test, 0))
+    }
+
+    /// Expected: a pulse for each 10 µs of a tenth of a second within the circle, from a random phase; a step in degrees is
+    /// refused.
+    #[test]
+    fn a_rosette_fires_at_its_rate_within_its_circle() {
+        let mid = built("Mid40(rotation_hz: 10)").unwrap();
+        assert_eq!((mid.columns(), mid.beams()), (10_000, 1));
+        let last = mid.pulse(9999, 0);
+        assert!((last.time_s - 0.09999).abs() < 1e-6, "{}", last.time_s);
+        let widest = (0..10_000).map(|k| mid.pulse(k, 0).direction.y).fold(1.0, f32::min);
+        assert!((widest.acos().to_degrees() - 19.2).abs() < 0.05, "{widest}");
+        assert_ne!(mid.pulse(0, 0).direction.x, 19.2_f32.to_radians().sin());
+        let error = built("Mid40(pulses: StepDeg(1))").unwrap_err().to_string();
+        assert!(error.contains("a Rosette has no rotating head"), "{error}");
     }
 
     /// Expected, by the frame's definition: azimuth 0 faces north at yaw 0, azimuth 90 faces east; a lowered front

@@ -1,19 +1,21 @@
-//! Rotating LiDAR: directions and widths of its pulses, and the echoes that its receiver reports.
+//! LiDAR: directions and widths of its pulses, and the echoes that its receiver reports.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `desc`, `preset` | LiDAR description in a scene file, and named LiDARs |
+//! | `rosette` | directions of a pair of rotating prisms |
 //! | `beam` | the rays that sample one pulse |
 //! | `returns` | the echoes of a pulse that are reported |
 //!
 //! Its frame: x right, y ahead, z up. Azimuths are clockwise from y as seen from above, elevations upwards from the xy
 //! plane: direction = (cos e sin a, cos e cos a, sin e). All beams of a column fire at the same moment; the head
-//! rotates at constant speed.
+//! rotates at constant speed. A LiDAR with prisms has one beam, and each of its pulses is a column.
 
 mod beam;
 mod desc;
 mod preset;
 mod returns;
+mod rosette;
 
 use furrow_base::math::{Mat3, ToFloat, ToInt, Vec3, vec3};
 
@@ -21,6 +23,7 @@ pub use beam::BeamRay;
 pub use desc::{BeamsDesc, LidarDesc, PulsesDesc};
 pub use preset::LIDARS;
 pub use returns::Returns;
+use rosette::Rosette;
 
 /// Half the speed of light, metres per nanosecond: range per nanosecond of echo delay.
 const HALF_LIGHT_M_NS: f64 = 0.149_896_229;
@@ -41,6 +44,8 @@ pub struct Lidar {
     step_deg: f64,
     columns: u32,
     rotation_hz: f64,
+    /// Prisms that deflect the only beam, instead of a rotating head.
+    rosette: Option<Rosette>,
     /// Full divergence between the directions of 1/e² of the intensity, radians, then the beam's diameter at the exit,
     /// metres.
     divergence: f32,
@@ -75,7 +80,7 @@ pub struct Pulse {
 }
 
 impl Lidar {
-    /// Returns the number of columns: directions per turn at which all beams fire.
+    /// Returns the number of columns: moments per turn, or per scan, at which all beams fire.
     pub fn columns(&self) -> u32 {
         self.columns
     }
@@ -85,13 +90,22 @@ impl Lidar {
         self.elevations_deg.len().to_u16()
     }
 
+    /// Returns `true` for a beam behind prisms, whose columns are not in the order of their azimuths.
+    pub fn has_prisms(&self) -> bool {
+        self.rosette.is_some()
+    }
+
     /// Returns the pulse of a beam in a column.
     pub fn pulse(&self, column: u32, beam: u16) -> Pulse {
         let turned = self.step_deg * f64::from(column);
-        let azimuth_deg = self.first_deg + turned;
-        let time_s = (turned / (360.0 * self.rotation_hz)).to_f32();
+        let time = turned / (360.0 * self.rotation_hz);
+        let time_s = time.to_f32();
+        let [azimuth_deg, elevation_deg] = match self.rosette {
+            Some(rosette) => rosette.at(time),
+            None => [self.first_deg + turned, self.elevations_deg[usize::from(beam)]],
+        };
         let (sa, ca) = azimuth_deg.to_radians().sin_cos();
-        let (se, ce) = self.elevations_deg[usize::from(beam)].to_radians().sin_cos();
+        let (se, ce) = elevation_deg.to_radians().sin_cos();
         let world = |x: f64, y: f64, z: f64| self.axes * vec3(x.to_f32(), y.to_f32(), z.to_f32());
         Pulse {
             beam,
