@@ -205,6 +205,7 @@ impl Renderer {
             scene_hash: grown.hash.clone(),
             seed: grown.seed,
             index: grown.index,
+            light: grown.light,
             spp,
             integrator: integrator.into(),
             deviations: self

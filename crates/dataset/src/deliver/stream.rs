@@ -121,6 +121,8 @@ impl ImageStream {
         let threads = Threads::new(work.threads)?.count();
         let (first, _) = self.set.recipe.field_of(self.indices.start);
         let at_once = match work.at_once {
+            // One worker builds each field once; several would each build it for some of its lights.
+            0 if self.set.recipe.lights() > 1 => 1,
             0 => threads.min(fitting(scene, first, work.memory)),
             given => given,
         };

@@ -13,7 +13,7 @@ use crate::make::finish::finish;
 use crate::make::generate::{MOST_AT_ONCE, formatted};
 use crate::make::meter;
 use crate::make::plan::{Draft, Order, draft};
-use crate::make::render::{CachedField, RenderedSample, of_day, render};
+use crate::make::render::{CachedField, RenderedSample, render, view_of};
 use crate::model::invariants;
 use crate::model::recipe::{FILE, ImageOrigin, Recipe, compact};
 use crate::model::record::{CaptureRecord, Record};
@@ -468,7 +468,8 @@ impl<'a> ProbeDataset<'a> {
         let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
         if let ImageOrigin::Rendered(rendering) = &mut small.made {
             rendering.days.truncate(days);
-            rendering.captures = recipe.captures_a_day().min(cameras.to_u64()) * rendering.days.len().max(1).to_u64();
+            let views = recipe.views_a_day().min(cameras.to_u64());
+            rendering.captures = views * rendering.lights * rendering.days.len().max(1).to_u64();
         }
         Self { recipe: small, probes }
     }
@@ -493,9 +494,10 @@ impl<'a> ProbeDataset<'a> {
         record.index = index;
         record.name = Set::name(index);
         record.split = self.recipe.split_of(index);
+        record.light = record.light.map(|_| self.recipe.light_of(index));
         if let Some(of_probe) = &mut record.capture {
-            let (of_day, day) = of_day(&self.recipe, capture);
-            let camera = probe.cameras.get(of_day.to_usize()).cloned().unwrap_or_default();
+            let (view, day) = view_of(&self.recipe, capture);
+            let camera = probe.cameras.get(view.to_usize()).cloned().unwrap_or_default();
             *of_probe = CaptureRecord { field, day, frame: 0, camera, ..of_probe.clone() };
         }
         let own = format!("{}/record.json", native::folder(&record.name));

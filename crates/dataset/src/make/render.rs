@@ -18,6 +18,7 @@ use furrow_field::drive::Capture;
 use furrow_field::profile::Phase;
 use furrow_field::traits::{PlantTraits, Traits};
 use furrow_job::{Image, PreparedField, Renderer, Request, SceneFile};
+use furrow_output::Provenance;
 use furrow_render::render::{self, Extent, LabelMap, RenderMonitor, WholePlants};
 use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
@@ -111,23 +112,26 @@ impl CachedField {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
-        let (of_day, day) = of_day(recipe, capture);
+        let (view, day) = view_of(recipe, capture);
         let known = self.field.take().filter(|field| field.grown().index == number && field.grown().day == day);
         let new = known.is_none();
         if new {
             self.traits = None;
         }
-        let mut field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
+        let field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
         if field.grown().hash != rendering.scene_sha256 {
             let help = format!("restore {}/scene/, or create another dataset", folder.display());
             let words = "the scene file or a file that it names was changed since the dataset was created";
             return Err(Error::misuse(words).help(help).in_file(folder.join(&rendering.scene)));
         }
-        field.take(of_day)?;
         field.geometry()?;
+        // Kept before it is set to the image, so that an error of one light costs no other light its field.
+        let field = self.field.insert(field);
+        field.take(view)?;
+        field.relight(recipe.light_of(index))?;
         let (grow, build) = field.times();
         let grow = if new { grow + build } else { Duration::ZERO };
-        Ok(FieldAtCamera { field: self.field.insert(field), traits: &mut self.traits, grow })
+        Ok(FieldAtCamera { field, traits: &mut self.traits, grow })
     }
 
     /// Measures the traits of the plants in the field, which its images share.
@@ -139,10 +143,10 @@ impl CachedField {
     }
 }
 
-/// Splits the number of a capture of a field into its number within the day and the day.
-pub(crate) fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
+/// Splits the number of an image of a field into the number of its view within the day and the day.
+pub(crate) fn view_of(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
     let a_day = recipe.captures_a_day();
-    (capture % a_day, recipe.days().get((capture / a_day).to_usize()).copied())
+    (capture % a_day / recipe.lights(), recipe.days().get((capture / a_day).to_usize()).copied())
 }
 
 /// Makes image `index` of a dataset from its [`scene_file`], on the threads of the scene file.
@@ -162,7 +166,8 @@ pub fn render(
     image.check_denoised()?;
     let begin = Instant::now();
     let (draw, label) = (image.times.draw, image.times.label);
-    let text = image.provenance.photograph_text(image.denoised.is_some());
+    // Label maps have this comment. It does not name the light, so that they are the same files for all lights.
+    let text = Provenance { light: 0, ..image.provenance.clone() }.photograph_text(image.denoised.is_some());
     let sample = field.threads().install(|| describe(&set.recipe, index, image, traits))?;
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
@@ -250,6 +255,7 @@ fn labelled(
             source: None,
             split: recipe.split_of(index),
             capture: recipe.has_sequences().then(|| taken(recipe, field)),
+            light: (recipe.lights() > 1).then_some(field.light),
             width: labels.window.width(),
             height: labels.window.height(),
             classes: Vec::new(),
