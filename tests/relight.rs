@@ -84,7 +84,8 @@ fn packs_streams_and_drives_know_the_lights() {
     assert!(words.contains("--pack 3 would cut fields of 2 images"), "{words}");
     succeed(make(&data, 4, &["--relight", "2", "--pack", "2"]));
     let look = ["--width", "96", "--spp", "2", "--relight", "2", "--quiet"];
-    let streamed = succeed(trace(&[&["stream", "--scene", SMALL, "--first", "1", "--count", "2"], &look[..]].concat())).stdout;
+    let streamed =
+        succeed(trace(&[&["stream", "--scene", SMALL, "--first", "1", "--count", "2"], &look[..]].concat())).stdout;
     let set = Set::open(&data).unwrap();
     let mut files = 0;
     for entry in tar::Archive::new(&streamed[..]).entries().unwrap() {
@@ -97,7 +98,8 @@ fn packs_streams_and_drives_know_the_lights() {
     }
     assert!(files > 10, "{files}");
     let moving = "drive=(frames: 2, path: AlongRows())";
-    let out = ["--out", path(&drive), "--spp", "1", "--width", "48", "--relight", "2", "--format", "coco,tum", "--quiet"];
+    let out =
+        ["--out", path(&drive), "--spp", "1", "--width", "48", "--relight", "2", "--format", "coco,tum", "--quiet"];
     succeed(trace(&[&["sequence", "--scene", SMALL, "--set", moving], &out[..]].concat()));
     for light in ["light00", "light01"] {
         let poses = fs::read_to_string(drive.join(format!("tum/000000-{light}-camera.txt"))).unwrap();
@@ -109,10 +111,24 @@ fn packs_streams_and_drives_know_the_lights() {
         coco[name].as_array().unwrap().iter().map(|entry| entry[key].clone()).collect()
     };
     assert_eq!(list("videos", "id"), [1, 2]);
-    assert_eq!((list("images", "video_id"), list("images", "frame_id")), (vec![1.into(), 2.into(), 1.into(), 2.into()], vec![0.into(), 0.into(), 1.into(), 1.into()]));
+    assert_eq!(
+        (list("images", "video_id"), list("images", "frame_id")),
+        (vec![1.into(), 2.into(), 1.into(), 2.into()], vec![0.into(), 0.into(), 1.into(), 1.into()])
+    );
     let words = fail(make(&drive.join("x"), 2, &["--relight", "2", "--edit", "smooth-labels"]), 2);
     assert!(words.contains("this --edit makes labels from samples"), "{words}");
-    let dark = trace(&["dataset", "--scene", SMALL, "--out", path(&drive.join("x")), "--count", "2", "--relight", "2", "--labels-only"]);
+    let dark = trace(&[
+        "dataset",
+        "--scene",
+        SMALL,
+        "--out",
+        path(&drive.join("x")),
+        "--count",
+        "2",
+        "--relight",
+        "2",
+        "--labels-only",
+    ]);
     let words = fail(dark, 2);
     assert!(words.contains("--relight renders the same labels under several lights"), "{words}");
 }

@@ -139,6 +139,6 @@ impl PreparedField {
 
     /// Returns scene and geometry in the form that integrators take.
     pub fn world(&self) -> Result<World<'_>> {
-        Ok(World { scene: &self.grown.scene, geometry: self.geometry()? })
+        Ok(World::new(&self.grown.scene, self.geometry()?))
     }
 }

@@ -150,7 +150,10 @@ fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
     let (images, words) = if by_day {
         (recipe.views_a_day(), "each field has one image a day; `drive` in a scene file takes several")
     } else {
-        (recipe.captures() / recipe.lights(), "each field has one image; `drive` or `days` in a scene file takes several")
+        (
+            recipe.captures() / recipe.lights(),
+            "each field has one image; `drive` or `days` in a scene file takes several",
+        )
     };
     if images == 1 { vec![words.to_owned()] } else { Vec::new() }
 }

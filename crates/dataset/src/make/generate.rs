@@ -20,7 +20,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
-use furrow_base::math::{RoundTo, ToFloat};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
@@ -211,6 +211,7 @@ pub(crate) fn generate_for(
     let workers = Threads::divided(threads, at_once)?;
     let run = Run {
         set,
+        rendered: tasks.iter().filter(|(_, task)| *task == Task::All).map(|(index, _)| *index).collect(),
         source: source.map(|(scene, _, renderer)| (scene, renderer)),
         callbacks,
         threads,
@@ -351,6 +352,8 @@ impl OpenPacks {
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
+    /// Images that this run renders.
+    rendered: BTreeSet<u64>,
     /// Scene file and renderer; `None` if no image has to be rendered.
     source: Option<(SceneFile, &'a Renderer)>,
     callbacks: &'a Callbacks<'a>,
@@ -376,6 +379,7 @@ impl Run<'_> {
         } else {
             let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
             let watch = RenderMonitor { done: &|_| (), stop: self.callbacks.now };
+            kept.expect(self.rendered.range(index + 1..).take(recipe.lights().to_usize()).copied().collect());
             let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
             self.profiler.enter(Phase::Files);
             crate::model::invariants::check(recipe, &made.sample)?;

@@ -39,5 +39,5 @@ pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Resul
     };
     image.check_denoised()?;
     let threads = image.field().threads().clone();
-    threads.install(|| describe(&recipe, index, image, &mut None))
+    threads.install(|| describe(&recipe, index, image, (&mut None, &mut None)))
 }

@@ -100,7 +100,10 @@ impl Field {
     pub fn provenance(&self) -> String {
         let Self { hash, seed, index, .. } = self;
         let light = if self.light == 0 { String::new() } else { format!("\nlight: {}", self.light) };
-        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}{light}", env!("CARGO_PKG_VERSION"))
+        format!(
+            "program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}{light}",
+            env!("CARGO_PKG_VERSION")
+        )
     }
 
     /// Converts a film of this field to an image with the field's sensor model.

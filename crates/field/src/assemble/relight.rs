@@ -78,7 +78,9 @@ mod tests {
                 source.relight(&mut skipping, &options, light).unwrap();
                 assert_eq!((&field.conditions, shining(&field)), (&skipping.conditions, shining(&skipping)));
             }
-            assert!(field.conditions.lights != own.conditions.lights && field.conditions.sensor != own.conditions.sensor);
+            assert!(
+                field.conditions.lights != own.conditions.lights && field.conditions.sensor != own.conditions.sensor
+            );
             assert_eq!((field.scene.camera, field.sample_seed()), (own.scene.camera, own.sample_seed()));
             match &field.conditions.lights[..] {
                 [LightRecord::Constant(flash)] => red.push(f64::from(flash.radiance_w_m2_sr_nm.to_array()[0])),
@@ -95,7 +97,10 @@ mod tests {
     /// Expected: a moving camera is exposed for as long as each light needs, and a light that is not there is warned of.
     #[test]
     fn exposure_follows_the_light() {
-        let source = source("OneOf([[Constant(radiance: (0.1, 0.1, 0.1, 0.1))], [Constant(radiance: (0.2, 0.2, 0.2, 0.2))]])", ", motion: (speed_m_s: 1)");
+        let source = source(
+            "OneOf([[Constant(radiance: (0.1, 0.1, 0.1, 0.1))], [Constant(radiance: (0.2, 0.2, 0.2, 0.2))]])",
+            ", motion: (speed_m_s: 1)",
+        );
         let options = Options::default();
         let mut field = source.field(&options).unwrap();
         let mut times = std::collections::BTreeMap::<usize, Vec<f32>>::new();
