@@ -138,7 +138,7 @@ fn main() {
         let (stop, integrator) = (AtomicBool::new(false), PathTracer::default());
         let watch = RenderMonitor { done: &|_| (), stop: &stop };
         let render = |geometry: &dyn Intersect| {
-            let world = World { scene, geometry };
+            let world = World::new(scene, geometry);
             pool.install(|| render::render(&world, &integrator, &settings, &watch)).expect("a film")
         };
         let recorder = Recorder { geometry: &geometry, asked: (0..threads).map(|_| Mutex::default()).collect() };

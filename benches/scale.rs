@@ -143,7 +143,7 @@ fn run(row: &Row) -> Cost {
         let camera = &field.scene.camera;
         let window = Window::full(camera.width(), camera.height());
         let settings = Settings { spp: row.spp, seed: field.sample_seed(), window, points: Points::Sobol };
-        let (stop, world) = (AtomicBool::new(false), World { scene: &field.scene, geometry: &accel });
+        let (stop, world) = (AtomicBool::new(false), World::new(&field.scene, &accel));
         let watch = RenderMonitor { done: &|_| (), stop: &stop };
         pool.install(|| render::render(&world, &PathTracer::default(), &settings, &watch)).expect("a film");
         lap(&mut cost.seconds[2]);

@@ -63,7 +63,7 @@ fn shoot(edit: &Edit, field: &Field, threads: usize) -> Rendered {
         let window = Window::full(scene.camera.width(), scene.camera.height());
         let settings = Settings { spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let watch = RenderMonitor { done: &|_| (), stop: &AtomicBool::new(false) };
-        let film = render::render(&World { scene, geometry: &geometry }, &tracer, &settings, &watch).unwrap();
+        let film = render::render(&World::new(scene, &geometry), &tracer, &settings, &watch).unwrap();
         let labels = render::label(&geometry, &scene.parts, &scene.camera, window);
         let labels = edit.labels(labels, &film, &scene.tags());
         Rendered { photograph: edit.photograph(field, &film), film, labels }

@@ -440,6 +440,7 @@ fn label_files_read_back_as_the_label_map() {
         scene_hash: field.hash.clone(),
         seed: 0,
         index: 0,
+        light: 0,
         spp: Spp::Uniform(1),
         integrator: "path".into(),
         deviations: Vec::new(),

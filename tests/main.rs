@@ -87,6 +87,7 @@ mod quality;
 #[cfg(feature = "raster")]
 mod raster;
 mod reference;
+mod relight;
 mod report;
 mod sampling;
 mod scan;

@@ -21,6 +21,7 @@ fn provenance(hash: &str) -> Provenance {
         scene_hash: hash.into(),
         seed: 3,
         index: 0,
+        light: 0,
         spp: Spp::Uniform(3),
         integrator: "path".into(),
         deviations: Vec::new(),

@@ -63,6 +63,7 @@ class RenderOptions(_Shared, total=False):
     index: int
     spp: Optional[int]
     day: int
+    light: int
     frame: int
     camera: str
     target_error: float
@@ -78,6 +79,7 @@ class StreamOptions(_Shared, total=False):
     spp: Optional[int]
     first: int
     count: Optional[int]
+    relight: int
     shard: Optional[Tuple[int, int]]
     labels_only: bool
     keep: Union[str, Sequence[str]]

@@ -74,7 +74,7 @@ pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
         let settings = Settings { spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let stop = AtomicBool::new(false);
         let watch = RenderMonitor { done: &|_| (), stop: &stop };
-        let world = World { scene, geometry: &geometry };
+        let world = World::new(scene, &geometry);
         let film = render::render(&world, &PathTracer::default(), &settings, &watch).expect("a film");
         (film, render::label(&geometry, &scene.parts, &scene.camera, window))
     })

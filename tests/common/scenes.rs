@@ -93,7 +93,7 @@ pub fn with_world<T: Send>(
     render::pool(threads).expect("a pool").install(|| {
         let accel = EmbreeAccel::build(&scene.surfaces(), 1).expect("an accelerator");
         let stop = AtomicBool::new(false);
-        f(&World { scene, geometry: &accel }, &RenderMonitor { done: &|_| (), stop: &stop })
+        f(&World::new(scene, &accel), &RenderMonitor { done: &|_| (), stop: &stop })
     })
 }
 

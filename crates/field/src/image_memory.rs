@@ -30,8 +30,9 @@ impl ImageMemory {
         self.asked.clear();
     }
 
-    /// Counts an image by its headers. If all images together exceed the limit, returns an error about the larger of its files.
-    pub(super) fn count(&mut self, picture: &ImageKey, need: fn(&Header, Option<&Header>) -> Need) -> Result<()> {
+    /// Counts an image by its headers. Returns whether they can be read; if not, decoding reports the error. If all images together
+    /// exceed the limit, returns an error about the larger of its files.
+    pub(super) fn count(&mut self, picture: &ImageKey, need: fn(&Header, Option<&Header>) -> Need) -> Result<bool> {
         let need = match self.needs.get(picture) {
             Some(known) => Some(*known),
             None => self.weigh(picture, need)?,
@@ -39,7 +40,7 @@ impl ImageMemory {
         if let Some(need) = need {
             self.note(picture.clone(), need);
         }
-        Ok(())
+        Ok(need.is_some())
     }
 
     /// Returns an error if reading an environment map would take too much memory.
@@ -49,11 +50,12 @@ impl ImageMemory {
         self.allowance().take(&header, header.panorama()).map_err(refused)
     }
 
-    /// Returns the memory need of an image, checked against the limit together with the other images of the field. Returns `None` if the
+    /// Returns the memory need of an image, checked against the limit together with the other images of the field. Returns `None` if a
     /// header cannot be read; decoding then reports the error.
     fn weigh(&self, (file, beside, _): &ImageKey, need: fn(&Header, Option<&Header>) -> Need) -> Result<Option<Need>> {
         let Some(header) = Header::of_file(file) else { return Ok(None) };
-        let height = if beside.as_os_str().is_empty() { None } else { Header::of_file(beside) };
+        let alone = beside.as_os_str().is_empty();
+        let height = if alone { None } else { Header::of_file(beside) };
         let (larger, of) = match &height {
             Some(height) if height.pixels() > header.pixels() => (beside, height),
             _ => (file, &header),
@@ -61,7 +63,7 @@ impl ImageMemory {
         let need = need(&header, height.as_ref());
         let refused = |what: String| Error::input(what).help(MemoryLimit::HELP).in_file(larger);
         self.allowance().take(of, need).map_err(refused)?;
-        Ok(Some(need))
+        Ok((alone || height.is_some()).then_some(need))
     }
 
     /// Adds an image with a known need to the current field.

@@ -3,12 +3,12 @@
 use super::desc::{ModelDesc, SpeciesDesc};
 use super::image_memory::{self, ImageMemory};
 use super::layer::Layer;
+use super::named_file::{IMAGE_HELP, at_its_place, digest};
 use super::poses;
 use super::scene_edit::SceneEdit;
 use super::shipped::species as shipped_species;
+use super::species::{LeafImage, NamedMaterial, Species, unlikely};
 use super::species_text::SpeciesFile;
-use furrow_base::error::{Kind, Place};
-use furrow_base::geometry::{AlphaMask, Margin};
 use furrow_base::input::{self, Outside, Scope, shipped};
 use furrow_base::math::{Spectrum, ToFloat, ToInt};
 use furrow_base::ron_file::{Pick, RonFile, nearest};
@@ -16,62 +16,18 @@ use furrow_base::{Error, Result};
 use furrow_grow::model::{Model, Up};
 use furrow_grow::soil::LayerDesc;
 use furrow_optics::light::{Infrared, Table};
-use furrow_optics::optics::{Pigments, measured};
+use furrow_optics::optics::measured;
 use furrow_optics::sensor::{Calibration, Pose};
 use furrow_optics::texture::{ColorSpace, Header, Height, HeightFromBrightness, Maps, Texture, Wrap};
-use furrow_render::material::{LeafMaterial, LeafTexture, Tones};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Maximum size of a file of poses in bytes: about a million lines.
 const MOST_POSES: u64 = 64 << 20;
 /// Maximum size of a file of a camera's calibration, bytes: it may hold the points of many images.
 const MOST_CALIBRATION: u64 = 64 << 20;
-
-/// A leaf image with its opacity mask.
-#[derive(Clone)]
-pub(super) struct MaskedImage {
-    picture: Arc<LeafTexture>,
-    mask: Option<Arc<AlphaMask>>,
-    margin: Option<Arc<Margin>>,
-}
-
-/// One variant of a material: the leaf image that a plant's organ may get, or none.
-pub(super) struct Choice {
-    pub(super) material: LeafMaterial,
-    /// Opacity mask of the blade; `None` if the image is fully opaque or there is none.
-    pub(super) mask: Option<Arc<AlphaMask>>,
-    /// Distance of each point of the blade from the edge of the mask.
-    pub(super) margin: Option<Arc<Margin>>,
-    /// Whether the variant has an image.
-    pub(super) pictured: bool,
-    tones: OnceLock<Arc<Tones>>,
-}
-
-impl Choice {
-    /// Returns the optics of yellowed and dead tissue, computed on first use. `pigments` must be those of this material.
-    pub(super) fn tones(&self, pigments: &Pigments) -> Arc<Tones> {
-        self.tones.get_or_init(|| Arc::new(Tones::new(pigments))).clone()
-    }
-}
-
-/// A species with its materials loaded.
-pub(super) struct Species {
-    pub(super) desc: SpeciesDesc,
-    /// Variants of each material, by the material's name.
-    pub(super) materials: BTreeMap<String, Vec<Choice>>,
-    /// Images of its leaves, as counted by [`ImageMemory`].
-    pub(super) pictures: Vec<image_memory::ImageKey>,
-}
-
-/// Compares by address: two species read from the same path may differ, because the file may have changed in between.
-impl PartialEq for Species {
-    fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self, other)
-    }
-}
 
 /// Files read so far. The hash covers the contents of every file, in the order of their paths.
 #[derive(Clone, Default)]
@@ -80,7 +36,7 @@ pub(super) struct Library {
     scope: Scope,
     files: BTreeMap<PathBuf, [u8; 32]>,
     /// Leaf images by file and by the bits of `relief_range`, which scales the height map beside the image.
-    pictures: BTreeMap<(PathBuf, u32), MaskedImage>,
+    pictures: BTreeMap<(PathBuf, u32), Arc<LeafImage>>,
     species: BTreeMap<PathBuf, Arc<Species>>,
     /// Models by file, by whether their z axis points up, and by whether they may name files outside their folder.
     models: BTreeMap<(PathBuf, bool, bool), Arc<Model>>,
@@ -96,6 +52,8 @@ pub(super) struct Library {
     shipped: BTreeMap<String, PathBuf>,
     /// Changes that an experiment makes to the descriptions of field and species.
     pub(super) growing: SceneEdit,
+    /// Whether the images of every species are decoded when a scene file names it, as a check does; otherwise when a field grows it.
+    pub(super) decodes_all: bool,
     /// Texts to read in place of those of scene and species files, by path.
     pub(super) replaced: BTreeMap<PathBuf, String>,
     /// Whether images and maps whose hash the previous library knows are not read again: `true` while a search for mistakes
@@ -216,105 +174,85 @@ impl Library {
         let full = self.need_or_shipped(page, path, shipped_species, shipped::species_files)?;
         if let Some(known) = self.species.get(&full) {
             self.counted.again(&known.pictures);
+            if self.decodes_all {
+                known.open()?;
+            }
             return Ok(known.clone());
         }
-        let file = self.species_file(&full)?;
+        let file = Arc::new(self.species_file(&full)?);
         let species = self.species_of(&full, &file).map_err(|error| file.locate(error))?;
+        if self.decodes_all {
+            species.open()?;
+        }
         self.species.insert(full, species.clone());
         Ok(species)
     }
 
     /// Loads the species of a file that was read from `full`. The position of an error refers to the merged text of the file.
-    fn species_of(&mut self, full: &Path, file: &SpeciesFile) -> Result<Arc<Species>> {
+    fn species_of(&mut self, full: &Path, file: &Arc<SpeciesFile>) -> Result<Arc<Species>> {
         let own = file.page();
         let mut desc: SpeciesDesc = own.parse_all()?;
         file.check_materials(&desc)?;
-        let (mut cuts, mut pictures): (Vec<Vec<MaskedImage>>, Vec<image_memory::ImageKey>) = (Vec::new(), Vec::new());
-        for leaf in desc.materials.values() {
+        let (mut named, mut pictures) = (Vec::new(), Vec::new());
+        for (name, leaf) in &desc.materials {
             let paths = leaf.texture.as_ref().map_or(&[][..], Pick::all);
-            let range = leaf.relief_range.f32();
-            let mut all = Vec::new();
+            let mut images = Vec::new();
             for path in paths {
-                let (cut, picture) = self.picture(own, path, range)?;
+                let (image, picture) = self.picture(own, path, leaf.relief_range.f32())?;
                 pictures.push(picture);
                 // Calibrated images hold reflectances, as `trace texture` paints them, and need no check.
                 if !leaf.calibrated {
-                    self.file_warnings.entry(full.into()).or_default().extend(unlikely(path, cut.mask.as_deref()));
+                    let decoded = image.decoded().map_err(|e| at_its_place(own, path, IMAGE_HELP, e))?;
+                    let warning = unlikely(path, decoded.mask.as_deref());
+                    self.file_warnings.entry(full.into()).or_default().extend(warning);
                 }
-                all.push(cut);
+                images.push((path.clone(), image));
             }
-            cuts.push(all);
+            named.push(NamedMaterial { name: name.clone(), desc: leaf.clone(), images });
         }
         let known = |before: &Self| {
-            let held = |cut: &MaskedImage| before.pictures.values().any(|c| Arc::ptr_eq(&c.picture, &cut.picture));
-            cuts.iter().flatten().all(held).then(|| before.species.get(full).cloned())?
+            let held = |image: &Arc<LeafImage>| before.pictures.values().any(|known| Arc::ptr_eq(known, image));
+            let mut images = named.iter().flat_map(|material| &material.images);
+            images.all(|(_, image)| held(image)).then(|| before.species.get(full).cloned())?
         };
         let files: Vec<&Path> = file.sources().map(|source| source.path.as_path()).collect();
         if let Some(known) = self.kept(&files, known) {
             return Ok(known);
         }
-        let mut materials = BTreeMap::new();
-        for ((name, leaf), cuts) in desc.materials.iter().zip(cuts) {
-            let mut choices = Vec::new();
-            for MaskedImage { picture, mask, margin } in cuts {
-                let material = LeafMaterial::new(leaf, Some(picture));
-                choices.push(Choice { material, mask, margin, pictured: true, tones: OnceLock::new() });
-            }
-            if choices.is_empty() {
-                let material = LeafMaterial::new(leaf, None);
-                choices.push(Choice { material, mask: None, margin: None, pictured: false, tones: OnceLock::new() });
-            }
-            materials.insert(name.clone(), choices);
-        }
         if let Some(change) = self.growing.species {
             change(&mut desc);
         }
-        Ok(Arc::new(Species { desc, materials, pictures }))
+        Ok(Arc::new(Species::new(desc, file, named, pictures)))
     }
 
-    /// Returns a leaf image, and its key among the counted images.
+    /// Returns a leaf image, and its key among the counted images. The image is decoded at once only if its header cannot be read,
+    /// which is then the error.
     fn picture(
         &mut self,
         page: &RonFile,
         path: &str,
         relief_range: f32,
-    ) -> Result<(MaskedImage, image_memory::ImageKey)> {
+    ) -> Result<(Arc<LeafImage>, image_memory::ImageKey)> {
         let full = self.need(page, path)?;
         // The height map is the file beside the image that ends in .height.png; without it the relief is derived from brightness.
         let beside = self.scope.check(full.with_extension("height.png")).map_err(outside(page, path))?;
         let relief = beside.is_file();
         let counted = (full.clone(), if relief { beside.clone() } else { PathBuf::new() }, relief_range.to_bits());
-        self.counted.count(&counted, Header::leaf).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
+        let readable =
+            self.counted.count(&counted, Header::leaf).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         let key = (full.clone(), relief_range.to_bits());
         if let Some(known) = self.pictures.get(&key) {
             return Ok((known.clone(), counted));
         }
-        self.note(&full)?;
-        if relief {
-            self.note(&beside)?;
+        let color = (full.clone(), self.note(&full)?);
+        let height = if relief { Some((beside.clone(), self.note(&beside)?)) } else { None };
+        let known = self.kept(&[&full, &beside], |before| before.pictures.get(&key).cloned());
+        let image = known.unwrap_or_else(|| Arc::new(LeafImage::new(color, height, relief_range)));
+        if !readable {
+            image.decoded().map_err(|e| at_its_place(page, path, IMAGE_HELP, e))?;
         }
-        if let Some(known) = self.kept(&[&full, &beside], |before| before.pictures.get(&key).cloned()) {
-            self.pictures.insert(key, known.clone());
-            return Ok((known, counted));
-        }
-        let color = || Texture::load(&full, ColorSpace::Srgb).map_err(|e| at_its_place(page, path, IMAGE_HELP, e));
-        let (color, maps) = if relief {
-            let height = || {
-                let height = Height::load(&beside, relief_range);
-                height.map(Maps::from_height).map_err(|e| at_its_place(page, path, IMAGE_HELP, e))
-            };
-            let (color, maps) = rayon::join(color, height);
-            (color?, maps?)
-        } else {
-            let color = color()?;
-            let maps = Maps::derive(&color, &HeightFromBrightness::LEAF);
-            (color, maps)
-        };
-        let mask = color.alpha_mask().map(Arc::new);
-        let margin = mask.as_deref().map(|m| Arc::new(Margin::of(m)));
-        let cut = MaskedImage { picture: Arc::new(LeafTexture { color, maps }), mask, margin };
-        self.pictures.insert(key, cut.clone());
-        Ok((cut, counted))
+        self.pictures.insert(key, image.clone());
+        Ok((image, counted))
     }
 
     /// Returns the model that `page` names, loaded with the files that it refers to.
@@ -360,7 +298,7 @@ impl Library {
     /// Notes the hash of an environment map that `page` names, even if the current field does not use it.
     pub(super) fn environment_map_file(&mut self, page: &RonFile, path: &str) -> Result<()> {
         let full = self.need(page, path)?;
-        if self.files.contains_key(&full) { Ok(()) } else { self.note(&full) }
+        if self.files.contains_key(&full) { Ok(()) } else { self.note(&full).map(drop) }
     }
 
     /// Returns the environment map that `page` names.
@@ -472,29 +410,24 @@ impl Library {
         Ok(layer)
     }
 
-    fn note(&mut self, path: &Path) -> Result<()> {
+    /// Notes the hash of a file's contents, and returns it.
+    fn note(&mut self, path: &Path) -> Result<[u8; 32]> {
         let known = self.before.as_deref().filter(|_| self.trusts_images).and_then(|before| before.files.get(path));
-        let digest = match known {
+        let hash = match known {
             Some(known) => *known,
             None => {
                 self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
                 digest(path)?
             }
         };
-        self.files.insert(path.into(), digest);
-        Ok(())
+        self.files.insert(path.into(), hash);
+        Ok(hash)
     }
 }
 
 /// Returns the key under which the images of a model are counted.
 fn counted_model((file, z_up, outside): &(PathBuf, bool, bool)) -> image_memory::ImageKey {
     (file.clone(), PathBuf::new(), u32::from(*z_up) + 2 * u32::from(*outside))
-}
-
-/// Returns the SHA-256 of a file's contents.
-fn digest(path: &Path) -> Result<[u8; 32]> {
-    let bytes = input::read(path, input::LARGEST).map_err(|refusal| refusal.into_error(path))?;
-    Ok(Sha256::digest(&bytes).into())
 }
 
 /// Returns a function that makes the error about a path in `page` that leads outside the scope.
@@ -523,44 +456,8 @@ fn read_off(albedo: &Texture) -> Height {
     Height::from_values(columns, rows, height.values().iter().map(unit).collect())
 }
 
-/// Minimum share of a blade image's opaque pixels that must be connected to the leaf base; the rest are specks.
-const WHOLE: f64 = 0.95;
-
-/// Returns a warning if a leaf image has no transparent pixels, or if too few opaque pixels are connected to the leaf base.
-fn unlikely(path: &str, mask: Option<&AlphaMask>) -> Option<String> {
-    let Some(mask) = mask else {
-        return Some(format!(
-            "{path} has no transparent pixels, so the blade is the whole rectangle; cut the leaf out"
-        ));
-    };
-    let share = mask.hanging().count().to_f64() / mask.count().max(1).to_f64();
-    (share < WHOLE).then(|| {
-        format!(
-            "{path}: {:.0} % of its opaque pixels are not connected to the leaf base in the middle of the lower edge; \
-             use one leaf per image, with its base at the bottom",
-            100.0 * (1.0 - share)
-        )
-    })
-}
-
-/// Help text of errors about images that cannot be used.
-const IMAGE_HELP: &str = "name a PNG or JPEG image, or draw it: trace texture RECIPE.ron";
-
 /// Help text of errors about models that cannot be used, if the error has none of its own.
 const MODEL_HELP: &str = "export it again from the program that made it";
-
-/// Moves an input error about an image or a model to the place in the scene file that names the file. Adds `help` if the error has
-/// no help text of its own.
-fn at_its_place(page: &RonFile, literal: &str, help: &str, error: Error) -> Error {
-    match error.place() {
-        Some(Place { file, span: None }) if error.kind() == Kind::Input => {
-            let name = file.file_name().unwrap_or_default().to_string_lossy();
-            let message = format!("`{name}` cannot be used: {}", error.message());
-            page.about(literal, message, error.advice().unwrap_or(help))
-        }
-        _ => error,
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -576,7 +473,7 @@ mod tests {
             let (cut, _) = library
                 .picture(&page, concat!(env!("CARGO_MANIFEST_DIR"), "/../../textures/leaf/sugar_beet.png"), range)
                 .unwrap();
-            cut.picture.maps.height.values().iter().fold(0.0_f32, |most, h| most.max(h.abs()))
+            cut.decoded().unwrap().picture.maps.height.values().iter().fold(0.0_f32, |most, h| most.max(h.abs()))
         };
         let (low, high, again) = (highest(0.01), highest(0.04), highest(0.01));
         assert!(low > 0.0 && (high / low - 4.0).abs() < 0.1, "{low} {high}");
@@ -593,7 +490,10 @@ mod tests {
         let copy = |name: &str| std::fs::copy(leaves.join(format!("{name}.png")), &path).unwrap();
         copy("sugar_beet");
         let page = RonFile { path: folder.path().join("page.ron"), text: "Species()".to_owned() };
-        let read = |library: &mut Library| library.picture(&page, "leaf.png", 0.02).unwrap().0.picture;
+        let read = |library: &mut Library| {
+            let (image, _) = library.picture(&page, "leaf.png", 0.02).unwrap();
+            image.decoded().unwrap().picture.clone()
+        };
         let mut first = Library::default();
         let picture = read(&mut first);
         let mut second = first.clone().renewed();
@@ -621,6 +521,32 @@ mod tests {
         let (again, library) = read(library.renewed_at_once());
         let (next, _) = read(library.renewed());
         assert!(first > 0 && again == 0 && next == first, "{first} {again} {next}");
+    }
+
+    /// Rationale: a scene file may name many more species than a field grows. Expected: naming a species decodes none of its images,
+    /// and does not change the hash of the scene; a check decodes them. An image that changes before it is decoded is an error, as
+    /// the scene's hash is not that of the new image.
+    #[test]
+    fn images_of_a_species_are_decoded_when_it_is_grown() {
+        let page =
+            RonFile { path: concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/x.ron").into(), text: String::new() };
+        let mut library = Library::default();
+        let beet = library.species(&page, "sugar_beet.ron").unwrap();
+        assert!(!beet.is_open() && beet.materials().is_err());
+        let hash = library.hash();
+        library.decodes_all = true;
+        let again = library.species(&page, "sugar_beet.ron").unwrap();
+        assert!(Arc::ptr_eq(&beet, &again) && beet.is_open() && library.hash() == hash);
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("leaf.png");
+        let leaves = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../textures/leaf");
+        std::fs::copy(leaves.join("galium.png"), &path).unwrap();
+        let page = RonFile { path: folder.path().join("page.ron"), text: "Species()".to_owned() };
+        let (image, _) = Library::default().picture(&page, "leaf.png", 0.02).unwrap();
+        std::fs::copy(leaves.join("sugar_beet.png"), &path).unwrap();
+        let error = image.decoded().err().unwrap();
+        assert!(error.message().contains("has changed"), "{error}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use furrow_base::geometry::Window;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_field::ablation::Edit;
-use furrow_field::assemble::{Options, Stage};
+use furrow_field::assemble::{Options, Source, Stage};
 use furrow_field::profile::{Phase, Profiler};
 use furrow_optics::sensor::Lidar;
 use furrow_render::accel::{EmbreeAccel, PreviousBuild};
@@ -17,6 +17,8 @@ use std::time::{Duration, Instant};
 /// A built field: scene, captures, and ground truth of every plant. The BVH is built on first use.
 pub struct PreparedField {
     grown: furrow_field::Field,
+    /// Scene file that the field was built from.
+    source: Arc<Source>,
     edit: &'static Edit,
     threads: Threads,
     options: Options,
@@ -27,12 +29,12 @@ pub struct PreparedField {
 impl PreparedField {
     pub(super) fn new(
         grown: furrow_field::Field,
-        edit: &'static Edit,
+        (source, edit): (Arc<Source>, &'static Edit),
         threads: Threads,
         options: Options,
         grow: Duration,
     ) -> Self {
-        Self { grown, edit, threads, options, grow, geometry: OnceLock::new() }
+        Self { grown, source, edit, threads, options, grow, geometry: OnceLock::new() }
     }
 
     /// Returns the field's data: scene, plants and sensor; seed, index and hash of the files read; conditions and warnings.
@@ -55,6 +57,16 @@ impl PreparedField {
             self.grown.take(place);
         }
         Ok(())
+    }
+
+    /// Gives the field another of its lights; 0 is its own. Scene and BVH are kept, so the field is then as if it were built
+    /// [under this light](super::SceneFile::light). After an error, it is unchanged.
+    pub fn relight(&mut self, light: u64) -> Result<()> {
+        if light == self.grown.light {
+            return Ok(());
+        }
+        let Self { grown, source, edit, threads, options, .. } = self;
+        threads.install(|| edit.relight(source, grown, options, light))
     }
 
     /// Returns the edit that was applied to the field.
@@ -127,6 +139,6 @@ impl PreparedField {
 
     /// Returns scene and geometry in the form that integrators take.
     pub fn world(&self) -> Result<World<'_>> {
-        Ok(World { scene: &self.grown.scene, geometry: self.geometry()? })
+        Ok(World::new(&self.grown.scene, self.geometry()?))
     }
 }

@@ -39,7 +39,7 @@ mod view;
 pub use expected::ExpectedPlants;
 pub use field::PreparedField;
 pub use image::{Image, Times};
-pub use renderer::{Renderer, Request};
+pub use renderer::{Known, Renderer, Request};
 pub use scene_file::SceneFile;
 pub use schedule::{ResultOrder, Schedule};
 pub use threads::Threads;

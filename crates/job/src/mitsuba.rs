@@ -86,7 +86,7 @@ pub fn export(folder: &Path, scene: &Scene, text: &str) -> Result<Export> {
 /// Returns the pairs of directions of a scene for export. Deterministic.
 fn directions(scene: &Scene, leveled: &Leveled) -> Result<Directions> {
     let geometry = EmbreeAccel::build_quickly(&scene.surfaces(), 0, None)?;
-    let world = World { scene, geometry: &geometry };
+    let world = World::new(scene, &geometry);
     let sights: Vec<Sight> = (0..RAYS).filter_map(|i| sight(&world, leveled, i)).collect();
     let (leaves, ground): (Vec<Sight>, Vec<Sight>) = sights.into_iter().partition(|sight| sight.leaf);
     let leaves = lit(&world, &leaves, Sight::crossing);

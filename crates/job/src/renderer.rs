@@ -9,12 +9,15 @@ use furrow_base::sampling::Points;
 use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
 use furrow_field::profile::Phase;
+use furrow_optics::light::Light;
+use furrow_optics::sensor::Camera;
 use furrow_output::{Denoiser, Provenance, Spp};
 use furrow_render::accel;
 use furrow_render::film::Film;
 use furrow_render::integrator::{self, Integrator, World};
 use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
 use furrow_render::settings::{Engine, Preset, Quality, RenderOptions, Technique, Techniques};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Seconds per pixel reserved for the sensor model and for writing files, if there is a time limit.
@@ -33,6 +36,15 @@ pub struct Request<'a> {
     pub begin: Option<Instant>,
     /// Progress display and stop flag.
     pub watch: RenderMonitor<'a>,
+}
+
+/// Results of earlier calls that an image may use: what they depend on must be the same.
+#[derive(Default)]
+pub struct Known {
+    /// Label map of the view.
+    pub labels: Option<LabelMap>,
+    /// Film of the view under the field's current light, from [`Renderer::films`].
+    pub film: Option<Film>,
 }
 
 /// An opened render engine. Ray tracing kernels, graphics card and denoiser are found when it is opened, before any long work starts.
@@ -85,11 +97,56 @@ impl Renderer {
 
     /// Renders and labels a field. Returns an interruption error if the request's watch stops it.
     pub fn render<'f>(&self, field: &'f PreparedField, request: &Request<'_>) -> Result<Image<'f>> {
+        self.render_known(field, request, Known::default())
+    }
+
+    /// Like [`Self::render`], with results of earlier calls. The rasterizer does not use them.
+    pub fn render_known<'f>(&self, field: &'f PreparedField, request: &Request<'_>, known: Known) -> Result<Image<'f>> {
         request.view.check(&self.options)?;
         field.threads().install(|| match &self.engine {
-            Opened::PathTracer { denoiser, .. } => self.trace(field, request, denoiser.as_ref()),
+            Opened::PathTracer { denoiser, .. } => self.trace(field, request, denoiser.as_ref(), known),
             Opened::Rasterizer(card) => self.rasterize(field, request, card),
         })
+    }
+
+    /// Renders the current view of a field under several of its lights at once, which takes less time than one after another:
+    /// all rays are shared that do not depend on light. Returns the films of those lights that can be drawn and share the
+    /// camera of the first; none unless path tracing takes a fixed number of samples. The field's light changes.
+    pub fn films(
+        &self,
+        field: &mut PreparedField,
+        lights: &[u64],
+        watch: &RenderMonitor<'_>,
+    ) -> Result<BTreeMap<u64, Film>> {
+        if matches!(self.engine, Opened::Rasterizer(_)) || !self.options.quality.is_fixed() {
+            return Ok(BTreeMap::new());
+        }
+        let mut lit: Vec<(u64, Camera, Vec<Light>)> = Vec::new();
+        for light in lights {
+            // The error is that of the light's own image.
+            if field.relight(*light).is_ok() {
+                let scene = &field.grown().scene;
+                lit.push((*light, scene.camera, scene.lights.clone()));
+            }
+        }
+        // An exposure time of its own moves the rays of a blurred camera.
+        if let Some((_, first, _)) = lit.first() {
+            let first = *first;
+            lit.retain(|(_, camera, _)| *camera == first);
+        }
+        let Some((_, camera, _)) = lit.first() else { return Ok(BTreeMap::new()) };
+        let window = Window::full(camera.width(), camera.height());
+        if let Some((light, ..)) = lit.first() {
+            field.relight(*light)?;
+        }
+        let world = field.world()?;
+        let worlds: Vec<World<'_>> = lit.iter().map(|(_, _, lights)| world.under(lights)).collect();
+        let integrator = View::Path.integrator(path(&self.options.techniques));
+        let settings = self.settings(field, window);
+        field.profiler().enter(Phase::Rays);
+        let films = field.threads().install(|| render::render_lit(&worlds, integrator.as_ref(), &settings, watch))?;
+        field.profiler().enter(Phase::Other);
+        Ok(lit.iter().map(|(light, ..)| *light).zip(films).collect())
     }
 
     /// Renders a field progressively. `passes` are ascending numbers of samples per pixel; after each of them, `show` gets the film and the
@@ -137,6 +194,7 @@ impl Renderer {
         field: &'f PreparedField,
         request: &Request<'_>,
         denoiser: Option<&Denoiser>,
+        known: Known,
     ) -> Result<Image<'f>> {
         let begin = request.begin.unwrap_or_else(Instant::now);
         let world = field.world()?;
@@ -146,7 +204,10 @@ impl Renderer {
         // Label first, so that the time limit need not predict how long it takes.
         profiler.enter(Phase::Labels);
         let start = Instant::now();
-        let labels = render::label(field.geometry()?, &world.scene.parts, camera, window);
+        let labels = match known.labels {
+            Some(labels) => labels,
+            None => render::label(field.geometry()?, &world.scene.parts, camera, window),
+        };
         let label = start.elapsed();
         profiler.enter(Phase::Rays);
         let start = Instant::now();
@@ -154,7 +215,10 @@ impl Renderer {
         let settings = self.settings(field, window);
         let integrator = request.view.integrator(path(&self.options.techniques));
         let deadline = deadline(quality, begin, window);
-        let film = sample(quality, &world, integrator.as_ref(), &settings, deadline, &request.watch)?;
+        let film = match known.film {
+            Some(film) => film,
+            None => sample(quality, &world, integrator.as_ref(), &settings, deadline, &request.watch)?,
+        };
         let sampled = start.elapsed();
         profiler.enter(Phase::Denoise);
         let denoised = denoiser.map(|d| d.denoise(&film, field.threads().count()));
@@ -205,6 +269,7 @@ impl Renderer {
             scene_hash: grown.hash.clone(),
             seed: grown.seed,
             index: grown.index,
+            light: grown.light,
             spp,
             integrator: integrator.into(),
             deviations: self

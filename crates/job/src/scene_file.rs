@@ -24,6 +24,8 @@ pub struct SceneFile {
     options: Options,
     /// Days that replace the scene file's; empty to keep those.
     days: Vec<u32>,
+    /// Number of the light under which fields are built.
+    light: u64,
     threads: Threads,
 }
 
@@ -41,13 +43,13 @@ impl SceneFile {
     /// Opens a scene file from an untrusted source. Neither it nor the files that it names may be outside `scope`.
     pub fn open_within(path: impl AsRef<Path>, edit: &'static Edit, scope: Scope) -> Result<Self> {
         let source = Arc::new(edit.open(path.as_ref(), scope)?);
-        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
+        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), light: 0, threads: Threads::all()? })
     }
 
     /// Returns the scene file of a text, with one edit. Its paths are relative to the folder of `path`, which need not exist.
     pub fn of_text(path: impl AsRef<Path>, text: &str, edit: &'static Edit) -> Result<Self> {
         let source = Arc::new(edit.of_text(path.as_ref(), text)?);
-        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), threads: Threads::all()? })
+        Ok(Self { source, edit, options: Options::default(), days: Vec::new(), light: 0, threads: Threads::all()? })
     }
 
     /// Returns the scene file with these values instead of its own. Errors about a value are shown in the value.
@@ -88,6 +90,14 @@ impl SceneFile {
     #[must_use]
     pub fn day(mut self, day: impl Into<Option<u32>>) -> Self {
         self.options.day = day.into();
+        self
+    }
+
+    /// Sets the number of the light under which fields are built. 0 is the field's own; each other number draws lights, exposure and sensor
+    /// anew from the scene file, and leaves plants, ground and labels as they are.
+    #[must_use]
+    pub fn light(mut self, light: u64) -> Self {
+        self.light = light;
         self
     }
 
@@ -224,13 +234,16 @@ impl SceneFile {
         self.threads.install(|| self.source.expected_plants(&options))
     }
 
-    /// Builds field `index` on its [day](Self::day). The result is always the same for the same file, seed and index; earlier fields are
-    /// not built for it.
+    /// Builds field `index` on its [day](Self::day) under its [light](Self::light). The result is always the same for the same file, seed,
+    /// index and light; earlier fields are not built for it.
     pub fn field(&self, index: u64) -> Result<PreparedField> {
         let begin = Instant::now();
         let day = self.options.day.or(self.seen_days().first().copied());
         let options = Options { index, day, ..self.options.clone() };
         let grown = self.threads.install(|| self.edit.field(&self.source, &options))?;
-        Ok(PreparedField::new(grown, self.edit, self.threads.clone(), options, begin.elapsed()))
+        let source = self.source.clone();
+        let mut field = PreparedField::new(grown, (source, self.edit), self.threads.clone(), options, begin.elapsed());
+        field.relight(self.light)?;
+        Ok(field)
     }
 }

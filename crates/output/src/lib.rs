@@ -103,6 +103,8 @@ pub struct Provenance {
     pub seed: u64,
     /// Index of the field.
     pub index: u64,
+    /// Number of the field's light, 0 for its own, which is not written.
+    pub light: u64,
     /// Samples per pixel.
     pub spp: Spp,
     /// Name of the integrator.
@@ -117,11 +119,12 @@ impl Provenance {
     /// Returns the provenance as text, with one `key: value` per line.
     pub fn text(&self) -> String {
         let text = format!(
-            "program: furrow {}\nscene: sha256 {}\nseed: {}\nindex: {}\nspp: {}\nintegrator: {}\nkernels: {}",
+            "program: furrow {}\nscene: sha256 {}\nseed: {}\nindex: {}{}\nspp: {}\nintegrator: {}\nkernels: {}",
             env!("CARGO_PKG_VERSION"),
             self.scene_hash,
             self.seed,
             self.index,
+            if self.light == 0 { String::new() } else { format!("\nlight: {}", self.light) },
             self.spp,
             self.integrator,
             self.kernels

@@ -87,6 +87,10 @@ pub(crate) struct FieldArgs {
     /// growth stages written in it.
     #[arg(long, value_name = "DAY", value_parser = clap::value_parser!(u32).range(0..=1000))]
     day: Option<u32>,
+    /// Number of the light: 0 is the field's own. Each other number draws lights, exposure and sensor anew from the scene
+    /// file; plants, ground and labels stay the same.
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    light: u64,
     /// Frame of a drive, from 0.
     #[arg(long, value_name = "N", default_value_t = 0)]
     frame: u32,
@@ -121,11 +125,11 @@ impl FieldArgs {
         self.grow(&asked(self.of(SceneFile::edited(self.path(), edit)?)?), warn)
     }
 
-    /// Returns a scene file with the values, seed, size, day and memory limit of these options.
+    /// Returns a scene file with the values, seed, size, day, light and memory limit of these options.
     pub(crate) fn of(&self, scene: SceneFile) -> Result<SceneFile> {
         let SceneArgs { seed, width, height, .. } = self.scene;
         let scene = scene.assign(&self.scene.set.values)?.seed(seed).width(width).height(height);
-        Ok(scene.day(self.day).memory(self.memory.bytes))
+        Ok(scene.day(self.day).light(self.light).memory(self.memory.bytes))
     }
 
     /// Builds the field of a scene file. Warnings are passed to `warn` as soon as they are known.

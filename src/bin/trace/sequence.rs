@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
             .help("add `drive: (frames: 20, path: AlongRows())` to it, further `cameras`, or days with --days 8..40/4; see: trace explain drive")
             .in_file(args.scene.path()));
     }
-    let mut order = Order::new(args.scene.path(), args.fields * captures);
+    let mut order = Order::new(args.scene.path(), args.fields * captures * args.look.lights);
     (order.seed, order.width, order.height) = (args.scene.seed, args.scene.width, args.scene.height);
     order.days = days.to_vec();
     order.assigned.clone_from(&args.scene.set.values);
@@ -93,6 +93,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     order.formats.dedup();
     order.options = args.look.options();
     order.labels_only = args.look.labels_only;
+    order.lights = args.look.lights;
     args.content.enter(&mut order)?;
     if args.dry.dry_run {
         return cost_estimate::run(&args.out, order, args.work.threads, args.work.quiet, args.dry.price, signals);

@@ -116,6 +116,7 @@ impl Args {
             labelling: Labelling { classes: self.classes.clone(), ..Labelling::default() },
             options: self.look.options(),
             labels_only: self.look.labels_only,
+            lights: self.look.lights,
             edit: self.edit.as_deref().map_or(Ok(&FULL), Edit::named)?,
             memory: self.memory.bytes,
             ..Order::new(self.scene.path(), count)

@@ -48,6 +48,8 @@ pub enum Purpose {
     Cloud = 23,
     /// Range errors of a LiDAR.
     Lidar = 24,
+    /// Light, exposure and sensor of a relit field, as a child of the streams of the field's own.
+    Relight = 25,
 }
 
 /// Addressed stream of random numbers.

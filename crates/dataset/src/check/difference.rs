@@ -80,6 +80,7 @@ mod tests {
                 source: None,
                 split: Split::Train,
                 capture: None,
+                light: None,
                 sampling: None,
                 quality: None,
                 width,

@@ -87,7 +87,7 @@ impl ImageStream {
             let _ = sender.send(Message::Ended(ended));
         };
         std::thread::Builder::new().name("archive".into()).spawn(write).map_err(Error::no_thread)?;
-        let source = Source { set, scene, renderer, stop: &stop };
+        let source = Source { set, end: self.indices.end, scene, renderer, stop: &stop };
         let make = |index: &u64, threads: &Threads, kept: &mut CachedField| {
             let made = threads.install(|| source.image(*index, threads, kept)).map_err(|e| self.as_asked(e));
             made.inspect_err(|e| {
@@ -121,6 +121,8 @@ impl ImageStream {
         let threads = Threads::new(work.threads)?.count();
         let (first, _) = self.set.recipe.field_of(self.indices.start);
         let at_once = match work.at_once {
+            // One worker builds each field once; several would each build it for some of its lights.
+            0 if self.set.recipe.lights() > 1 => 1,
             0 => threads.min(fitting(scene, first, work.memory)),
             given => given,
         };
@@ -150,6 +152,8 @@ impl ImageStream {
 /// Scene and renderer of the images.
 struct Source<'a> {
     set: &'a Set,
+    /// Index after the last image of the stream.
+    end: u64,
     scene: SceneFile,
     renderer: Renderer,
     stop: &'a Arc<AtomicBool>,
@@ -159,6 +163,9 @@ impl Source<'_> {
     /// Makes an image and returns its files as in a dataset.
     fn image(&self, index: u64, threads: &Threads, kept: &mut CachedField) -> Result<Vec<File>> {
         let watch = RenderMonitor { done: &|_| (), stop: self.stop };
+        let lights = self.set.recipe.lights();
+        // Those of the same view are in the same shard.
+        kept.expect((index + 1..self.end.min((index / lights + 1) * lights)).collect());
         let made = render(self.set, &self.scene.clone().threads(threads), index, &self.renderer, watch, kept)?;
         invariants::check(&self.set.recipe, &made.sample)?;
         native::files(&self.set.recipe, &made.sample, &made.text)

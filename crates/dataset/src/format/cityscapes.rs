@@ -154,6 +154,7 @@ mod tests {
             source: None,
             split: Split::Train,
             capture: None,
+            light: None,
             width: 1,
             height: 1,
             classes: Vec::new(),

@@ -104,7 +104,7 @@ fn image(set: &Set, videos: Option<&Videos>, record: &Record) -> Result<Value> {
         "license": 1,
     });
     if let (Some(videos), Some(capture)) = (videos, &record.capture) {
-        image["video_id"] = videos.id(capture)?.into();
+        image["video_id"] = videos.id(capture, record.light)?.into();
         image["frame_id"] = capture.frame.into();
         image["camera"] = capture.camera.clone().into();
     }
@@ -179,7 +179,7 @@ fn annotations<'a>(
 ) -> impl Iterator<Item = Result<Annotation>> + 'a {
     let of_record = move |record: Record| -> Result<Vec<Annotation>> {
         let video = match (videos, &record.capture) {
-            (Some(videos), Some(capture)) => Some(videos.id(capture)?),
+            (Some(videos), Some(capture)) => Some(videos.id(capture, record.light)?),
             _ => None,
         };
         let with_identity = |(annotation, identity): (Annotation, Option<u32>)| match video {

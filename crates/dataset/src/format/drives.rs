@@ -1,4 +1,5 @@
-//! Images of a field with their cameras, from which formats for poses and tracks are made.
+//! Images of a field with their cameras, from which formats for poses and tracks are made. Views that are rendered under
+//! several lights are as many drives: each light has files of its own, whose names end in its number.
 
 use super::{Format, SetWriter};
 use crate::model::recipe::Recipe;
@@ -62,14 +63,15 @@ impl<T: OfFields> Format for T {
     fn write_set(&self, set: &Set, out: &mut SetWriter<'_>) -> Result<()> {
         let fields = set.recipe.count.div_ceil(set.recipe.captures());
         for field in 0..fields {
-            let (name, images) = (Set::name(field), images(set, field)?);
-            if !self.by_day() || set.recipe.days().is_empty() {
-                self.field(set, &name, &images, out)?;
-                continue;
-            }
-            for of_day in images.chunk_by(|a, b| a.capture.day == b.capture.day) {
-                let day = of_day.first().and_then(|image| image.capture.day).unwrap_or(0);
-                self.field(set, &format!("{name}-day{day:03}"), of_day, out)?;
+            for (name, images) in drives(set, field)? {
+                if !self.by_day() || set.recipe.days().is_empty() {
+                    self.field(set, &name, &images, out)?;
+                    continue;
+                }
+                for of_day in images.chunk_by(|a, b| a.capture.day == b.capture.day) {
+                    let day = of_day.first().and_then(|image| image.capture.day).unwrap_or(0);
+                    self.field(set, &format!("{name}-day{day:03}"), of_day, out)?;
+                }
             }
         }
         Ok(())
@@ -78,6 +80,21 @@ impl<T: OfFields> Format for T {
     fn warnings(&self, recipe: &Recipe) -> Vec<String> {
         warnings(recipe, self.by_day())
     }
+}
+
+/// Returns the images of a field under each of its lights, with the name of their drive.
+fn drives(set: &Set, field: u64) -> Result<Vec<(String, Vec<DriveImage>)>> {
+    let mut all: BTreeMap<Option<u64>, Vec<DriveImage>> = BTreeMap::new();
+    for image in images(set, field)? {
+        all.entry(image.record.light).or_default().push(image);
+    }
+    Ok(all.into_iter().map(|(light, images)| (drive_name(field, light), images)).collect())
+}
+
+/// Returns the name of a field's drive, in names of files.
+pub(super) fn drive_name(field: u64, light: Option<u64>) -> String {
+    let name = Set::name(field);
+    light.map_or_else(|| name.clone(), |light| format!("{name}-light{light:02}"))
 }
 
 /// Returns the images of a field that are in the dataset, in order.
@@ -131,9 +148,12 @@ pub(super) fn quaternion(axes: &DMat3) -> [f64; 4] {
 /// all days together.
 fn warnings(recipe: &Recipe, by_day: bool) -> Vec<String> {
     let (images, words) = if by_day {
-        (recipe.captures_a_day(), "each field has one image a day; `drive` in a scene file takes several")
+        (recipe.views_a_day(), "each field has one image a day; `drive` in a scene file takes several")
     } else {
-        (recipe.captures(), "each field has one image; `drive` or `days` in a scene file takes several")
+        (
+            recipe.captures() / recipe.lights(),
+            "each field has one image; `drive` or `days` in a scene file takes several",
+        )
     };
     if images == 1 { vec![words.to_owned()] } else { Vec::new() }
 }

@@ -38,7 +38,7 @@ impl Format for Writer {
     }
 
     fn has_images(&self, recipe: &Recipe) -> bool {
-        recipe.captures_a_day() > 1
+        recipe.views_a_day() > 1
     }
 
     fn needs_photograph(&self) -> bool {

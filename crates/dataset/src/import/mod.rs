@@ -194,6 +194,7 @@ fn sample(recipe: &Recipe, listed: &SourceImage, index: u64, read: Labelled) -> 
             source: Some(listed.name.clone()),
             split: recipe.split_of(index),
             capture: None,
+            light: None,
             width,
             height,
             classes: Vec::new(),

@@ -107,6 +107,7 @@ fn of_image(set: &Set, record: &Record) -> Row {
         ("camera", capture.map(|capture| capture.camera.as_str()).into()),
         ("day", capture.and_then(|capture| capture.day).into()),
         ("frame", capture.map(|capture| capture.frame).into()),
+        ("light", record.light.map(count).into()),
         ("time_s", capture.map(|capture| capture.time_s).into()),
         ("width", record.width.into()),
         ("height", record.height.into()),

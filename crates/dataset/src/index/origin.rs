@@ -1,7 +1,7 @@
 //! Columns that identify the image of a row. All tables of plants and leaves start with them, so that these tables can
 //! be joined with the table of images, and filtered by field, day and camera without it.
 //!
-//! Camera, day and frame are empty if an image has none.
+//! Camera, day, frame and light are empty if an image has none.
 
 use super::table::{Row, count};
 use crate::model::recipe::Recipe;
@@ -24,6 +24,8 @@ pub(crate) struct Origin<'a> {
     day: Option<u32>,
     /// Number of images that its camera took before, on all days.
     frame: Option<u32>,
+    /// Number of the light, for views under several lights.
+    light: Option<u64>,
 }
 
 impl<'a> Origin<'a> {
@@ -38,6 +40,7 @@ impl<'a> Origin<'a> {
             camera: capture.map(|capture| capture.camera.as_str()),
             day: capture.and_then(|capture| capture.day),
             frame: capture.map(|capture| capture.frame),
+            light: record.light,
         }
     }
 
@@ -51,6 +54,7 @@ impl<'a> Origin<'a> {
             ("camera", self.camera.into()),
             ("day", self.day.into()),
             ("frame", self.frame.into()),
+            ("light", self.light.map(count).into()),
         ]
     }
 }

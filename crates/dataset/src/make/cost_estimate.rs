@@ -13,7 +13,7 @@ use crate::make::finish::finish;
 use crate::make::generate::{MOST_AT_ONCE, formatted};
 use crate::make::meter;
 use crate::make::plan::{Draft, Order, draft};
-use crate::make::render::{CachedField, RenderedSample, of_day, render};
+use crate::make::render::{CachedField, RenderedSample, render, view_of};
 use crate::model::invariants;
 use crate::model::recipe::{FILE, ImageOrigin, Recipe, compact};
 use crate::model::record::{CaptureRecord, Record};
@@ -141,7 +141,8 @@ pub fn estimate_cost(
     let base_memory = meter::memory().unwrap_or(0);
     let images = Images::of(&recipe, scene_sha256, scene.threads(threads))?;
     let mut probes = Vec::new();
-    let some = probed(recipe.count);
+    let lights = recipe.lights();
+    let some: Vec<u64> = probed(recipe.count.div_ceil(lights)).into_iter().map(|view| view * lights).collect();
     let (least, most) = (PROBES[0].min(some.len()), some.len());
     for (drawn, index) in some.into_iter().enumerate() {
         if drawn >= PROBES[0] {
@@ -315,6 +316,12 @@ impl Images {
         if drawn > 0.0 { (largest / drawn).max(1.0) } else { 1.0 }
     }
 
+    /// Returns an image and the following ones of the same view, under other lights, that are in the dataset.
+    fn of_view(&self, index: u64) -> Vec<u64> {
+        let (lights, count) = (self.set.recipe.lights(), self.set.recipe.count);
+        (index..count.min((index / lights + 1) * lights)).collect()
+    }
+
     /// Renders an image twice with few samples, and measures times and file sizes.
     fn probe(&self, index: u64, stop: &Arc<AtomicBool>) -> Result<Probe> {
         let scene = self.scene.clone().until(stop);
@@ -326,7 +333,12 @@ impl Images {
         // Once for each field: counted with the first rendering, it would hide the time of the samples.
         kept.measure_traits();
         let grown = cpu()?;
+        let of_view = self.of_view(index);
+        let lights = of_view.len().to_f64();
         let mut draw = |renderer: &Renderer| {
+            // All lights of the view are rendered at once, as in the run.
+            kept.forget_view();
+            kept.expect(of_view[1..].to_vec());
             let begin = cpu()?;
             let made = render(&self.set, &scene, index, renderer, RenderMonitor { done: &|_| (), stop }, &mut kept)?;
             // Called only to measure its time; the faults are ignored, because with few samples the classes by samples
@@ -353,7 +365,7 @@ impl Images {
             // Each doubling of samples halves the variance of the noise, which saves a constant number of bits per
             // pixel.
             let steepness = (long - short) / doublings(fewer, more);
-            ((seconds - short_s).max(0.0) / (more - fewer), 1.0 + steepness * doublings(more, spp) / long)
+            ((seconds - short_s).max(0.0) / (more - fewer) / lights, 1.0 + steepness * doublings(more, spp) / long)
         });
         let own = made.sample.record.split;
         let mut of_splits = BTreeMap::new();
@@ -369,7 +381,7 @@ impl Images {
             cameras,
             grow_s: grown - begin,
             sample_s,
-            fixed_s: (seconds - sample_s * more).max(0.0),
+            fixed_s: (seconds - sample_s * more * lights).max(0.0),
             files: of_splits,
             longer: longer.clamp(0.5, 2.0),
         })
@@ -468,7 +480,8 @@ impl<'a> ProbeDataset<'a> {
         let cameras = probes.first().map_or(1, |probe| probe.cameras.len().max(1));
         if let ImageOrigin::Rendered(rendering) = &mut small.made {
             rendering.days.truncate(days);
-            rendering.captures = recipe.captures_a_day().min(cameras.to_u64()) * rendering.days.len().max(1).to_u64();
+            let views = recipe.views_a_day().min(cameras.to_u64());
+            rendering.captures = views * rendering.lights * rendering.days.len().max(1).to_u64();
         }
         Self { recipe: small, probes }
     }
@@ -493,9 +506,10 @@ impl<'a> ProbeDataset<'a> {
         record.index = index;
         record.name = Set::name(index);
         record.split = self.recipe.split_of(index);
+        record.light = record.light.map(|_| self.recipe.light_of(index));
         if let Some(of_probe) = &mut record.capture {
-            let (of_day, day) = of_day(&self.recipe, capture);
-            let camera = probe.cameras.get(of_day.to_usize()).cloned().unwrap_or_default();
+            let (view, day) = view_of(&self.recipe, capture);
+            let camera = probe.cameras.get(view.to_usize()).cloned().unwrap_or_default();
             *of_probe = CaptureRecord { field, day, frame: 0, camera, ..of_probe.clone() };
         }
         let own = format!("{}/record.json", native::folder(&record.name));

@@ -12,6 +12,7 @@ use crate::make::render::{CachedField, Times, render, renderer, scene_file};
 use crate::make::task::{Task, in_format, task};
 use crate::make::time_left::TimeLeft;
 use crate::make::timing_log::{End, ImageFailure, ImageTiming, Row, RunEnd, RunStart, TimingLog, now};
+use crate::read::checksum::Checksum;
 use crate::read::checksum_record::{ChecksumRecord, write_files_beside};
 use crate::read::native;
 use crate::read::packs::Id;
@@ -19,7 +20,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
-use furrow_base::math::{RoundTo, ToFloat};
+use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
 use furrow_field::estimate::usual_memory;
@@ -175,7 +176,7 @@ pub(crate) fn generate_for(
     units.retain(|unit| !lacking.contains(&unit.name()));
     let sent = delivery.deliver;
     units.into_iter().try_for_each(|unit| if callbacks.soon.load(Ordering::Relaxed) { Ok(()) } else { sent(unit) })?;
-    // One worker renders all images of a field and day one after another, and builds the scene once.
+    // One worker renders all images of a field and day one after another, under all lights, and builds the scene once.
     let of_one_field = |a: &(u64, Task), b: &(u64, Task)| set.recipe.growing_of(a.0) == set.recipe.growing_of(b.0);
     let fields: Vec<Vec<(u64, Task)>> = tasks.chunk_by(of_one_field).map(<[_]>::to_vec).collect();
     if let Some(time_left) = work.time_left {
@@ -210,6 +211,7 @@ pub(crate) fn generate_for(
     let workers = Threads::divided(threads, at_once)?;
     let run = Run {
         set,
+        rendered: tasks.iter().filter(|(_, task)| *task == Task::All).map(|(index, _)| *index).collect(),
         source: source.map(|(scene, _, renderer)| (scene, renderer)),
         callbacks,
         threads,
@@ -350,6 +352,8 @@ impl OpenPacks {
 /// A run of a shard.
 struct Run<'a> {
     set: &'a Set,
+    /// Images that this run renders.
+    rendered: BTreeSet<u64>,
     /// Scene file and renderer; `None` if no image has to be rendered.
     source: Option<(SceneFile, &'a Renderer)>,
     callbacks: &'a Callbacks<'a>,
@@ -375,6 +379,7 @@ impl Run<'_> {
         } else {
             let (scene, renderer) = self.source.as_ref().ok_or_else(|| lost(self.set, index))?;
             let watch = RenderMonitor { done: &|_| (), stop: self.callbacks.now };
+            kept.expect(self.rendered.range(index + 1..).take(recipe.lights().to_usize()).copied().collect());
             let made = render(self.set, &scene.clone().threads(threads), index, renderer, watch, kept)?;
             self.profiler.enter(Phase::Files);
             crate::model::invariants::check(recipe, &made.sample)?;
@@ -386,9 +391,10 @@ impl Run<'_> {
             return Err(Error::interrupted());
         }
         let before = if task == Task::Formats { ChecksumRecord::read(folder, index) } else { None };
-        let mut own = before.as_ref().map(|before| before.files.clone()).unwrap_or_default();
-        own.retain(|path, _| native::is_native(path));
-        write_files_beside(folder, &files, &own)?;
+        let mut there = before.as_ref().map(|before| before.files.clone()).unwrap_or_default();
+        there.extend(self.of_first_light(index));
+        there.retain(|path, _| native::is_native(path));
+        write_files_beside(folder, &files, &there)?;
         let mut checksums = ChecksumRecord::of(index, recipe, &files)?;
         if let Some(before) = before {
             // Keeps the checksums of native files and of formats that need the film: these are intact, or the task
@@ -403,6 +409,16 @@ impl Run<'_> {
         let seconds = self.tell_time(begin, times.grow);
         let hash = checksums.image_hash()?;
         self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
+    }
+
+    /// Returns the files of the image that shows the same view under the field's own light; none if it is this image or does not
+    /// exist yet. Their label maps are equal, and become hard links to one file.
+    fn of_first_light(&self, index: u64) -> BTreeMap<String, Checksum> {
+        let Set { folder, recipe, .. } = self.set;
+        match recipe.light_of(index) {
+            0 => BTreeMap::new(),
+            light => ChecksumRecord::read(folder, index - light).map(|record| record.files).unwrap_or_default(),
+        }
     }
 
     /// Adds an image's time to the remaining-time estimate, with the time `grow` of scene construction. Returns the

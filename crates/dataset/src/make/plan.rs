@@ -44,6 +44,8 @@ pub struct Order {
     pub count: u64,
     /// Days on which the images are taken; empty for the scene file's.
     pub days: Vec<u32>,
+    /// Number of lights under which each view of a field is rendered, from 1.
+    pub lights: u64,
     /// Image width in pixels; `None` for the scene file's.
     pub width: Option<u32>,
     /// Image height in pixels; `None` for the scene file's.
@@ -88,6 +90,7 @@ impl Order {
             seed: None,
             count,
             days: Vec::new(),
+            lights: 1,
             width: None,
             height: None,
             formats: Vec::new(),
@@ -159,6 +162,10 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     }
     let keep =
         if order.labels_only { labels_alone(order, &options)? } else { optional_maps::checked(order.keep.clone())? };
+    if order.lights > 1 && order.edit.asks_samples() {
+        return Err(Error::misuse("this --edit makes labels from samples, so they would differ between lights")
+            .help("leave out --relight or --edit"));
+    }
     // Opening the renderer first reports missing hardware or libraries before a field is built.
     let kernels = Renderer::open(&options)?.kernels().to_owned();
     let source = opened(&order.scene, order)?.until(stop);
@@ -189,6 +196,8 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
             labels_only: order.labels_only,
             image_format: Some(order.image_format),
             edit: order.edit.label(),
+            captures: source.captures() * order.lights,
+            lights: order.lights,
             ..rendering(&source, field, &options, &kernels)
         })),
         count: order.count,
@@ -217,6 +226,7 @@ pub(crate) fn rendering(source: &SceneFile, field: &Field, options: &RenderOptio
         scene_sha256: field.hash.clone(),
         seed: field.seed,
         captures: source.captures(),
+        lights: 1,
         days: source.seen_days().to_vec(),
         width: field.scene.camera.width(),
         height: field.scene.camera.height(),
@@ -244,6 +254,9 @@ fn labels_alone(order: &Order, options: &RenderOptions) -> Result<Vec<OptionalMa
     let refused = |what: &str| Err(Error::misuse(what).help("leave out --labels-only or this option"));
     if options.engine != Engine::Trace {
         return refused("--engine raster renders labels together with the image, and --labels-only renders no image");
+    }
+    if order.lights > 1 {
+        return refused("--relight renders the same labels under several lights, and --labels-only renders no light");
     }
     if order.edit.asks_samples() {
         return refused("this --edit makes labels from samples, and --labels-only takes none");

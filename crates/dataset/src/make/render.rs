@@ -7,7 +7,7 @@ use crate::make::plant_boxes;
 use crate::model::annotate::{self, keypoint, of_255};
 use crate::model::image_format;
 use crate::model::optional_maps::{self, OptionalMap};
-use crate::model::recipe::{self, Recipe};
+use crate::model::recipe::{self, Recipe, Rendering};
 use crate::model::record::{CaptureRecord, Exposure, Leaf, Plant, PlantAttributes, Record, Seen};
 use crate::model::sample::{Rendered, Sample};
 use crate::read::set::Set;
@@ -17,7 +17,9 @@ use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
 use furrow_field::profile::Phase;
 use furrow_field::traits::{PlantTraits, Traits};
-use furrow_job::{Image, PreparedField, Renderer, Request, SceneFile};
+use furrow_job::{Image, Known, PreparedField, Renderer, Request, SceneFile};
+use furrow_output::Provenance;
+use furrow_render::film::{Film, Pixel};
 use furrow_render::render::{self, Extent, LabelMap, RenderMonitor, WholePlants};
 use furrow_render::settings::Engine;
 use std::collections::BTreeMap;
@@ -88,19 +90,37 @@ fn same(set: &Set, what: &str, there: &str, here: &str) -> Result<()> {
     Err(Error::misuse(words).help(format!("continue it with {there}, or create another dataset")))
 }
 
+/// Maximum memory of the films of a view that are rendered at once, under several lights, bytes.
+const FILMS: u64 = 256 << 20;
+
 /// The field that was built last, reused for further images of it.
 #[derive(Default)]
 pub struct CachedField {
     field: Option<PreparedField>,
     /// Traits that were measured for the previous image of this field.
     traits: Option<Traits>,
+    view: CachedView,
+    /// Images that are made next, in order.
+    next: Vec<u64>,
 }
 
-/// The field of an image, set to the image's camera and frame.
+/// What images of one view under several lights share.
+#[derive(Default)]
+struct CachedView {
+    /// Number of the view among those of the field and day that were built last.
+    number: Option<u64>,
+    /// Labels and record of an image of the view.
+    labelled: Option<Sample>,
+    /// Films by the number of their light, until their images are made.
+    films: BTreeMap<u64, Film>,
+}
+
+/// The field of an image, set to the image's camera, frame and light.
 pub(crate) struct FieldAtCamera<'a> {
-    pub(crate) field: &'a PreparedField,
+    pub(crate) field: &'a mut PreparedField,
     /// Traits that were measured for the previous image of this field; `None` for the first.
     traits: &'a mut Option<Traits>,
+    view: &'a mut CachedView,
     /// Time of building the scene and BVH; zero if the field was reused.
     pub(crate) grow: Duration,
 }
@@ -111,23 +131,39 @@ impl CachedField {
         let Set { folder, recipe, .. } = set;
         let rendering = recipe.rendering()?;
         let (number, capture) = recipe.field_of(index);
-        let (of_day, day) = of_day(recipe, capture);
+        let (view, day) = view_of(recipe, capture);
         let known = self.field.take().filter(|field| field.grown().index == number && field.grown().day == day);
         let new = known.is_none();
         if new {
             self.traits = None;
         }
-        let mut field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
+        if new || self.view.number != Some(view) {
+            self.view = CachedView { number: Some(view), ..CachedView::default() };
+        }
+        let field = known.map_or_else(|| scene_file.clone().day(day).field(number), Ok)?;
         if field.grown().hash != rendering.scene_sha256 {
             let help = format!("restore {}/scene/, or create another dataset", folder.display());
             let words = "the scene file or a file that it names was changed since the dataset was created";
             return Err(Error::misuse(words).help(help).in_file(folder.join(&rendering.scene)));
         }
-        field.take(of_day)?;
         field.geometry()?;
+        // Kept before it is set to the image, so that an error of one light costs no other light its field.
+        let field = self.field.insert(field);
+        field.take(view)?;
+        field.relight(recipe.light_of(index))?;
         let (grow, build) = field.times();
         let grow = if new { grow + build } else { Duration::ZERO };
-        Ok(FieldAtCamera { field: self.field.insert(field), traits: &mut self.traits, grow })
+        Ok(FieldAtCamera { field, traits: &mut self.traits, view: &mut self.view, grow })
+    }
+
+    /// Announces the images that are made next, in order. Those of one view are then rendered at once.
+    pub fn expect(&mut self, images: Vec<u64>) {
+        self.next = images;
+    }
+
+    /// Forgets labels and films of the current view.
+    pub(crate) fn forget_view(&mut self) {
+        self.view = CachedView::default();
     }
 
     /// Measures the traits of the plants in the field, which its images share.
@@ -139,10 +175,10 @@ impl CachedField {
     }
 }
 
-/// Splits the number of a capture of a field into its number within the day and the day.
-pub(crate) fn of_day(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
+/// Splits the number of an image of a field into the number of its view within the day and the day.
+pub(crate) fn view_of(recipe: &Recipe, capture: u64) -> (u64, Option<u32>) {
     let a_day = recipe.captures_a_day();
-    (capture % a_day, recipe.days().get((capture / a_day).to_usize()).copied())
+    (capture % a_day / recipe.lights(), recipe.days().get((capture / a_day).to_usize()).copied())
 }
 
 /// Makes image `index` of a dataset from its [`scene_file`], on the threads of the scene file.
@@ -154,23 +190,46 @@ pub fn render(
     watch: RenderMonitor<'_>,
     kept: &mut CachedField,
 ) -> Result<RenderedSample> {
-    let FieldAtCamera { field, traits, grow } = kept.at(set, scene_file, index)?;
-    if set.recipe.labels_only() {
-        return label(set, FieldAtCamera { field, traits, grow }, index, renderer);
+    let recipe = &set.recipe;
+    let together = of_view(recipe, index, &std::mem::take(&mut kept.next))?;
+    let at = kept.at(set, scene_file, index)?;
+    if recipe.labels_only() {
+        return label(set, at, index, renderer);
     }
-    let image = renderer.render(field, &Request { watch, ..Request::default() })?;
+    let FieldAtCamera { field, traits, view, grow } = at;
+    let (begin, light) = (Instant::now(), recipe.light_of(index));
+    if together.len() > 1 && !view.films.contains_key(&light) {
+        view.films = renderer.films(field, &together, &watch)?;
+        field.relight(light)?;
+    }
+    let shared = begin.elapsed();
+    let labels = view.labelled.as_ref().and_then(|sample| Some(sample.film.as_ref()?.labels.clone()));
+    let known = Known { labels, film: view.films.remove(&light) };
+    let image = renderer.render_known(field, &Request { watch, ..Request::default() }, known)?;
     image.check_denoised()?;
     let begin = Instant::now();
-    let (draw, label) = (image.times.draw, image.times.label);
-    let text = image.provenance.photograph_text(image.denoised.is_some());
-    let sample = field.threads().install(|| describe(&set.recipe, index, image, traits))?;
+    let (draw, label) = (shared + image.times.draw, image.times.label);
+    // Label maps have this comment. It does not name the light, so that they are the same files for all lights.
+    let text = Provenance { light: 0, ..image.provenance.clone() }.photograph_text(image.denoised.is_some());
+    let sample = field.threads().install(|| describe(recipe, index, image, (traits, &mut view.labelled)))?;
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
+}
+
+/// Returns the lights of an image and of those images that are made next and show the same view, as many as fit into
+/// [`FILMS`].
+fn of_view(recipe: &Recipe, index: u64, next: &[u64]) -> Result<Vec<u64>> {
+    let Rendering { width, height, .. } = recipe.rendering()?;
+    let film = u64::from(*width) * u64::from(*height) * size_of::<Pixel>().to_u64();
+    let view = |index: u64| index / recipe.lights();
+    let same = next.iter().take_while(|next| view(**next) == view(index));
+    let lights = std::iter::once(&index).chain(same).map(|index| recipe.light_of(*index));
+    Ok(lights.take((FILMS / film.max(1)).max(1).to_usize()).collect())
 }
 
 /// Labels an image without rendering it.
 fn label(
     set: &Set,
-    FieldAtCamera { field, traits, grow }: FieldAtCamera<'_>,
+    FieldAtCamera { field, traits, grow, .. }: FieldAtCamera<'_>,
     index: u64,
     renderer: &Renderer,
 ) -> Result<RenderedSample> {
@@ -182,13 +241,25 @@ fn label(
     Ok(RenderedSample { sample, text, times: Times { grow, draw: Duration::ZERO, label: begin.elapsed() } })
 }
 
-/// Returns the sample of a rendered image.
-pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &mut Option<Traits>) -> Result<Sample> {
+/// Returns the sample of a rendered image. `traits` are those of the previous image of the field, `view` is the sample of
+/// another image of the same view before it had colours; both are set to this image's.
+pub(crate) fn describe(
+    recipe: &Recipe,
+    index: u64,
+    image: Image<'_>,
+    (traits, view): (&mut Option<Traits>, &mut Option<Sample>),
+) -> Result<Sample> {
     let photograph = image.photograph();
     let field = image.field();
     field.profiler().enter(Phase::Records);
     let Image { film, labels, denoised, .. } = image;
-    let mut sample = labelled(recipe, index, field, (labels, traits))?;
+    let mut sample = match view.take() {
+        Some(of_view) => relit(recipe, index, field.grown(), of_view),
+        None => labelled(recipe, index, field, (labels, traits))?,
+    };
+    if recipe.lights() > 1 {
+        *view = Some(sample.clone());
+    }
     sample.record.exposure = Some(Exposure {
         gain: photograph.gain,
         nir_gain: photograph.nir_gain,
@@ -214,6 +285,20 @@ pub(crate) fn describe(recipe: &Recipe, index: u64, image: Image<'_>, traits: &m
         rendered.film = Some(film);
     }
     Ok(sample)
+}
+
+/// Returns the sample of an image with the labels of its view, under the field's current light.
+fn relit(recipe: &Recipe, index: u64, field: &furrow_field::Field, of_view: Sample) -> Sample {
+    let record = Record {
+        index,
+        name: Set::name(index),
+        light: Some(recipe.light_of(index)),
+        conditions: Some(field.conditions.clone()),
+        warnings: field.warnings.clone(),
+        ..of_view.record
+    };
+    let film = of_view.film.map(|rendered| Rendered { camera: field.scene.camera, ..rendered });
+    Sample { record, film, ..of_view }
 }
 
 /// Returns the sample of an image with everything that follows from its labels and its field.
@@ -250,6 +335,7 @@ fn labelled(
             source: None,
             split: recipe.split_of(index),
             capture: recipe.has_sequences().then(|| taken(recipe, field)),
+            light: (recipe.lights() > 1).then_some(field.light),
             width: labels.window.width(),
             height: labels.window.height(),
             classes: Vec::new(),

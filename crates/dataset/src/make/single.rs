@@ -10,17 +10,22 @@ use furrow_base::math::ToInt;
 use furrow_job::{Image, Renderer, SceneFile};
 
 /// Returns the sample of a whole image of a field of `scene`: with the number that the image has in a dataset, and the
-/// usual maps.
+/// usual maps. Under a light of number k > 0, it is a dataset with k + 1 lights.
 pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Result<Sample> {
     let field = image.field().grown();
     let options = renderer.options();
     let days = scene.seen_days();
-    let captures = scene.captures();
+    let lights = field.light + 1;
+    let captures = scene.captures() * lights;
     let day = field.day.and_then(|day| days.iter().position(|other| *other == day)).unwrap_or_default();
     let a_day = captures / days.len().max(1).to_u64();
-    let index = field.index * captures + day.to_u64() * a_day + field.capture.to_u64();
-    let rendering =
-        Rendering { edit: image.field().edit().label(), ..rendering(scene, field, options, renderer.kernels()) };
+    let index = field.index * captures + day.to_u64() * a_day + field.capture.to_u64() * lights + field.light;
+    let rendering = Rendering {
+        edit: image.field().edit().label(),
+        captures,
+        lights,
+        ..rendering(scene, field, options, renderer.kernels())
+    };
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: ImageOrigin::Rendered(Box::new(rendering)),
@@ -34,5 +39,5 @@ pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Resul
     };
     image.check_denoised()?;
     let threads = image.field().threads().clone();
-    threads.install(|| describe(&recipe, index, image, &mut None))
+    threads.install(|| describe(&recipe, index, image, (&mut None, &mut None)))
 }

@@ -123,6 +123,9 @@ fn numbers(recipe: &Recipe, sample: &Sample) -> Vec<String> {
     if recorded != recipe.has_sequences().then_some((field, true)) || !frames || day != of_day {
         all.push("its field, frame or day does not match its number".into());
     }
+    if record.light != (recipe.lights() > 1).then(|| recipe.light_of(record.index)) {
+        all.push("its light does not match its number".into());
+    }
     let points = record
         .plants
         .iter()

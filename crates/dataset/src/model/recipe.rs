@@ -74,6 +74,9 @@ pub struct Rendering {
     /// Number of images of each field; they have consecutive numbers.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub captures: u64,
+    /// Number of lights under which each view of a field is rendered. Images of the same view have consecutive numbers.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub lights: u64,
     /// Days on which images are taken: all images of one day, then those of the next. Omitted if fields have no days.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub days: Vec<u32>,
@@ -244,12 +247,27 @@ impl Recipe {
         }
     }
 
+    /// Returns the number of lights under which each view of a field is rendered; 1 for imported images.
+    pub fn lights(&self) -> u64 {
+        self.rendering().map_or(1, |rendering| rendering.lights.max(1))
+    }
+
+    /// Returns the number of the light under which an image is rendered, 0 for the field's own.
+    pub fn light_of(&self, index: u64) -> u64 {
+        self.field_of(index).1 % self.lights()
+    }
+
+    /// Returns the number of views of each field per day: frames times cameras.
+    pub fn views_a_day(&self) -> u64 {
+        (self.captures_a_day() / self.lights()).max(1)
+    }
+
     /// Returns the field that an image shows, and the number of the image within the field.
     pub fn field_of(&self, index: u64) -> (u64, u64) {
         (index / self.captures(), index % self.captures())
     }
 
-    /// Returns the number of images of each field per day.
+    /// Returns the number of images of each field per day, under all lights.
     pub fn captures_a_day(&self) -> u64 {
         (self.captures() / self.days().len().max(1).to_u64()).max(1)
     }
@@ -272,7 +290,7 @@ impl Recipe {
 
     /// Returns whether records state the position of the image in a drive, a rig or the days of its field.
     pub fn has_sequences(&self) -> bool {
-        self.captures() > 1 || !self.days().is_empty()
+        self.views_a_day() > 1 || !self.days().is_empty()
     }
 
     /// Returns the split of an image; all images of a field have the same one.

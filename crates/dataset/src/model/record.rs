@@ -30,6 +30,9 @@ pub struct Record {
     /// days.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capture: Option<CaptureRecord>,
+    /// Number of the light among those under which the view is rendered, 0 for the field's own; `None` if there is only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<u64>,
     /// Image width, pixels.
     pub width: u32,
     /// Image height, pixels.

@@ -69,6 +69,7 @@ mod tests {
             source: None,
             split: Split::Train,
             capture: None,
+            light: None,
             width: 3,
             height: 2,
             classes: Vec::new(),

@@ -5,8 +5,12 @@ use furrow_base::shell::quoted;
 use furrow_render::settings::Engine;
 use maud::{Markup, html};
 
-/// Placeholder for the number of the image.
+/// Placeholder for the number of the field.
 const INDEX: &str = "INDEX";
+/// Placeholder for the number of the light.
+const LIGHT: &str = "LIGHT";
+/// Placeholder for the number of the image.
+const IMAGE: &str = "IMAGE";
 
 /// Returns the field for the number of an image, and the command that renders it with `trace`, in the dataset's folder.
 /// Empty for datasets whose images `trace` does not render one by one: imported, labels only, ablations, drives and days.
@@ -17,7 +21,11 @@ pub(super) fn section(recipe: &Recipe) -> Markup {
         p.again {
             label { "Render image " input #again type="number" min="0" max=(last) value="0"; " again, in the folder of the dataset:" }
         }
-        pre { code #command data-command=(command) { (command.replace(INDEX, "0")) } }
+        pre {
+            code #command data-command=(command) data-lights=(recipe.lights()) {
+                ([INDEX, LIGHT, IMAGE].iter().fold(command.clone(), |command, number| command.replace(number, "0")))
+            }
+        }
     }
 }
 
@@ -31,6 +39,9 @@ fn command(recipe: &Recipe) -> Option<String> {
     option("--scene", &made.scene);
     option("--seed", &made.seed);
     option("--index", &INDEX);
+    if recipe.lights() > 1 {
+        option("--light", &LIGHT);
+    }
     option("--width", &made.width);
     option("--height", &made.height);
     option("--spp", &made.spp);
@@ -50,6 +61,6 @@ fn command(recipe: &Recipe) -> Option<String> {
         option("--clamp", &clamp);
     }
     words.extend(made.denoise.then(|| "--denoise".to_owned()));
-    words.extend(["--out".to_owned(), format!("out/{INDEX}")]);
+    words.extend(["--out".to_owned(), format!("out/{IMAGE}")]);
     Some(words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "))
 }

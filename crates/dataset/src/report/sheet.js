@@ -65,7 +65,9 @@
   const again = byId("again");
   const write = (number) => {
     const command = byId("command");
-    command.textContent = command.dataset.command.replaceAll("INDEX", number);
+    const lights = Number(command.dataset.lights);
+    const numbers = { INDEX: Math.floor(number / lights), LIGHT: number % lights, IMAGE: number };
+    command.textContent = command.dataset.command.replace(/INDEX|LIGHT|IMAGE/g, (word) => numbers[word]);
   };
   again?.addEventListener("input", () => { if (again.checkValidity()) write(Number(again.value)); });
   tools.hidden = false;

@@ -36,6 +36,7 @@ fn record(conditions: Option<Conditions>) -> Record {
         source: None,
         split: Split::Train,
         capture: None,
+        light: None,
         width: 16,
         height: 12,
         classes: Vec::new(),

@@ -108,6 +108,16 @@ impl Edit {
         Ok(field)
     }
 
+    /// Gives a field that this edit has built with the same options another of its [lights](Source::relight), and applies the edit to
+    /// them.
+    pub fn relight(&self, source: &Source, field: &mut Field, options: &Options, light: u64) -> Result<()> {
+        source.relight(field, options, light)?;
+        if let Change::Lights(change) = self.change {
+            change(&mut field.scene.lights);
+        }
+        Ok(())
+    }
+
     /// Applies the edit to render options.
     #[must_use]
     pub fn options(&self, mut options: RenderOptions) -> RenderOptions {

@@ -105,7 +105,7 @@ pub(super) fn bank(drawn: &Drawn<'_>, seedlings: &[Seedling], dust: Spectrum) ->
         let stream = drawn.stream(Purpose::Plant, member.population).child(BANK, member.number);
         let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
         let place = PlantSite { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
-        let (record, organs) = grow(&own, &place, |_| true);
+        let (record, organs) = grow(&own, &place, |_| true)?;
         Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
     };
     wanted.par_iter().map(raise).inspect(|_| progress.shared.add()).collect()

@@ -1,7 +1,7 @@
 //! Applies a plant's condition to its organs: holes in the opacity mask, and changed tissue optics, leaf by leaf.
 
 use super::grown::GrownOrgan;
-use crate::library::Choice;
+use crate::species::Choice;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{Spectrum, ToFloat, ToInt, Vec2};
 use furrow_base::sampling::{Purpose, Stream};

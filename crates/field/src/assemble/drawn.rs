@@ -3,7 +3,7 @@
 use super::detail::MeshDetail;
 use super::extent::PLANT_MARGIN;
 use super::field_day::FieldDay;
-use super::lighting::{Lighting, SceneLight};
+use super::illumination::{DrawnLights, LightAddress};
 use super::options::Options;
 use super::season::Season;
 use super::{lidar, rig};
@@ -12,25 +12,21 @@ use crate::drive::Capture;
 use crate::estimate::usual_memory;
 use crate::layer::Layer;
 use crate::library::Library;
-use furrow_base::math::{Spectrum, ToInt, Vec2, Vec3};
-use furrow_base::ron_file::{RonFile, Step};
+use furrow_base::Result;
+use furrow_base::math::{ToInt, Vec2, Vec3};
+use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_base::{Error, Result};
 use furrow_grow::plant::GrowOptions;
 use furrow_grow::scatter::Rows;
 use furrow_grow::soil::{Envelope, Ground, SeedRows};
-use furrow_optics::light::{Light, LightDesc, LightRecord};
 use furrow_optics::sensor::{Camera, Lidar};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Random stream address of the season, beyond those of any number of lights.
 const SEASON: u64 = 1 << 32;
-/// First random stream address for the choice of a `OneOf` list; one stream for each index among the scene file's lights.
-const LIGHTING: u64 = 2 << 32;
 /// Random stream address for the choice of the sown crop.
 const SOWN: u64 = 3 << 32;
-/// Maximum number of lights of a field: each is evaluated at every hit point of a ray.
-const MOST_LIGHTS: usize = 256;
 
 /// Values that a field draws from its scene file.
 pub(super) struct Drawn<'a> {
@@ -43,7 +39,7 @@ pub(super) struct Drawn<'a> {
     /// Day of the field; `None` if it has no days.
     pub(super) today: Option<FieldDay>,
     /// Indices of the scene file's crops that this field has.
-    pub(super) sown: std::ops::Range<usize>,
+    pub(super) sown: Range<usize>,
     /// Camera of the first image.
     pub(super) camera: Camera,
     /// Level of geometric detail.
@@ -54,15 +50,27 @@ pub(super) struct Drawn<'a> {
     pub(super) scanners: Vec<Lidar>,
 }
 
-/// The lights that a field draws.
-pub(super) struct DrawnLights {
-    pub(super) lights: Vec<Light>,
-    pub(super) records: Vec<LightRecord>,
-    pub(super) lighting: Vec<Lighting>,
+/// Draws the season, and the scene file's crops that are sown.
+fn grown_on(page: &RonFile, desc: &FieldDesc, (seed, index): (u64, u64)) -> Result<(Season, Range<usize>)> {
+    let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
+    let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+    Ok((season, sown))
+}
+
+/// Returns the day of a field; `None` if it has no days.
+pub(super) fn day(
+    page: &RonFile,
+    desc: &FieldDesc,
+    library: &mut Library,
+    options: &Options,
+    address: (u64, u64),
+) -> Result<Option<FieldDay>> {
+    let (season, sown) = grown_on(page, desc, address)?;
+    FieldDay::of((page, desc), library, options.day, (sown, season.place()))
 }
 
 impl<'a> Drawn<'a> {
-    /// Draws season, day, crops, lights, cameras and LiDAR. Also returns warnings about them.
+    /// Draws season, day, crops, the field's own lights, cameras and LiDAR. Also returns warnings about them.
     pub(super) fn draw(
         page: &'a RonFile,
         desc: &'a FieldDesc,
@@ -73,53 +81,21 @@ impl<'a> Drawn<'a> {
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, library, (options.width, options.height), &mut stream)?;
-        let season = Season::draw(page, desc, &mut Stream::of(seed, index, Purpose::Page, SEASON))?;
-        let sown = desc.sown.draw(desc.crops.len(), &mut Stream::of(seed, index, Purpose::Page, SOWN));
+        let (season, sown) = grown_on(page, desc, (seed, index))?;
         let today = FieldDay::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
-        let daily = |address| {
-            let stream = Stream::of(seed, index, Purpose::Page, address);
-            today.as_ref().map_or_else(|| stream.clone(), |today| today.stream(&stream))
-        };
-        let (mut lights, mut records) = (Vec::new(), Vec::new());
-        let lists = |place: usize| daily(LIGHTING + place.to_u64());
-        let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
-        if listed.len() > MOST_LIGHTS {
-            let fault = Error::input(format!("{} lights: a field may have at most {MOST_LIGHTS}", listed.len()))
-                .help("remove some; one Daylight is both sun and sky");
-            return Err(page.blame(&[Step::Field("lights")], fault));
-        }
-        // Note the files of all lists, so that all fields have the same scene hash whichever list each of them draws.
-        for file in desc.lights.iter().flat_map(LightDesc::files) {
-            library.environment_map_file(page, file)?;
-        }
-        for (i, SceneLight { desc: light, at }) in listed.into_iter().enumerate() {
-            let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
-            let drawn = light.draw(&mut daily(1 + i.to_u64()), &mut open);
-            let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
-            records.push(record);
-            lights.extend(drawn);
-        }
-        let mut warnings = Vec::new();
+        let at = LightAddress { seed, index, light: 0 };
+        let lit = DrawnLights::draw(page, desc, library, at, today.as_ref())?;
         // A LiDAR is its own light source.
-        if lights.is_empty() && options.scan.is_none() {
-            warnings.push("no light in the scene: the image will be black".into());
-        }
+        let warnings = lit.warning().filter(|_| options.scan.is_none()).into_iter().collect();
         let mut captures = rig::captures(page, desc, library, &camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
-        if captures.iter().any(|capture| capture.camera.blurs()) {
-            // The time is that of a meter: the image that would give it is not rendered yet.
-            let sensor = desc.sensor.build(&mut Stream::of(seed, index, Purpose::Sensor, 0));
-            let illuminant = lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
-            for capture in &mut captures {
-                capture.camera = capture.camera.with_metered(sensor.metered_s(illuminant, &capture.camera));
-            }
-        }
+        lit.expose(&desc.sensor, at, &mut captures);
         let scanners = lidar::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         let detail = MeshDetail::of(desc, options.scan.is_some(), &captures);
         let camera = captures.first().map_or(camera, |first| first.camera);
         let drawn = Self { page, desc, options, seed, index, season, today, sown, camera, detail, captures, scanners };
-        Ok((drawn, DrawnLights { lights, records, lighting }, warnings))
+        Ok((drawn, lit, warnings))
     }
 
     pub(super) fn stream(&self, purpose: Purpose, index: u64) -> Stream {

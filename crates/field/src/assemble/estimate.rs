@@ -88,7 +88,7 @@ pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Visible
     for (population, range) in populations {
         let (at, advice) = population.place();
         let number = range.len();
-        let some = count(drawn, &seedlings, population, range.clone());
+        let some = count(drawn, &seedlings, population, range.clone())?;
         let shared = seedlings[range].iter().filter_map(|s| s.member).collect::<Vec<_>>();
         add(&at, expected(&some, number, &shared), &format!("{advice}{coarser}"));
         counted.extend(some);
@@ -144,7 +144,12 @@ fn pictured(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Share>> {
 }
 
 /// Counts triangles and organs of sample plants of a population by growing them. A plant that might itself be too large is not grown.
-fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, range: Range<usize>) -> Vec<CountedPlant> {
+fn count(
+    drawn: &Drawn<'_>,
+    seedlings: &[Seedling],
+    population: Population,
+    range: Range<usize>,
+) -> Result<Vec<CountedPlant>> {
     let number = range.len();
     let most = if population == Population::Placed { LOOKED_AT_PLACED } else { LOOKED_AT };
     let tried = number.min(most);
@@ -152,23 +157,25 @@ fn count(drawn: &Drawn<'_>, seedlings: &[Seedling], population: Population, rang
         let seedling = &seedlings[range.start + (2 * k + 1) * number / (2 * tried)];
         let cell = drawn.cell(seedling.position);
         let known = drawn.options.preview.as_ref().and_then(|preview| preview.counted(seedling, cell));
-        CountedPlant { seedling: seedling.clone(), cell, size: known.unwrap_or_else(|| size(seedling, cell)) }
+        let size = known.map_or_else(|| size(seedling, cell), Ok)?;
+        Ok(CountedPlant { seedling: seedling.clone(), cell, size })
     });
     samples.collect()
 }
 
 /// Returns the numbers of triangles and organs of a plant; for a plant that may exceed [`TRIED`], the upper bound and 1.
-fn size(seedling: &Seedling, cell: f32) -> (f64, f64) {
+fn size(seedling: &Seedling, cell: f32) -> Result<(f64, f64)> {
     let bound = most_triangles(&seedling.species.desc.plant);
     if bound > TRIED {
-        return (bound, 1.0);
+        return Ok((bound, 1.0));
     }
     // Holes and spots are expensive to compute and do not change the triangles.
     let healthy = Seedling { condition: None, ..seedling.clone() };
     let place = PlantSite { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
-    let (_, organs) = grow(&healthy, &place, |_| true);
+    let (_, organs) = grow(&healthy, &place, |_| true)?;
     let organs = organs.unwrap_or_default();
-    (organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>().to_f64(), organs.len().to_f64())
+    let triangles = organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>();
+    Ok((triangles.to_f64(), organs.len().to_f64()))
 }
 
 /// Estimates the cost of `number` plants from the samples `some`. `shared` lists the bank plants of those that are instances.

@@ -48,6 +48,7 @@ impl Source {
     }
 
     fn checked(&self, Asked { drawn, library, warnings }: Asked<'_>) -> Result<Vec<String>> {
+        library.decodes_all = true;
         let mut found = self.warnings(Asked { drawn, library, warnings })?;
         known::species(drawn, library)?;
         let sight = sight::sight(drawn, warnings)?;
@@ -79,6 +80,7 @@ impl Source {
         let answer = drawn.and_then(|(drawn, _, mut warnings)| {
             question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
         });
+        library.decodes_all = false;
         (answer, library)
     }
 }

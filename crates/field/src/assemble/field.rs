@@ -1,5 +1,6 @@
 //! The built field: scene, records, captures, and conversion of its films to images.
 
+use super::illumination::LightAddress;
 use super::record::{Conditions, SpeciesRecord};
 use crate::drive::Capture;
 use crate::{PartKind, PlantRecord};
@@ -36,6 +37,8 @@ pub struct Field {
     pub seed: u64,
     /// Index of the field in the distribution that the scene file describes.
     pub index: u64,
+    /// Number of the light, 0 for the field's own. The others draw lights, exposure and sensor anew.
+    pub light: u64,
     /// All species that the scene file can place, in the scene file's order; the same for all indices.
     pub species: Vec<SpeciesRecord>,
     /// Names of models from disk; [`PartKind::Named`] is an index into this list. The same for all indices.
@@ -62,7 +65,13 @@ impl Field {
         self.conditions.camera = self.scene.camera.record();
     }
 
-    /// Returns the seed of the samples; every image has its own, so their noise is independent.
+    /// Returns the address of the field's current light.
+    pub(super) fn light_address(&self) -> LightAddress {
+        LightAddress { seed: self.seed, index: self.index, light: self.light }
+    }
+
+    /// Returns the seed of the samples. Every image of the field has its own, so their noise is independent; images of the same view
+    /// under other lights have the same.
     pub fn sample_seed(&self) -> u64 {
         let first = mix(mix(self.seed) ^ self.index);
         if self.shot() == 0 { first } else { mix(first ^ self.shot()) }
@@ -86,21 +95,26 @@ impl Field {
         self.plants.iter().map(|plant| (plant.number, plant.id)).collect()
     }
 
-    /// Returns the field's provenance, one `key: value` per line: program, hash of the scene files, seed, index.
+    /// Returns the field's provenance, one `key: value` per line: program, hash of the scene files, seed, index, and the light unless it
+    /// is the field's own.
     pub fn provenance(&self) -> String {
         let Self { hash, seed, index, .. } = self;
-        format!("program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}", env!("CARGO_PKG_VERSION"))
+        let light = if self.light == 0 { String::new() } else { format!("\nlight: {}", self.light) };
+        format!(
+            "program: furrow {}\nscene: sha256 {hash}\nseed: {seed}\nindex: {index}{light}",
+            env!("CARGO_PKG_VERSION")
+        )
     }
 
     /// Converts a film of this field to an image with the field's sensor model.
     pub fn photograph(&self, film: &Film) -> Photograph {
-        let stream = |k| Stream::of(self.seed, self.index, Purpose::Sensor, k);
-        // One sensor for all images of a field, independent noise for each image.
+        let stream = |k| self.light_address().stream(Purpose::Sensor, k);
+        // One sensor for all images of a field under the same light, independent noise for each image.
         let noise = 1 + self.shot();
         let illuminant = self.scene.lights.iter().fold(Spectrum::ZERO, |sum, l| sum + l.horizontal_irradiance());
         let pixels: Vec<Spectrum> = film.pixels.iter().map(|p| p.mean).collect();
         let window = film.window;
         let linear = Linear { pixels: &pixels, width: window.width(), left: window.x0, top: window.y0 };
-        self.sensor.build(&mut stream(0)).expose(linear, &self.scene.camera, illuminant, &stream(noise))
+        self.light_address().sensor(&self.sensor).expose(linear, &self.scene.camera, illuminant, &stream(noise))
     }
 }

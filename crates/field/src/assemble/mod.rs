@@ -17,6 +17,7 @@ mod ground;
 mod ground_view;
 mod grown;
 mod identity;
+mod illumination;
 mod individual;
 mod known;
 mod lidar;
@@ -30,6 +31,7 @@ mod populate;
 mod preview;
 mod progress;
 pub mod record;
+mod relight;
 mod rig;
 mod scanner;
 mod season;
@@ -52,8 +54,8 @@ use furrow_base::Result;
 use furrow_base::input::Scope;
 use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::ron_file::{Assignment, RonFile, Spliced, Step};
-use furrow_base::sampling::Purpose;
 use furrow_render::scene::Scene;
+use illumination::LightAddress;
 pub use lighting::Lighting;
 pub use options::{Options, Scanner};
 use populate::PlantsAndModels;
@@ -188,7 +190,7 @@ impl Source {
         frames * (1 + self.desc.cameras.len().to_u64())
     }
 
-    /// Builds field `options.index`. Call it inside a thread pool.
+    /// Builds field `options.index` under its own light; [`Self::relight`] gives it another. Call it inside a thread pool.
     pub fn field(&self, options: &Options) -> Result<Field> {
         let held = || self.library.lock().unwrap_or_else(PoisonError::into_inner);
         // The clone shares all data by reference; fields that are built concurrently do not wait for each other.
@@ -241,7 +243,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     warnings.extend(plausibility::view(&drawn, &plants, sight.shown(&drawn)));
     let conditions = Conditions {
         camera: drawn.camera.record(),
-        sensor: desc.sensor.build(&mut drawn.stream(Purpose::Sensor, 0)).record(),
+        sensor: LightAddress { seed: drawn.seed, index: drawn.index, light: 0 }.sensor(&desc.sensor).record(),
         lights: lit.records,
         lighting: lit.lighting,
         soil,
@@ -271,6 +273,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         hash: library.hash(),
         seed: drawn.seed,
         index: drawn.index,
+        light: 0,
         warnings,
     })
 }

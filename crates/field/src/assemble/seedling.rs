@@ -7,7 +7,8 @@ use super::individual::Individual;
 use super::member::Member;
 use crate::PlantRecord;
 use crate::desc::{Growth, SpeciesDesc};
-use crate::library::Species;
+use crate::species::Species;
+use furrow_base::Result;
 use furrow_base::math::{Frame, Mat3, Spectrum, ToFloat, Vec2, Vec3};
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
@@ -75,12 +76,12 @@ pub(super) struct PlantSite {
 }
 
 /// Grows one plant from its own random stream and places it. The returned record has no number yet. The organs are `None` if the plant
-/// has not emerged or if `wanted` returns `false`.
+/// has not emerged or if `wanted` returns `false`. Returns an error if the species was not opened.
 pub(super) fn grow(
     s: &Seedling,
     place: &PlantSite,
     wanted: impl FnOnce(&PlantRecord) -> bool,
-) -> (PlantRecord, Option<Vec<GrownOrgan>>) {
+) -> Result<(PlantRecord, Option<Vec<GrownOrgan>>)> {
     let PlantSite { height: z, normal, dust, cell, rigged } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
@@ -88,7 +89,7 @@ pub(super) fn grow(
     let axis = scatter::axis(normal, AXIS_NOISE_DEG, &mut stream);
     let shape = s.individual.as_ref().map_or(&stream, Individual::shape);
     let Some(stage) = s.individual.as_ref().map_or(drawn, |individual| stage(s, &mut individual.age())) else {
-        return (unborn(s, normal, z), None);
+        return Ok((unborn(s, normal, z), None));
     };
     let mut ailing = s.condition.as_ref().map(|condition| PlantCondition::new(condition, shape, dust));
     let mut vigour = s.vigour.draw32(&mut shape.child(Purpose::Plant, VIGOUR));
@@ -127,13 +128,14 @@ pub(super) fn grow(
         ..unborn(s, normal, z)
     };
     if !wanted(&record) {
-        return (record, None);
+        return Ok((record, None));
     }
+    let materials = s.species.materials()?;
     let last = plant.organs.iter().map(|o| o.leaf).max().unwrap_or(0);
     let organs = plant.organs.into_iter().filter(|o| kept(o.leaf)).flat_map(|organ| {
         let mut mesh = organ.mesh;
         mesh.transform(rotation, foot);
-        let choices = &s.species.materials[&organ.material];
+        let choices = &materials[&organ.material];
         let choice = shape.child(Purpose::Leaf, 1 << 20 | u64::from(organ.leaf)).index(choices.len());
         let chosen = &choices[choice];
         let pigments = &desc.materials[&organ.material].pigments;
@@ -163,7 +165,7 @@ pub(super) fn grow(
         }
     });
     let organs = organs.collect();
-    (record, Some(organs))
+    Ok((record, Some(organs)))
 }
 
 /// Draws the first two properties of a plant: the stage (`None` before emergence), and its chlorophyll relative to the species' mean.

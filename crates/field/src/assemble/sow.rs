@@ -9,17 +9,20 @@ use super::seedling::Seedling;
 use super::view::{self, VisibleGround};
 use super::{bank, identity};
 use crate::desc::Growth;
-use crate::library::{Library, Species};
+use crate::library::Library;
+use crate::species::Species;
 use furrow_base::Result;
 use furrow_base::math::{RoundTo, ToInt, vec2};
 use furrow_base::ron_file::Vary;
 use furrow_base::sampling::Purpose;
 use furrow_grow::scatter::{self, Disc, Spot};
 use furrow_render::scene::tag::Class;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Returns the plants to be grown, and the range of each population among them. Adding a species at the end of the scene file does
-/// not change the order of the others.
+/// Returns the plants to be grown, and the range of each population among them. The images of their species are decoded. Adding a
+/// species at the end of the scene file does not change the order of the others.
 pub(super) fn seedlings(
     drawn: &Drawn<'_>,
     library: &mut Library,
@@ -82,7 +85,16 @@ pub(super) fn seedlings(
     }
     census.close(all.len())?;
     let populations = census.populations(all.len());
+    open(&all)?;
     Ok((all, populations))
+}
+
+/// Opens the species of these plants, each once.
+fn open(seedlings: &[Seedling]) -> Result<()> {
+    let species: BTreeMap<*const Species, &Species> =
+        seedlings.iter().map(|seedling| (Arc::as_ptr(&seedling.species), &*seedling.species)).collect();
+    let species: Vec<&Species> = species.into_values().collect();
+    species.par_iter().try_for_each(|species| species.open())
 }
 
 fn seedling(

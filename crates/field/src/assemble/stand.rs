@@ -74,10 +74,11 @@ pub(super) fn plant(
         let place = PlantSite { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
         let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
         let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
-        Ok(PlacedPlant::Own(known.unwrap_or_else(|| {
-            let (record, organs) = grow(seedling, &place, reaches);
-            Arc::new(CachedPlant { seedling: seedling.clone(), place, record, organs })
-        })))
+        if let Some(known) = known {
+            return Ok(PlacedPlant::Own(known));
+        }
+        let (record, organs) = grow(seedling, &place, reaches)?;
+        Ok(PlacedPlant::Own(Arc::new(CachedPlant { seedling: seedling.clone(), place, record, organs })))
     };
     let grown = seedlings.par_iter().map(stand).inspect(|_| options.progress.plants.add());
     let grown: Vec<PlacedPlant> = grown.collect::<Result<_>>()?;

@@ -4,12 +4,14 @@ mod backscatter;
 mod falsecolor;
 mod path;
 mod roulette;
+mod trail;
 mod vertex;
 
 use crate::scene::Scene;
 use furrow_base::geometry::{Hit, Interaction, Intersect, PACKET, Ray};
 use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::sampling::Sampler;
+use furrow_optics::light::Light;
 
 pub use falsecolor::FalseColor;
 pub use path::{PathTracer, Technique};
@@ -19,8 +21,23 @@ pub use path::{PathTracer, Technique};
 pub struct World<'a> {
     /// The scene.
     pub scene: &'a Scene,
+    /// Lights, those of the scene or others.
+    pub lights: &'a [Light],
     /// The accelerator.
     pub geometry: &'a dyn Intersect,
+}
+
+impl<'a> World<'a> {
+    /// Returns a scene under its own lights.
+    pub fn new(scene: &'a Scene, geometry: &'a dyn Intersect) -> Self {
+        Self { scene, lights: &scene.lights, geometry }
+    }
+
+    /// Returns the same scene under other lights.
+    #[must_use]
+    pub fn under(self, lights: &'a [Light]) -> Self {
+        Self { lights, ..self }
+    }
 }
 
 impl World<'_> {
@@ -78,5 +95,16 @@ pub trait Integrator: Sync {
     /// packet. Empty lanes return the default.
     fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [CameraSample; PACKET] {
         samples.map(|sample| sample.map_or_else(CameraSample::default, |sample| self.li(world, &sample, spread)))
+    }
+
+    /// Estimates the radiance of the same samples in several worlds that differ only in their lights. Each result is
+    /// that of [`Self::li_packet`], bit by bit.
+    fn li_packet_lit(
+        &self,
+        worlds: &[World<'_>],
+        samples: &[Option<Sample>; PACKET],
+        spread: f32,
+    ) -> Vec<[CameraSample; PACKET]> {
+        worlds.iter().map(|world| self.li_packet(world, samples, spread)).collect()
     }
 }

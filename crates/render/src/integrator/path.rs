@@ -6,8 +6,12 @@
 //!
 //! Splitting and termination of paths depend on what they can still contribute relative to the light found so far
 //! ([`RouletteSplitting`]). Unbiased: every contribution is divided by its sampling probability.
+//!
+//! Under several lights, camera rays and [trails](super::trail) are traced once. What is found under each light is the
+//! same, bit by bit, as under this light alone.
 
 use super::roulette::RouletteSplitting;
+use super::trail::{Fleeting, KeptTrails, ScatteredRay, Trail, Trails};
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, Sample, World};
 use furrow_base::geometry::{PACKET, Ray};
@@ -51,15 +55,9 @@ impl Default for PathTracer {
     }
 }
 
-/// Growth of a ray's width after a diffuse bounce, metres per metre: scattered light sees textures at this resolution.
-const DIFFUSE_SPREAD: f32 = 0.1;
-
 /// Last scattering event, needed for the MIS weight of emission found by a scattered ray.
-struct Origin {
-    p: Vec3,
-    normal: Vec3,
-    two_sided: bool,
-    pdf: f32,
+struct Origin<'a> {
+    flight: &'a ScatteredRay,
     asked: LightStrategy,
 }
 
@@ -86,49 +84,31 @@ impl Default for Direct {
     }
 }
 
+/// Start of a trail at a first surface.
+struct Start<'a> {
+    first: &'a Vertex,
+    /// Random numbers of its ray.
+    u: [f32; 3],
+    /// Same as in [`LightStrategy::All`].
+    rays: f32,
+    throughput: Spectrum,
+}
+
 /// First surfaces of a packet, with the samplers of their samples.
 type Seen = [Option<(Vertex, Sampler)>; PACKET];
 
-/// A scattered ray.
-struct ScatteredRay {
-    ray: Ray,
-    /// Width at the origin, metres.
-    width: f32,
-    /// Growth of the width, metres per metre.
-    spread: f32,
-    throughput: Spectrum,
-    from: Origin,
-}
-
-impl ScatteredRay {
-    /// Samples a ray scattered at `vertex` with the numbers `u`, before Russian roulette.
-    #[inline]
-    fn leave(vertex: &Vertex, u: [f32; 3], throughput: Spectrum, asked: LightStrategy) -> Option<Self> {
-        let s = vertex.sample(u)?;
-        let at = &vertex.at;
-        let (normal, two_sided) = (vertex.normal(), vertex.bsdf.transmits());
-        Some(Self {
-            ray: at.ray(s.wi, f32::INFINITY),
-            width: at.footprint,
-            spread: DIFFUSE_SPREAD,
-            throughput: throughput * s.weight,
-            from: Origin { p: at.p, normal, two_sided, pdf: s.pdf, asked },
-        })
-    }
-}
-
 impl PathTracer {
     /// Radiance of the infinite lights along a ray that left the scene.
-    fn escaped(&self, world: &World<'_>, ray: &Ray, from: Option<&Origin>) -> Spectrum {
+    fn escaped(&self, world: &World<'_>, ray: &Ray, from: Option<&Origin<'_>>) -> Spectrum {
         let mut sum = Spectrum::ZERO;
-        for light in &world.scene.lights {
+        for light in world.lights {
             let Some(from) = from else {
                 sum += light.seen(ray.direction);
                 continue;
             };
             let emitted = light.le(ray.direction);
             if !emitted.is_black() {
-                sum += emitted * self.weigh(world, from, light, || light.pdf_li(from.p, ray.direction));
+                sum += emitted * self.weigh(world, from, light, || light.pdf_li(from.flight.p, ray.direction));
             }
         }
         sum
@@ -136,9 +116,9 @@ impl PathTracer {
 
     /// Radiance of the lamps that a scattered ray hits before `end`. Lamps are visible only to scattered rays, not to
     /// the camera or the labels.
-    fn lamps(&self, world: &World<'_>, ray: &Ray, from: &Origin, end: f32) -> Spectrum {
+    fn lamps(&self, world: &World<'_>, ray: &Ray, from: &Origin<'_>, end: f32) -> Spectrum {
         let mut sum = Spectrum::ZERO;
-        for light in &world.scene.lights {
+        for light in world.lights {
             if let Some(lamp) = light.hit(ray.origin, ray.direction)
                 && lamp.distance < end
             {
@@ -150,7 +130,7 @@ impl PathTracer {
 
     /// MIS weight of emission from `light` found by a scattered ray from `from`.
     #[inline]
-    fn weigh(&self, world: &World<'_>, from: &Origin, light: &Light, light_pdf: impl FnOnce() -> f32) -> f32 {
+    fn weigh(&self, world: &World<'_>, from: &Origin<'_>, light: &Light, light_pdf: impl FnOnce() -> f32) -> f32 {
         match (self.technique.light_sampling, self.technique.mis) {
             (false, _) => 1.0,
             (true, false) => 0.0,
@@ -158,12 +138,13 @@ impl PathTracer {
                 let (rays, asks) = match from.asked {
                     LightStrategy::All { rays } => (if light.is_narrow() { 1.0 } else { rays }, 1.0),
                     LightStrategy::One => {
-                        let total = total_importance(world, from.p, from.normal, from.two_sided);
-                        let own = light.importance(from.p, from.normal, from.two_sided);
+                        let ScatteredRay { p, normal, two_sided, .. } = *from.flight;
+                        let total = total_importance(world, p, normal, two_sided);
+                        let own = light.importance(p, normal, two_sided);
                         (1.0, own / total.max(f32::MIN_POSITIVE))
                     }
                 };
-                rays * from.pdf / (rays * from.pdf + asks * light_pdf())
+                rays * from.flight.pdf / (rays * from.flight.pdf + asks * light_pdf())
             }
         }
     }
@@ -203,7 +184,7 @@ impl PathTracer {
         let mut direct = [Direct::default(); PACKET];
         // `true` once a wide light was sampled: the light found before the first one fixes the MIS weights of all.
         let mut weighed = [false; PACKET];
-        for (k, light) in world.scene.lights.iter().enumerate() {
+        for (k, light) in world.lights.iter().enumerate() {
             let mut shadow = [None; PACKET];
             let mut brings = [Spectrum::ZERO; PACKET];
             for (i, (vertex, sampler)) in seen.iter().enumerate().filter_map(|(i, seen)| Some((i, seen.as_ref()?))) {
@@ -259,7 +240,7 @@ impl PathTracer {
         }
         let mut left = u[0] * total;
         let mut chosen = None;
-        for light in &world.scene.lights {
+        for light in world.lights {
             let importance = light.importance(p, normal, two_sided);
             if importance > 0.0 {
                 chosen = Some((light, importance / total));
@@ -275,42 +256,50 @@ impl PathTracer {
         }
     }
 
-    /// Traces a scattered ray from surface number `depth` on and returns the radiance along it. `branch` selects its
-    /// random numbers, `found` is the light that its path has found so far.
+    /// Follows a trail from the first surface, where its ray is sampled with the numbers `u`, and returns the radiance along it.
+    /// `branch` selects its random numbers, `found` is the light that its path has found so far.
     fn follow(
         &self,
         world: &World<'_>,
-        mut flight: ScatteredRay,
+        trail: &mut impl Trail,
+        Start { first, u, rays, mut throughput }: Start<'_>,
         roulette: &RouletteSplitting,
-        sampler: Sampler,
-        branch: u32,
+        (sampler, branch): (Sampler, u32),
         found: Spectrum,
     ) -> Spectrum {
         let mut radiance = Spectrum::ZERO;
+        let mut asked = LightStrategy::All { rays };
+        let Some(mut step) = trail.step(1, || ScatteredRay::leave(first, u)) else { return radiance };
+        throughput *= step.flight.weight;
         for depth in 1..=self.max_depth {
-            let ScatteredRay { ray, throughput, ref from, .. } = flight;
-            let met = world.interact(&ray, flight.width, flight.spread);
-            radiance +=
-                throughput * self.lamps(world, &ray, from, met.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.t));
-            let Some((hit, at)) = met else {
-                return radiance + throughput * self.escaped(world, &ray, Some(from));
+            let met = step.met(world);
+            let (flight, end) = (step.flight, met.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.t));
+            let from = Origin { flight: &flight, asked };
+            radiance += throughput * self.lamps(world, &flight.ray, &from, end);
+            let Some(met) = met else {
+                return radiance + throughput * self.escaped(world, &flight.ray, Some(&from));
             };
             if depth == self.max_depth {
                 break;
             }
-            let vertex = Vertex::new(world, &ray, &hit, at);
+            let vertex = step.vertex(world, &met);
             let lights = sampler.get4(sets::light(branch, depth));
             if self.technique.light_sampling {
                 radiance += throughput * self.sample_one_light(world, &vertex, [lights[0], lights[1], lights[2]]);
             }
-            let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
-            let Some(next) = ScatteredRay::leave(&vertex, [lobe, u, v], throughput, LightStrategy::One) else { break };
-            flight = next;
-            let chance = roulette.survive(flight.throughput, found + radiance);
+            let scatter = || {
+                let [lobe, u, v, _] = sampler.get4(sets::scatter(branch, depth));
+                ScatteredRay::leave(&vertex, [lobe, u, v])
+            };
+            let Some(next) = trail.step(depth + 1, scatter) else { break };
+            step = next;
+            throughput *= step.flight.weight;
+            let chance = roulette.survive(throughput, found + radiance);
             if lights[3] >= chance {
                 break;
             }
-            flight.throughput *= 1.0 / chance;
+            throughput *= 1.0 / chance;
+            asked = LightStrategy::One;
         }
         radiance
     }
@@ -320,9 +309,9 @@ impl PathTracer {
     fn indirect(
         &self,
         world: &World<'_>,
-        vertex: &Vertex,
+        (vertex, sampler): &(Vertex, Sampler),
+        trails: &mut impl Trails,
         roulette: &RouletteSplitting,
-        sampler: Sampler,
         Direct { found: direct, rays }: Direct,
         narrow: Option<usize>,
     ) -> Spectrum {
@@ -331,7 +320,7 @@ impl PathTracer {
         let count = (mean + extra).trunc_to::<u32>();
         let mut radiance = Spectrum::ZERO;
         for branch in 0..count {
-            let [lobe, u, v] = match (branch, narrow) {
+            let u = match (branch, narrow) {
                 (0, Some(_)) => [lobe, own_u, own_v],
                 (0, None) => {
                     let [_, _, u, v] = sampler.get4(sets::FIRST);
@@ -342,20 +331,61 @@ impl PathTracer {
                     [lobe, u, v]
                 }
             };
-            let Some(flight) =
-                ScatteredRay::leave(vertex, [lobe, u, v], Spectrum::splat(1.0 / mean), LightStrategy::All { rays })
-            else {
-                continue;
-            };
-            radiance += self.follow(world, flight, roulette, sampler, branch, direct + radiance);
+            let trail = trails.of(branch, narrow.is_some());
+            let start = Start { first: vertex, u, rays, throughput: Spectrum::splat(1.0 / mean) };
+            radiance += self.follow(world, trail, start, roulette, (*sampler, branch), direct + radiance);
         }
         radiance
     }
+
+    /// Returns what the samples of a packet find, given their first surfaces.
+    fn lit(
+        &self,
+        world: &World<'_>,
+        samples: &[Option<Sample>; PACKET],
+        (seen, distances): &(Seen, [f32; PACKET]),
+        trails: &mut [impl Trails; PACKET],
+    ) -> [CameraSample; PACKET] {
+        let roulette = RouletteSplitting::new(world, self.technique.roulette);
+        let narrow = world.lights.iter().position(Light::is_narrow).filter(|_| self.technique.light_sampling);
+        let direct = if self.technique.light_sampling {
+            self.sample_all_lights(world, seen, &roulette, narrow)
+        } else {
+            [Direct::default(); PACKET]
+        };
+        let mut sightings = [CameraSample::default(); PACKET];
+        for i in 0..PACKET {
+            let Some(sample) = &samples[i] else { continue };
+            let (radiance, first) = match &seen[i] {
+                Some(first) => {
+                    let indirect = self.indirect(world, first, &mut trails[i], &roulette, direct[i], narrow);
+                    (direct[i].found + indirect, Some(first.0.describe(distances[i])))
+                }
+                None => (self.escaped(world, &sample.ray, None), None),
+            };
+            sightings[i] = CameraSample { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
+        }
+        sightings
+    }
+}
+
+/// Returns the first surfaces of a packet, and their distances.
+#[inline]
+fn first_surfaces(world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> (Seen, [f32; PACKET]) {
+    let hits = world.geometry.closest_packet(&samples.map(|sample| sample.map(|s| s.ray)));
+    let (mut seen, mut distances): (Seen, _) = ([None; PACKET], [0.0; PACKET]);
+    for i in 0..PACKET {
+        if let (Some(Sample { ray, sampler }), Some(hit)) = (&samples[i], &hits[i]) {
+            seen[i] = Some((Vertex::new(world, ray, hit, world.at(hit, spread * hit.t)), *sampler));
+            distances[i] = hit.t;
+        }
+    }
+    (seen, distances)
 }
 
 #[inline]
 fn total_importance(world: &World<'_>, p: Vec3, normal: Vec3, two_sided: bool) -> f32 {
-    world.scene.lights.iter().map(|l| l.importance(p, normal, two_sided)).sum()
+    world.lights.iter().map(|l| l.importance(p, normal, two_sided)).sum()
 }
 
 impl Integrator for PathTracer {
@@ -366,32 +396,19 @@ impl Integrator for PathTracer {
     }
 
     fn li_packet(&self, world: &World<'_>, samples: &[Option<Sample>; PACKET], spread: f32) -> [CameraSample; PACKET] {
-        let hits = world.geometry.closest_packet(&samples.map(|sample| sample.map(|s| s.ray)));
-        let mut seen: Seen = [None; PACKET];
-        for i in 0..PACKET {
-            if let (Some(Sample { ray, sampler }), Some(hit)) = (&samples[i], &hits[i]) {
-                seen[i] = Some((Vertex::new(world, ray, hit, world.at(hit, spread * hit.t)), *sampler));
-            }
-        }
-        let roulette = RouletteSplitting::new(world, self.technique.roulette);
-        let narrow = world.scene.lights.iter().position(Light::is_narrow).filter(|_| self.technique.light_sampling);
-        let direct = if self.technique.light_sampling {
-            self.sample_all_lights(world, &seen, &roulette, narrow)
-        } else {
-            [Direct::default(); PACKET]
-        };
-        let mut sightings = [CameraSample::default(); PACKET];
-        for i in 0..PACKET {
-            let Some(sample) = &samples[i] else { continue };
-            let (radiance, first) = match (&seen[i], &hits[i]) {
-                (Some((vertex, sampler)), Some(hit)) => {
-                    let indirect = self.indirect(world, vertex, &roulette, *sampler, direct[i], narrow);
-                    (direct[i].found + indirect, Some(vertex.describe(hit.t)))
-                }
-                _ => (self.escaped(world, &sample.ray, None), None),
-            };
-            sightings[i] = CameraSample { radiance: Spectrum(radiance.0.min(Spectrum::splat(self.clamp).0)), first };
-        }
-        sightings
+        let first = first_surfaces(world, samples, spread);
+        self.lit(world, samples, &first, &mut <[Fleeting; PACKET]>::default())
+    }
+
+    fn li_packet_lit(
+        &self,
+        worlds: &[World<'_>],
+        samples: &[Option<Sample>; PACKET],
+        spread: f32,
+    ) -> Vec<[CameraSample; PACKET]> {
+        let Some(any) = worlds.first() else { return Vec::new() };
+        let first = first_surfaces(any, samples, spread);
+        let mut trails = <[KeptTrails; PACKET]>::default();
+        worlds.iter().map(|world| self.lit(world, samples, &first, &mut trails)).collect()
     }
 }

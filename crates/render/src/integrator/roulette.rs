@@ -45,7 +45,7 @@ impl RouletteSplitting {
     /// unknown, everything is followed exactly once.
     #[inline]
     pub(super) fn new(world: &World<'_>, on: bool) -> Self {
-        let open = world.scene.lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
+        let open = world.lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
         Self { usual: open * (USUAL_ALBEDO * FRAC_1_PI), on: on && !open.is_black() }
     }
 

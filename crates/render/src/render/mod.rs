@@ -11,7 +11,7 @@ mod tiles;
 
 use crate::accel::prepare_thread;
 use crate::film::{Accumulator, Film, Pixel};
-use crate::integrator::{Integrator, Sample, World};
+use crate::integrator::{CameraSample, Integrator, Sample, World};
 use furrow_base::geometry::{PACKET, Ray, Window};
 use furrow_base::math::{ToFloat, ToInt, vec2};
 use furrow_base::sampling::{Points, Sampler, sets};
@@ -102,6 +102,53 @@ pub fn render(
     Ok(Film { window: settings.window, pixels })
 }
 
+/// Renders a window in several worlds that differ only in their lights, with the same rays for all that does not depend on
+/// light. Each film is the one that [`render`] returns for its world, bit by bit.
+pub fn render_lit(
+    worlds: &[World<'_>],
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    watch: &RenderMonitor<'_>,
+) -> Result<Vec<Film>> {
+    let tiles = tiles::tiles(settings.window);
+    let render = |tile: &Window| {
+        let mut lit: Vec<Vec<Pixel>> = vec![Vec::new(); worlds.len()];
+        for at in tiles::pixels(*tile).take_while(|_| !watch.stopped()) {
+            let mut sums = vec![Accumulator::default(); worlds.len()];
+            gather_lit(worlds, integrator, settings, at, &mut sums);
+            lit.iter_mut().zip(&sums).for_each(|(pixels, sum)| pixels.push(sum.finish()));
+        }
+        (watch.done)(u64::from(settings.spp) * lit.iter().map(|pixels| pixels.len().to_u64()).sum::<u64>());
+        lit
+    };
+    let mut rendered: Vec<Vec<Vec<Pixel>>> = tiles.par_iter().map(render).collect();
+    if watch.stopped() {
+        return Err(Error::interrupted());
+    }
+    let film = |light: usize| {
+        let pixels = tiles.iter().copied().zip(rendered.iter_mut().map(|lit| std::mem::take(&mut lit[light])));
+        Film { window: settings.window, pixels: tiles::assemble(settings.window, pixels) }
+    };
+    Ok((0..worlds.len()).map(film).collect())
+}
+
+/// Adds all samples of one pixel to the accumulators of the worlds, as [`gather`] does for one.
+fn gather_lit(
+    worlds: &[World<'_>],
+    integrator: &dyn Integrator,
+    settings: &Settings,
+    at: (u32, u32),
+    sums: &mut [Accumulator],
+) {
+    let Some(world) = worlds.first() else { return };
+    let spread = world.scene.camera.pixel_angle();
+    for packet in 0..settings.spp.div_ceil(PACKET.to_u32()) {
+        let wanted = packet_of(world, settings, at, packet, &(0..settings.spp));
+        let lit = integrator.li_packet_lit(worlds, &wanted, spread);
+        lit.iter().zip(&mut *sums).for_each(|(seen, sum)| add(seen, &wanted, sum));
+    }
+}
+
 /// Renders one pixel, as within a tile; `--pixel` uses it too.
 pub fn pixel(world: &World<'_>, integrator: &dyn Integrator, settings: &Settings, x: u32, y: u32) -> Pixel {
     let mut sum = Accumulator::default();
@@ -121,17 +168,36 @@ fn gather(
 ) {
     let spread = world.scene.camera.pixel_angle();
     for packet in samples.start / PACKET.to_u32()..samples.end.div_ceil(PACKET.to_u32()) {
-        let mut wanted = [None; PACKET];
-        for (index, wanted) in (packet * PACKET.to_u32()..).zip(&mut wanted) {
-            if samples.contains(&index) {
-                *wanted = Some(sample(world, settings, at, index));
-            }
+        let wanted = packet_of(world, settings, at, packet, &samples);
+        add(&integrator.li_packet(world, &wanted, spread), &wanted, sum);
+    }
+}
+
+/// Builds those samples of a packet that are in the range.
+#[inline]
+fn packet_of(
+    world: &World<'_>,
+    settings: &Settings,
+    at: (u32, u32),
+    packet: u32,
+    samples: &Range<u32>,
+) -> [Option<Sample>; PACKET] {
+    let mut wanted = [None; PACKET];
+    for (index, wanted) in (packet * PACKET.to_u32()..).zip(&mut wanted) {
+        if samples.contains(&index) {
+            *wanted = Some(sample(world, settings, at, index));
         }
-        for (seen, _) in integrator.li_packet(world, &wanted, spread).iter().zip(&wanted).filter(|(_, s)| s.is_some()) {
-            sum.add(seen.radiance);
-            if let Some(first) = seen.first {
-                sum.add_first(first.part, first.albedo, first.normal, first.distance);
-            }
+    }
+    wanted
+}
+
+/// Adds what the samples of a packet have found to a pixel's accumulator.
+#[inline]
+fn add(seen: &[CameraSample; PACKET], wanted: &[Option<Sample>; PACKET], sum: &mut Accumulator) {
+    for (seen, _) in seen.iter().zip(wanted).filter(|(_, sample)| sample.is_some()) {
+        sum.add(seen.radiance);
+        if let Some(first) = seen.first {
+            sum.add_first(first.part, first.albedo, first.normal, first.distance);
         }
     }
 }

@@ -192,7 +192,7 @@ impl Args {
     fn shoot(&self, page: &Path, bbch: u32, view: &View, signals: &Signals) -> Result<Thumbnail> {
         let field = self.field(page, bbch, Some(view))?;
         let geometry = EmbreeAccel::build(&field.scene.surfaces(), self.threads.max(1).to_u32())?;
-        let world = World { scene: &field.scene, geometry: &geometry };
+        let world = World::new(&field.scene, &geometry);
         let window = Window::full(self.size, self.size);
         let settings = Settings { spp: self.spp, seed: field.sample_seed(), window, points: Points::Sobol };
         let watch = RenderMonitor { done: &|_| {}, stop: signals.catch() };

@@ -89,9 +89,17 @@ pub(crate) struct RenderingArgs {
     /// Denoise the images; needs Open Image Denoise.
     #[arg(long)]
     denoise: bool,
+    /// Render each view of a field under N lights: its own, and N - 1 for which lights, exposure and sensor are drawn anew
+    /// from the scene file. The field is built once, and its labels are the same. Images count one by one, so --count 40
+    /// --relight 8 renders 5 fields.
+    #[arg(long = "relight", value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=MOST_RELIT))]
+    pub(crate) lights: u64,
     #[command(flatten)]
     technique: TechniqueArgs,
 }
+
+/// Largest number of lights of a view.
+const MOST_RELIT: u64 = 1000;
 
 /// Labels in the formats.
 #[derive(clap::Args)]
@@ -157,7 +165,8 @@ pub(crate) fn run(args: &Args, quiet: bool, signals: &Signals) -> Result<Set> {
 
 /// Prints how many plants the images are expected to show. With `quiet`, only warnings are printed.
 pub(super) fn print_plants(set: &Set, quiet: bool) -> Result<()> {
-    match furrow_dataset::make::render::scene_file(set)?.plants_in_view(set.recipe.count) {
+    let fields = set.recipe.count.div_ceil(set.recipe.captures());
+    match furrow_dataset::make::render::scene_file(set)?.plants_in_view(fields) {
         Some(plants) if plants.warning().is_some() || !quiet => furrow_cli::message!("{}", plants.message()),
         _ => {}
     }
@@ -227,6 +236,7 @@ impl ImageArgs {
             licence: self.licence.clone(),
             options: self.options(),
             labels_only: self.look.labels_only,
+            lights: self.look.lights,
             edit,
             memory: self.memory.bytes,
             ..Order::new(self.scene.path(), self.count.unwrap_or(0))
