@@ -178,7 +178,9 @@ impl Cracks {
         let pieces = self.pieces(raster.area());
         let rows = raster.height.div_ceil(BANDS).max(1);
         heights.par_chunks_mut(rows * raster.width).enumerate().for_each(|(band, heights)| {
-            pieces.iter().for_each(|piece| self.cut(piece, raster, band * rows, heights));
+            for piece in &pieces {
+                self.cut(piece, raster, band * rows, heights);
+            }
         });
         heights
     }
