@@ -33,8 +33,8 @@ pub use furrow_grow::plant::{ConditionDesc, LayerDesc, LeafKind, PlantDesc, Shap
 pub use furrow_grow::scatter::{ClustersDesc, RowsDesc, WeedsDesc};
 #[doc(inline)]
 pub use furrow_grow::soil::{
-    BlendDesc, ClodsDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc,
-    SoilColor, SoilDesc, StonesDesc, WheelDesc,
+    BlendDesc, ClodsDesc, CracksDesc, CrumbsDesc, LayerDesc as SoilLayerDesc, LitterDesc, MoistureDesc, ReliefDesc,
+    RowReliefDesc, SoilColor, SoilDesc, StonesDesc, ToolDesc, WheelDesc,
 };
 #[doc(inline)]
 pub use furrow_optics::light::desc::*;

@@ -130,7 +130,7 @@ impl Ground {
         let look = self.appearance();
         let crumbs = self.crumbs(raster, laid);
         let hues = self.crumb_hues();
-        let mut detail = crumbs.height;
+        let mut detail = self.small_relief(crumbs.height, raster);
         let rows = (
             detail.par_chunks_mut(width),
             baked.albedo.par_chunks_mut(width),
@@ -220,7 +220,7 @@ impl Ground {
         let finest = (1e3 * FINEST_TEXELS * raster.step).max(GRAINS_MM.0);
         let mm = (finest, GRAINS_MM.1.max(finest));
         let amount = GRAINS_COVER / self.law.at(Vec2::ZERO, 1.0).cover(mm).max(f32::MIN_POSITIVE);
-        let [grains, none] = [mm, (mm.1, mm.1)].map(|mm| SizeRange { mm, amount, gain: |_| 0.0, dry: 1.0 });
+        let [grains, none] = [mm, (mm.1, mm.1)].map(|mm| SizeRange { mm, amount, dry: 1.0 });
         let mut crumbs = Crumbs::draw(raster, &self.law, [grains, none], [none; 2], &stream, |_| 1.0);
         let noise = Perlin::new(stream.child(Purpose::Texture, 0).seed32());
         let octaves = (ROUGH_M / (FINEST_TEXELS * raster.step)).log2().clamp(0.0, 6.0).trunc_to::<u32>();

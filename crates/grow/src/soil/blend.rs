@@ -81,6 +81,14 @@ impl Blend {
         self
     }
 
+    /// Multiplies the heights of all layers by a factor.
+    pub(super) fn flattened(mut self, factor: f32) -> Self {
+        for tile in &mut self.tiles {
+            (tile.low, tile.relief) = (factor * tile.low, factor * tile.relief);
+        }
+        self
+    }
+
     /// Returns the noise of layer `i`. It varies slowly, so it may be interpolated between vertices.
     pub(super) fn noise(&self, i: usize, p: Vec2) -> f32 {
         let (x, y) = (f64::from(p.x) * self.frequency, f64::from(p.y) * self.frequency);

@@ -1,7 +1,7 @@
 //! Clods: soil aggregates as separate bodies.
 //!
 //! Clods are placed on the [`Pile`], largest first, so that small ones roll into the gaps between large ones or rest on
-//! them, as on a seedbed. Some lie on top and some are mostly buried, large ones deeper. Triangles that face down into
+//! them, as on a seedbed. Some lie on top and some are mostly buried. Triangles that face down into
 //! the ground, about half of them, are left out because no ray can reach them.
 
 use super::body::{self, LEVELS, Placed, Pose, Shape, ShapeParameters};
@@ -30,19 +30,25 @@ const AXES: (f32, f32) = (0.77, 0.55);
 
 /// Fractions of the dry clods that have kept at least one third and at least two thirds of the moisture that others have
 /// lost.
-const HALF_DRY: [f32; 2] = [0.35, 0.12];
+const HALF_DRY: [f32; 2] = [0.22, 0.06];
 /// Relative heights below which a clod is one level moister, and the length above which a clod has such a base and is
 /// joined to the ground, mm.
-const MOIST_BELOW: [f32; 2] = [0.15, 0.35];
+const MOIST_BELOW: [f32; 2] = [0.05, 0.14];
 const GRADED_MM: f32 = 5.0;
 /// Excess of fine aggregates on the ground, as [`Ground::fines`]. Above the first, a base is at most one level moister;
 /// above the second it is as dry as the clod.
 const DRY_FINES: [f32; MOIST_BELOW.len()] = [0.0, 0.25];
 /// Buried fraction of the height above which a clod is one level moister.
-const MOIST_SUNK: f32 = 0.45;
+const MOIST_SUNK: f32 = 0.6;
 /// Height of the soil washed against a welded clod, relative to half of its own, and its widening at the ground.
 const FILLET: f32 = 0.6;
 const FLARE: f32 = 0.2;
+
+/// Length of the clods of which 37 % are gone from a fully slaked surface, mm: e^(−L / 7 mm).
+const SLAKED_MM: f32 = 7.0;
+/// Buried fraction of the height of a clod that is pressed flat, and fraction of the way to it by soil that rain has washed in.
+const FLUSH: f32 = 0.88;
+const SILTED: f32 = 0.4;
 
 /// Grid spacing for which the levels of detail are designed, metres: about four pixels of 0.25 mm.
 const FINE_M: f32 = 0.0009;
@@ -113,9 +119,12 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let mut vary = |mean: f32| (mean * (1.0 + 0.2 * s.normal().to_f32())).clamp(0.5 * mean, 1.0);
         let axes = vec3(1.0, vary(AXES.0), vary(AXES.1)) * half;
         let pose = Pose::lying(shape, axes, 0.3, &mut s);
-        let sink = sink(clod.mm, s.uniform32());
+        let sink = sink(s.uniform32());
+        if s.child(Purpose::Page, 0).uniform32() < ground.slaked * (-clod.mm / SLAKED_MM).exp() {
+            continue;
+        }
         let tint = ground.law.tint_sigma * s.normal().to_f32() + loose_gain(sink);
-        let sink = sink * (1.0 - ground.law.loose);
+        let sink = flush(sink * (1.0 - ground.law.loose), ground.slaked, ground.shape.left(clod.at));
         let sunk = usize::from(sink > MOIST_SUNK);
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
@@ -176,6 +185,13 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
     (groups.into_iter().enumerate().filter(|(_, mesh)| !mesh.triangles.is_empty()))
         .map(|(g, mesh)| Clods { tint: hues[g / TONES % HUES] * brightness(g), moisture: g / (HUES * TONES), mesh })
         .collect()
+}
+
+/// Returns the buried fraction of a clod's height after rain and under tools and wheels, which have left a fraction `left`
+/// of the roughness: washed-in soil covers more of it, and pressed clods are level with the ground.
+fn flush(sink: f32, slaked: f32, left: f32) -> f32 {
+    let washed = sink + SILTED * slaked * (FLUSH - sink).max(0.0);
+    washed + (1.0 - left) * (FLUSH - washed).max(0.0)
 }
 
 /// Returns the level of moisture of a dry clod, from u in 0..1.

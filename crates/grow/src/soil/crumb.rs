@@ -22,14 +22,14 @@ const FBM3_SD: f32 = 0.28;
 /// Logarithm of the brightness of a clod lying loosely on top relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) const LOOSE_GAIN: f32 = 0.14;
 
-/// Buried fraction of the height of small clods: its range, the exponent of its distribution and its mean.
+/// Buried fraction of the height of clods: its range, the exponent of its distribution and its mean.
 const SINK: (f32, f32) = (0.03, 0.7);
 const SINK_POWER: f32 = 1.4;
 const MEAN_SINK: f32 = SINK.0 + (SINK.1 - SINK.0) / (1.0 + SINK_POWER);
 
 /// Fraction of the moisture that dry clods have lost that clods have lost on average: some are half dry, and bases are
 /// moist.
-pub(super) const CLODS_DRY: f32 = 0.66;
+pub(super) const CLODS_DRY: f32 = 0.8;
 
 /// Lengths of the aggregates that fill the gaps between clods, mm.
 const FINES_MM: (f32, f32) = (1.0, 5.0);
@@ -77,8 +77,6 @@ pub(super) struct SizeRange {
     pub(super) mm: (f32, f32),
     /// Fraction of the number that the size distribution gives.
     pub(super) amount: f32,
-    /// Mean logarithm of the brightness relative to the ground, as a function of the length in mm.
-    pub(super) gain: fn(f32) -> f32,
     /// Fraction of the moisture that dry aggregates have lost that these have lost on average.
     pub(super) dry: f32,
 }
@@ -89,25 +87,14 @@ impl SizeRange {
     }
 }
 
-/// Returns the fraction of a clod's height below the surface, from u in 0..1: 0.03 to 0.7 for small clods, a tenth more for
-/// those of 15 mm and more.
-pub(super) fn sink(mm: f32, u: f32) -> f32 {
-    deeper(mm) + SINK.0 + (SINK.1 - SINK.0) * u.powf(SINK_POWER)
-}
-
-/// Returns how much more of its height a clod of this length has below the surface than a small one.
-fn deeper(mm: f32) -> f32 {
-    0.1 * (mm / 15.0).min(1.0)
+/// Returns the fraction of a clod's height below the surface, from u in 0..1.
+pub(super) fn sink(u: f32) -> f32 {
+    SINK.0 + (SINK.1 - SINK.0) * u.powf(SINK_POWER)
 }
 
 /// Returns the logarithm of a clod's brightness relative to one that is sunk to the [`MEAN_SINK`].
 pub(super) fn loose_gain(sink: f32) -> f32 {
     LOOSE_GAIN * (MEAN_SINK - sink) / MEAN_SINK
-}
-
-/// Returns the mean logarithm of the brightness of clods of this length relative to the ground.
-pub(super) fn mean_gain(mm: f32) -> f32 {
-    loose_gain(deeper(mm) + MEAN_SINK)
 }
 
 /// Local size distribution: the number above 5 mm, m⁻², and the exponent.
@@ -180,10 +167,10 @@ impl SizeDistribution {
     }
 
     /// Returns the brightness times 128 and the loss of moisture times 255 of an aggregate, from three numbers in 0..1;
-    /// `gain` and `dry` as in [`SizeRange`].
-    fn shade(&self, u: [f32; 3], gain: f32, dry: f32) -> (u8, u8) {
+    /// `dry` as in [`SizeRange`].
+    fn shade(&self, u: [f32; 3], dry: f32) -> (u8, u8) {
         // The sum of two uniforms less one has standard deviation 0.408.
-        let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma + gain).exp();
+        let tint = ((u[0] + u[1] - 1.0) / 0.408 * 1.5 * self.tint_sigma).exp();
         let dry = if u[2] < self.damp { 0 } else { (self.dryness * dry * 255.0).trunc_to::<u8>() };
         ((tint * 128.0).clamp(1.0, 255.0).trunc_to::<u8>(), dry)
     }
@@ -248,7 +235,7 @@ pub(super) struct Raster {
 
 impl Raster {
     /// Returns the area that it covers.
-    fn area(self) -> Rect {
+    pub(super) fn area(self) -> Rect {
         let far = self.origin + vec2(self.width.to_f32(), self.height.to_f32()) * self.step;
         Rect::new(self.origin.x, self.origin.y, far.x, far.y)
     }
@@ -356,7 +343,7 @@ impl Band<'_> {
                     if self.tint[k] == 0 && s.uniform32() >= bare {
                         let part = &parts[usize::from(s.uniform32() >= first)];
                         let u = [s.uniform32(), s.uniform32(), s.uniform32()];
-                        (self.tint[k], self.dry[k]) = law.shade(u, (part.gain)(part.mm.1), part.dry);
+                        (self.tint[k], self.dry[k]) = law.shade(u, part.dry);
                         self.hue[k] = hue(u[0] - u[1]);
                     }
                 }
@@ -376,7 +363,7 @@ impl Band<'_> {
         let centre = top * (0.6 - 0.6 * u[3]);
         let face = |v: f32, w: f32| Vec2::from_angle(v * std::f32::consts::TAU) * (0.4 + 0.9 * w);
         let (f, g) = (face(u[4], u[5]), face(u[6], u[7]));
-        let (tint, dry) = law.shade([u[8], u[9], u[10]], (part.gain)(length_mm), part.dry);
+        let (tint, dry) = law.shade([u[8], u[9], u[10]], part.dry);
         let hue = hue(u[8] - u[9]);
         // The outline is an ellipse cut by straight breaks, so that crumbs are angular and all different.
         let breaks: [Vec2; BREAKS] = std::array::from_fn(|k| {
@@ -479,7 +466,7 @@ mod tests {
     fn aggregates_cover_as_much_drawn_or_not() {
         let law = law(0.0);
         let mm = (2.5, 10.0);
-        let some = SizeRange { mm, amount: 0.2, gain: |_| 0.0, dry: 1.0 };
+        let some = SizeRange { mm, amount: 0.2, dry: 1.0 };
         let none = SizeRange { mm: (2.5, 2.5), ..some };
         let covered = |step: f32, size: usize, seen: SizeRange, unseen: SizeRange| {
             let raster = Raster { origin: vec2(0.0, 0.0), step, width: size, height: size };
@@ -499,11 +486,11 @@ mod tests {
     /// the ground, some are mostly buried.
     #[test]
     fn clods_are_buried_by_a_wide_range_of_their_height() {
-        let sinks: Vec<f32> = (0..1000).map(|k| sink(6.0, (k.to_f32() + 0.5) / 1000.0)).collect();
+        let sinks: Vec<f32> = (0..1000).map(|k| sink((k.to_f32() + 0.5) / 1000.0)).collect();
         let mean = |of: &dyn Fn(f32) -> f32| sinks.iter().map(|s| of(*s)).sum::<f32>() / 1000.0;
         let below = |limit: f32| sinks.iter().filter(|s| **s < limit).count();
-        assert!((mean(&|s| s) - MEAN_SINK - deeper(6.0)).abs() < 1e-3, "{}", mean(&|s| s));
-        assert!((mean(&loose_gain) - mean_gain(6.0)).abs() < 1e-3);
+        assert!((mean(&|s| s) - MEAN_SINK).abs() < 1e-3, "{}", mean(&|s| s));
+        assert!(mean(&loose_gain).abs() < 1e-3);
         assert!(
             (120..300).contains(&below(0.12)) && (700..900).contains(&below(0.55)),
             "{} {}",

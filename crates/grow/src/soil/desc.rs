@@ -1,6 +1,6 @@
 //! Ground in a scene file: soil, clods, stones and litter.
 
-use super::{PigmentsDesc, SoilColor, WheelDesc};
+use super::{CracksDesc, PigmentsDesc, SoilColor, ToolDesc, WheelDesc};
 use furrow_base::math::Spectrum;
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Signed, Vary};
 use furrow_optics::optics::Rock;
@@ -55,6 +55,13 @@ pub struct SoilDesc {
     /// Relief of the ground.
     #[serde(default)]
     pub relief: ReliefDesc,
+    /// Effect of rain since the last tillage: 0 freshly tilled, 0.5 a thin crust with the larger clods left, 1 a smooth,
+    /// slaked surface without crumbs. The book's page on soil has the formula.
+    #[serde(default = "dry_since")]
+    pub slaked: Vary<Fraction>,
+    /// Cracks of a dried crust; default none.
+    #[serde(default)]
+    pub cracks: CracksDesc,
     /// Moisture of the ground.
     #[serde(default)]
     pub moisture: MoistureDesc,
@@ -81,6 +88,10 @@ pub struct SoilDesc {
 
 fn grown() -> f32 {
     1.0
+}
+
+fn dry_since() -> Vary<Fraction> {
+    Vary::fixed(0.0)
 }
 
 /// One layer of soil.
@@ -158,6 +169,8 @@ pub struct ReliefDesc {
     pub row: RowReliefDesc,
     /// Wheel tracks along the rows; default none.
     pub wheels: Vec<WheelDesc>,
+    /// Marks of harrows, drills and rollers over the whole ground; default none.
+    pub tools: Vec<ToolDesc>,
 }
 
 impl Default for ReliefDesc {
@@ -169,6 +182,7 @@ impl Default for ReliefDesc {
             tilt_deg: Vary::uniform(0.0, 2.0),
             row: RowReliefDesc::default(),
             wheels: Vec::new(),
+            tools: Vec::new(),
         }
     }
 }
@@ -183,11 +197,18 @@ pub struct RowReliefDesc {
     pub width_mm: Vary<Positive<10_000>>,
     /// Height of a sinusoidal ridge with its crest on the row; its width at half height is half the row spacing.
     pub ridge_mm: Vary<NonNegative<1000>>,
+    /// Fraction of roughness and clods that the press wheel has pressed flat in the furrow.
+    pub pressed: Vary<Fraction>,
 }
 
 impl Default for RowReliefDesc {
     fn default() -> Self {
-        Self { depth_mm: Vary::uniform(4.0, 11.0), width_mm: Vary::uniform(45.0, 80.0), ridge_mm: Vary::fixed(0.0) }
+        Self {
+            depth_mm: Vary::uniform(4.0, 11.0),
+            width_mm: Vary::uniform(45.0, 80.0),
+            ridge_mm: Vary::fixed(0.0),
+            pressed: Vary::uniform(0.0, 0.6),
+        }
     }
 }
 
@@ -267,7 +288,7 @@ pub struct ClodsDesc {
     pub dryness: Vary<Fraction>,
     /// Fraction of clods and crumbs that were turned up recently and are still as wet as the ground.
     pub damp: Vary<Fraction>,
-    /// Looseness of the clods: at 0 they are sunk by 3 to 80 % of their height, 31 to 41 % on average, as after harrow and
+    /// Looseness of the clods: at 0 they are sunk by 3 to 70 % of their height, 31 % on average, as after harrow and
     /// rain; at 1 they lie on top.
     pub loose: Vary<Fraction>,
 }
@@ -352,10 +373,20 @@ impl Default for StonesDesc {
 pub struct LitterDesc {
     /// Fraction of the ground covered by straw: conventional tillage below 0.15, reduced 0.15–0.3, conservation above.
     pub straw_cover: Vary<Fraction>,
+    /// Standard deviation of the logarithm of the straw's density between mats and bare ground: 0 even, 1.5 mats.
+    pub straw_clustering: Vary<NonNegative<10>>,
+    /// Size of the mats, metres.
+    pub straw_mat_m: Vary<Positive<100>>,
     /// Length of a straw.
     pub straw_mm: Vary<Positive<10_000>>,
     /// Width of a straw.
     pub straw_width_mm: Vary<Positive<1000>>,
+    /// Number of cut stalks that stand in the ground, m⁻²: 300–500 after a harvest without tillage.
+    pub stubble_per_m2: Vary<NonNegative<100_000>>,
+    /// Height of the stubble.
+    pub stubble_mm: Vary<Positive<1000>>,
+    /// Distance between rows of stubble, metres.
+    pub stubble_rows_m: Vary<Positive<100>>,
     /// Number of sticks, m⁻².
     pub sticks_per_m2: Vary<NonNegative<100_000_000>>,
     /// Length of a stick.
@@ -379,6 +410,8 @@ impl Default for LitterDesc {
     fn default() -> Self {
         Self {
             straw_cover: Vary::uniform(0.0, 0.01),
+            straw_clustering: Vary::fixed(0.7),
+            straw_mat_m: Vary::fixed(0.25),
             straw_mm: Vary::Drawn(furrow_base::ron_file::Distribution::LogNormal {
                 median: 30.0,
                 sigma: 0.6,
@@ -386,6 +419,9 @@ impl Default for LitterDesc {
                 max: 150.0,
             }),
             straw_width_mm: Vary::uniform(1.5, 4.5),
+            stubble_per_m2: Vary::fixed(0.0),
+            stubble_mm: Vary::uniform(40.0, 120.0),
+            stubble_rows_m: Vary::fixed(0.15),
             sticks_per_m2: Vary::uniform(0.0, 4.0),
             stick_mm: Vary::uniform(30.0, 120.0),
             stick_width_mm: Vary::uniform(1.5, 5.0),

@@ -1,5 +1,6 @@
 //! Bounds of a ground's heights, which are needed before it is built to determine the area that a camera sees.
 
+use super::ground::slaked;
 use super::relief::Relief;
 use super::{Rect, SeedRows, Site, SoilDesc};
 use furrow_base::math::Vec2;
@@ -31,7 +32,7 @@ impl Envelope {
             smallest_mm: 0.0,
             rows,
         };
-        let relief = Relief::new(&desc.relief, site, stream);
+        let relief = Relief::new(&desc.relief, slaked(desc, stream), site, stream);
         let (below, above) = relief.departs();
         let ends = desc.layers.iter().map(|layer| (layer.height_mm.0.f32(), layer.height_mm.1.f32()));
         let (low, high) = ends.fold((0.0_f32, 0.0_f32), |(low, high), (from, to)| (low.min(from), high.max(to)));

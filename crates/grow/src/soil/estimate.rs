@@ -3,13 +3,14 @@
 use super::blend::Blend;
 use super::crumb::{Local, SizeDistribution};
 use super::grid::Grid;
+use super::ground::crumbs_amount;
 use super::openness::Squares;
 use super::site::{FULL_CELL_M, Sizes};
 use super::{InView, MAX_LAYERS, Rect, Site, SoilDesc, clod, litter, stone, stone_cover, surface};
 use furrow_base::geometry::Cost;
 use furrow_base::math::{ToFloat, Vec2, vec2};
 use furrow_base::ron_file::Step;
-use furrow_base::sampling::{Purpose, Stream};
+use furrow_base::sampling::Stream;
 
 /// Number of sample points along each side of the ground for the density of clods.
 const PLACES: usize = 12;
@@ -62,7 +63,7 @@ pub fn expected(
         let advice = "lower over_5mm_per_m2 or raise min_mm";
         add(&[Step::Field("clods")], bodies + reckoned(&places, &sizes, area), advice);
     }
-    let amount = f64::from(desc.crumbs.amount.draw32(&mut ground.child(Purpose::Soil, 20)));
+    let amount = f64::from(crumbs_amount(desc, ground));
     let mean =
         |of: &dyn Fn(&Local) -> f32| places.iter().map(|law| f64::from(of(law))).sum::<f64>() / places.len().to_f64();
     let number = |(min, max): (f32, f32)| square * mean(&|law| law.number(min, max));
@@ -76,8 +77,8 @@ pub fn expected(
         let cost = stone::cost(population, (area, made), sizes.resolved_mm, &stone_cover::own(debris, i));
         add(&[Step::Field("stones"), Step::Item(i)], cost, "lower their cover or raise min_mm and median_mm");
     }
-    let of = ["straw_cover", "sticks_per_m2", "bits_per_m2"];
-    let advice = ["lower it, or make straws larger", "lower it, or lower stubs", "lower it"];
+    let of = ["straw_cover", "sticks_per_m2", "bits_per_m2", "stubble_per_m2"];
+    let advice = ["lower it, or make straws larger", "lower it, or lower stubs", "lower it", "lower it"];
     let costs = litter::costs(&desc.litter, (area, made), sizes.resolved_mm, leftovers);
     for ((field, advice), cost) in of.into_iter().zip(advice).zip(costs) {
         add(&[Step::Field("litter"), Step::Field(field)], cost, advice);

@@ -2,7 +2,8 @@
 
 use super::blend::{Blend, Weights};
 use super::color::{ColorTransform, mean};
-use super::crumb::{CLODS_DRY, Crumbs, Raster, SizeDistribution, SizeRange, mean_gain};
+use super::crack::Cracks;
+use super::crumb::{CLODS_DRY, Crumbs, Raster, SizeDistribution, SizeRange};
 use super::grid::Grid;
 use super::pigments::Pigments;
 use super::record::{ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, SoilRecord};
@@ -27,6 +28,20 @@ const FBM4_SD: f32 = 0.245;
 
 /// Fraction of its moisture that ground under a complete cover of dry fine aggregates has lost relative to bare ground.
 const MULCH: f32 = 1.2;
+
+/// Fractions of the layers' heights and of the crumbs that a fully slaked surface has lost.
+const SLAKED_RELIEF: f32 = 0.7;
+const SLAKED_CRUMBS: f32 = 0.92;
+
+/// Returns the effect of rain on a ground since its last tillage, 0..1.
+pub(super) fn slaked(desc: &SoilDesc, stream: &Stream) -> f32 {
+    desc.slaked.draw32(&mut stream.child(Purpose::Soil, 70))
+}
+
+/// Returns the fraction of the crumbs that the size distribution gives, after rain.
+pub(super) fn crumbs_amount(desc: &SoilDesc, stream: &Stream) -> f32 {
+    desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)) * (1.0 - SLAKED_CRUMBS * slaked(desc, stream))
+}
 
 /// Data at each vertex of the fine grid.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +73,10 @@ pub struct Ground {
     pub(super) heights: Vec<f32>,
     pub(super) slopes: Vec<Vec2>,
     /// Relief without layers and crumbs.
-    shape: Relief,
+    pub(super) shape: Relief,
+    cracks: Option<Cracks>,
+    /// Effect of rain since the last tillage, 0..1.
+    pub(super) slaked: f32,
     pub(super) fine: FineGridPoint,
     pub(super) blend: Blend,
     pub(super) law: SizeDistribution,
@@ -105,8 +123,10 @@ impl Ground {
         stream: &Stream,
     ) -> Result<Self> {
         check(desc, maps.len(), site)?;
-        let relief = Relief::new(&desc.relief, *site, stream);
+        let slaked = slaked(desc, stream);
+        let relief = Relief::new(&desc.relief, slaked, *site, stream);
         let blend = Blend::new(&desc.blend, &desc.layers, stream).with_crust(desc.crust);
+        let blend = if slaked > 0.0 { blend.flattened(1.0 - SLAKED_RELIEF * slaked) } else { blend };
         let law = SizeDistribution::new(&desc.clods, stream);
         let grid = Grid::new(site);
         let mut ground = Self {
@@ -118,10 +138,12 @@ impl Ground {
             color: ColorTransform::draw(colors, &maps[0], &mut stream.child(Purpose::Soil, 40)),
             pigments: Pigments::new(&desc.pigments, stream),
             sizes: site.sizes(desc),
-            crumbs_amount: desc.crumbs.amount.draw32(&mut stream.child(Purpose::Soil, 20)),
+            crumbs_amount: crumbs_amount(desc, stream),
             stream: stream.clone(),
             step: site.grid_m,
             shape: relief,
+            cracks: Cracks::draw(&desc.cracks, stream),
+            slaked,
             moisture: MoistureRecord {
                 mean: desc.moisture.mean.draw32(&mut stream.child(Purpose::Soil, 30)),
                 spread: desc.moisture.spread.draw32(&mut stream.child(Purpose::Soil, 31)),
@@ -144,6 +166,8 @@ impl Ground {
             heights: Vec::new(),
             slopes: Vec::new(),
             shape: self.shape.clone(),
+            cracks: self.cracks.clone(),
+            slaked: self.slaked,
             fine: FineGridPoint::default(),
             blend: self.blend.clone(),
             law: self.law.clone(),
@@ -189,7 +213,9 @@ impl Ground {
             // Elongated cells would turn fine heights into furrows.
             let fade = (2.0 * ground.step / cell).min(1.0);
             let height = ground.shape.height(p, cell) + detail * fade * fade;
-            (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * ground.shape.left(p))))
+            // Half of the clods that are pressed flat are still visible.
+            let left = 0.5 + 0.5 * ground.shape.left(p);
+            (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * left)))
         };
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
         for first in (0..rows).step_by(BLOCK_ROWS) {
@@ -206,11 +232,11 @@ impl Ground {
         }
     }
 
-    /// Adds crumbs to the heights of the fine grid.
+    /// Adds crumbs and cracks to the heights of the fine grid.
     fn scatter_debris(&mut self) {
-        let crumbs = self.crumbs(self.raster(), 1.0);
+        let small = self.small_relief(self.crumbs(self.raster(), 1.0).height, self.raster());
         let columns = self.grid.columns();
-        for (k, h) in crumbs.height.iter().enumerate() {
+        for (k, h) in small.iter().enumerate() {
             let (i, j) = (k % self.fine_columns(), k / self.fine_columns());
             // The outermost vertices are shared with the coarse ground, which has no crumbs.
             let inner = i > 0 && j > 0 && i < self.grid.x.steps && j < self.grid.y.steps;
@@ -221,12 +247,20 @@ impl Ground {
         }
     }
 
+    /// Returns the heights of crumbs with those of cracks, at the samples of a raster.
+    pub(super) fn small_relief(&self, mut crumbs: Vec<f32>, raster: Raster) -> Vec<f32> {
+        if let Some(cracks) = &self.cracks {
+            crumbs.iter_mut().zip(cracks.heights(raster)).for_each(|(height, crack)| *height += crack);
+        }
+        crumbs
+    }
+
     /// Rasterizes the crumbs on any raster. `laid` is the fraction of the unresolved clods that is included.
     pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
         let Sizes { drawn, unseen, .. } = self.sizes;
-        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, gain: |_| 0.0, dry: 1.0 };
-        let clods = |mm, amount| SizeRange { mm, amount, gain: mean_gain, dry: CLODS_DRY };
+        let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, dry: 1.0 };
+        let clods = |mm, amount| SizeRange { mm, amount, dry: CLODS_DRY };
         let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
         let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
         Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
@@ -295,6 +329,8 @@ impl Ground {
             blend_scale_m,
             blend_sharpness,
             relief: self.shape.record.clone(),
+            slaked: self.slaked,
+            cracks: self.cracks.as_ref().map(Cracks::record),
             clods: ClodsRecord {
                 over_5mm_per_m2: self.law.over_pivot,
                 exponent: self.law.exponent,

@@ -1,20 +1,43 @@
 //! Straw, sticks and bits of dead plants.
 //!
 //! All are sweeps of a closed cross-section along a bent path. A straw is a split stalk with a thick arc as its
-//! section; a stick is tapered and round with stubs; a bit is a flat lens that curls. The path is fitted to the pile:
-//! stiff pieces bridge hollows and touch the ground only in places.
+//! section; a stick is tapered and round with stubs; a bit is a flat lens that curls, a thread of root or a crumb of
+//! charcoal. The path is fitted to the pile: stiff pieces bridge hollows and touch the ground only in places. Straw lies in
+//! mats, where its density is log-normal noise; stubble stands in the rows of the harvested crop.
 
 use super::record::LitterRecord;
 use super::{Debris, DebrisKind, Ground, LitterDesc, Pile, Rect, cell_stream, cells, residue};
 use furrow_base::geometry::{Cost, Mesh};
-use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, vec2};
+use furrow_base::math::{RoundTo, Spectrum, ToFloat, ToInt, Vec2, Vec3, lerp, vec2};
 use furrow_base::ron_file::{Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_optics::texture::noise::Perlin;
 use std::f32::consts::{PI, TAU};
 
 /// Reflectance of wood: measured bark. The bits are rotten leaves, redder and darker.
 const WOOD: Spectrum = Spectrum::new(0.22, 0.16, 0.12, 0.38);
 const ROTTEN: Spectrum = Spectrum::new(0.20, 0.09, 0.05, 0.32);
+/// Reflectance of dead roots, washed pale, and of charcoal: estimates.
+const ROOT: Spectrum = Spectrum::new(0.34, 0.26, 0.17, 0.46);
+const CHARCOAL: Spectrum = Spectrum::new(0.045, 0.042, 0.04, 0.06);
+
+/// Fractions of the bits that are roots and that are charcoal, and width of a root relative to its length.
+const ROOTS: f32 = 0.14;
+const COALS: f32 = 0.05;
+const THREAD: (f32, f32) = (0.03, 0.08);
+
+/// Standard deviation of [`Perlin::fbm2`] with three octaves and gain 0.5, and limit of the mats' noise, standard deviations.
+const FBM3_SD: f32 = 0.28;
+const MOST_MAT: f32 = 2.0;
+
+/// Stalks of one cereal plant, distance between them and from the row's line, and depth of their foot, metres.
+const TILLERS: (f32, f32) = (1.0, 4.0);
+const TUFT_M: f32 = 0.006;
+const ROW_M: f32 = 0.012;
+const FOOT_M: f32 = 0.003;
+/// Standard deviation of the stubble's lean, and number of points along a stalk.
+const LEAN: f32 = 0.25;
+const STALK_POINTS: usize = 4;
 
 /// Number of segments of the wall of straw and bits along its arc, and of vertices around sticks and stubs.
 const PARTS: u8 = 6;
@@ -103,12 +126,14 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
     let drawn = LitterRecord::draw(desc, stream);
     let resolved_mm = ground.sizes.resolved_mm;
     let straws = straws_per_m2(desc, &drawn, stream);
+    let mats = Mats::draw(desc, stream);
     for (kind, per_m2, k) in [
         (DebrisKind::Stick, drawn.sticks_per_m2, 4),
         (DebrisKind::Straw, straws, 5),
         (DebrisKind::Bit, drawn.bits_per_m2, 6),
     ] {
-        for (at, mut s) in places(ground.area(), per_m2, &child(k)) {
+        let density = |p: Vec2| if kind == DebrisKind::Straw { mats.density(p) } else { 1.0 };
+        for (at, mut s) in places(ground.area(), per_m2, density, &child(k)) {
             if pile.given_up() {
                 break;
             }
@@ -118,6 +143,58 @@ pub fn litter(desc: &LitterDesc, ground: &Ground, pile: &mut Pile, stream: &Stre
                 _ => bit(desc, (drawn.weathering, resolved_mm), pile, at, &mut s),
             };
             all.push(Debris { dust: desc.dust.draw32(&mut s), ..thing });
+        }
+    }
+    all.extend(stubble(desc, &drawn, resolved_mm, pile, stream));
+    all
+}
+
+/// Mats of straw.
+struct Mats {
+    noise: Perlin,
+    clustering: f32,
+    size_m: f32,
+}
+
+impl Mats {
+    fn draw(desc: &LitterDesc, stream: &Stream) -> Self {
+        Self {
+            noise: Perlin::new(own(stream, 9).seed32()),
+            clustering: desc.straw_clustering.draw32(&mut own(stream, 10)),
+            size_m: desc.straw_mat_m.draw32(&mut own(stream, 11)),
+        }
+    }
+
+    /// Returns the density of straw at a point relative to its mean.
+    fn density(&self, p: Vec2) -> f32 {
+        let q = p / self.size_m + 0.43;
+        let noise = self.noise.fbm2(f64::from(q.x), f64::from(q.y), 3, 0.5).to_f32() / FBM3_SD;
+        (self.clustering * noise.clamp(-MOST_MAT, MOST_MAT) - 0.5 * self.clustering * self.clustering).exp()
+    }
+}
+
+/// Places stubble: tufts of cut stalks in rows with a random direction.
+fn stubble(desc: &LitterDesc, drawn: &LitterRecord, resolved_mm: f32, pile: &mut Pile, stream: &Stream) -> Vec<Debris> {
+    let mut all = Vec::new();
+    if drawn.stubble_per_m2 <= 0.0 {
+        return all;
+    }
+    let mut field = own(stream, 12);
+    let across = Vec2::from_angle(field.range32(0.0, PI));
+    let apart = desc.stubble_rows_m.draw32(&mut field);
+    let offset = apart * field.uniform32();
+    let tillers = 0.5 * (TILLERS.0 + TILLERS.1);
+    for (at, mut s) in places(pile.area(), drawn.stubble_per_m2 / tillers, |_| 1.0, &own(stream, 13)) {
+        if pile.given_up() {
+            break;
+        }
+        let aside = at.dot(across) - offset;
+        let line = at + across * (apart * (aside / apart).round() - aside + ROW_M * s.normal().to_f32());
+        for _ in 0..s.range32(TILLERS.0, TILLERS.1 + 1.0).trunc_to::<u8>() {
+            let foot = line + vec2(s.normal().to_f32(), s.normal().to_f32()) * TUFT_M;
+            if pile.area().contains(foot) {
+                all.push(stalk(desc, (drawn.weathering, resolved_mm), pile, foot, &mut s));
+            }
         }
     }
     all
@@ -131,9 +208,9 @@ fn straws_per_m2(desc: &LitterDesc, drawn: &LitterRecord, stream: &Stream) -> f3
     -(1.0 - drawn.straw_cover.min(0.95)).ln() / one
 }
 
-/// Estimates the costs of straw, sticks and bits on `area`, a fraction `made` of which gets meshes; `resolved_mm` is the
+/// Estimates the costs of straw, sticks, bits and stubble on `area`, a fraction `made` of which gets meshes; `resolved_mm` is the
 /// smallest resolved length, mm.
-pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f32, stream: &Stream) -> [Cost; 3] {
+pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f32, stream: &Stream) -> [Cost; 4] {
     let drawn = LitterRecord::draw(desc, stream);
     let s = own(stream, 8);
     let mean = |of: &dyn Fn(&mut Stream) -> usize| {
@@ -150,6 +227,10 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
         swept(detail.points(points), detail.corners(ROUND).into())
     });
     let stubs = mean(&|s| desc.stubs.draw(s).trunc_to::<usize>()) * swept(STUB_POINTS, STUB.into()).to_f64();
+    let stalk = mean(&|s| {
+        let detail = Detail::of(desc.straw_width_mm.draw32(s), resolved_mm);
+        swept(STALK_POINTS, detail.arc())
+    });
     let bit = mean(&|s| {
         let detail = Detail::of(0.3 * desc.bit_mm.draw32(s), resolved_mm);
         swept(detail.points(BIT_POINTS), detail.arc())
@@ -160,13 +241,15 @@ pub(super) fn costs(desc: &LitterDesc, (area, made): (Rect, f64), resolved_mm: f
         Cost::work(0.0, HEAP_SECONDS * cells * points.to_f64() * number)
     };
     let on_it = f64::from(area.area());
-    let [straws, sticks, bits] =
-        [straws_per_m2(desc, &drawn, stream), drawn.sticks_per_m2, drawn.bits_per_m2].map(|n| on_it * f64::from(n));
+    let [straws, sticks, bits, stalks] =
+        [straws_per_m2(desc, &drawn, stream), drawn.sticks_per_m2, drawn.bits_per_m2, drawn.stubble_per_m2]
+            .map(|n| on_it * f64::from(n));
     let widest = |width: &Vary<Positive<1000>>| width.usual().1;
     [
         Cost::of(straw, 1.0) * (straws * made) + heaps(widest(&desc.straw_width_mm), 24, straws),
         Cost::of(stick + stubs, 1.0) * (sticks * made) + heaps(widest(&desc.stick_width_mm), 32, sticks),
         Cost::of(bit, 1.0) * (bits * made),
+        Cost::of(stalk, 1.0) * (stalks * made),
     ]
 }
 
@@ -182,16 +265,20 @@ impl LitterRecord {
             straw_cover: desc.straw_cover.draw32(&mut own(stream, 2)),
             sticks_per_m2: desc.sticks_per_m2.draw32(&mut own(stream, 0)),
             bits_per_m2: desc.bits_per_m2.draw32(&mut own(stream, 3)),
+            stubble_per_m2: desc.stubble_per_m2.draw32(&mut own(stream, 8).child(Purpose::Page, 0)),
             weathering: desc.weathering.draw32(&mut own(stream, 7)),
         }
     }
 }
 
-fn places(area: Rect, per_m2: f32, stream: &Stream) -> Vec<(Vec2, Stream)> {
+/// Draws the places of pieces, with the random stream of each. `density` returns their density at a point relative to the
+/// mean `per_m2`.
+fn places(area: Rect, per_m2: f32, density: impl Fn(Vec2) -> f32, stream: &Stream) -> Vec<(Vec2, Stream)> {
     let mut all = Vec::new();
     for (i, j) in cells(area, CELL_M) {
         let mut cell = cell_stream(stream, i, j);
-        for k in 0..cell.poisson(f64::from(per_m2 * CELL_M * CELL_M)) {
+        let here = per_m2 * density(vec2(i.to_f32() + 0.5, j.to_f32() + 0.5) * CELL_M);
+        for k in 0..cell.poisson(f64::from(here * CELL_M * CELL_M)) {
             let mut s = cell.child(Purpose::Debris, k);
             let at = (vec2(i.to_f32(), j.to_f32()) + vec2(s.uniform32(), s.uniform32())) * CELL_M;
             if area.contains(at) {
@@ -323,6 +410,23 @@ fn straw(
     debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s)
 }
 
+/// Builds a standing stalk: an open tube, cut off at the top.
+fn stalk(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &Pile, at: Vec2, s: &mut Stream) -> Debris {
+    let length = desc.stubble_mm.draw32(s) * 1e-3;
+    let width = desc.straw_width_mm.draw32(s) * 1e-3;
+    let detail = Detail::of(1e3 * width, resolved_mm);
+    let lean = Vec2::from_angle(s.range32(0.0, TAU)) * (LEAN * s.normal().to_f32().abs() + 0.02);
+    let foot = at.extend(pile.at(at) - FOOT_M);
+    let point = |k: usize| {
+        let t = k.to_f32() / (STALK_POINTS - 1).to_f32();
+        foot + (lean * t * (0.7 + 0.3 * t)).extend(t) * length
+    };
+    let path: Vec<Vec3> = (0..STALK_POINTS).map(point).collect();
+    let section = arc(5.6, 0.2, detail.parts());
+    let mesh = sweep(&path, &section, |_| Vec2::splat(0.5 * width), 0.0);
+    Debris { centre: foot, ..debris(DebrisKind::Straw, mesh, tone(weathering, s), &path, s) }
+}
+
 fn stick(desc: &LitterDesc, resolved_mm: f32, pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.stick_mm.draw32(s) * 1e-3;
     let half = 0.5e-3 * desc.stick_width_mm.draw32(s);
@@ -350,12 +454,15 @@ fn stick(desc: &LitterDesc, resolved_mm: f32, pile: &mut Pile, at: Vec2, s: &mut
 
 fn bit(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &mut Pile, at: Vec2, s: &mut Stream) -> Debris {
     let length = desc.bit_mm.draw32(s) * 1e-3;
-    let half = 0.5 * length * s.range32(0.12, 0.5);
+    let kind = s.child(Purpose::Debris, 1).uniform32();
+    let (root, coal) = (kind < ROOTS, kind >= 1.0 - COALS);
+    let wide = s.range32(0.12, 0.5);
+    let half = 0.5 * length * if root { lerp(THREAD.0, THREAD.1, wide) } else { wide };
     let detail = Detail::of(2e3 * half, resolved_mm);
-    let points = path(at, length, 0.5, BIT_POINTS, s);
+    let points = path(at, length, if root { 1.6 } else { 0.5 }, BIT_POINTS, s);
     let mut path = lay(&points, 1e-4, 0.6, pile);
     // Dry leaves curl up at both ends.
-    let curl = length * s.range32(0.0, 0.25);
+    let curl = length * s.range32(0.0, 0.25) * if coal { 0.0 } else { 1.0 };
     for (i, p) in path.iter_mut().enumerate() {
         p.z += curl * (i.to_f32() / 2.5 - 1.0).powi(2);
     }
@@ -370,7 +477,13 @@ fn bit(desc: &LitterDesc, (weathering, resolved_mm): (f32, f32), pile: &mut Pile
         0.8 * s.normal().to_f32(),
     );
     let stalk = s.chance(0.3);
-    debris(DebrisKind::Bit, mesh, if stalk { tone(weathering, s) } else { ROTTEN }, &path, s)
+    let albedo = match (root, coal) {
+        (true, _) => ROOT,
+        (_, true) => CHARCOAL,
+        _ if stalk => tone(weathering, s),
+        _ => ROTTEN,
+    };
+    debris(DebrisKind::Bit, mesh, albedo, &path, s)
 }
 
 /// Returns the reflectance of a piece of straw; `s` is the piece's random stream.
@@ -387,6 +500,20 @@ fn raise(pile: &mut Pile, path: &[Vec3], half: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Expected: mats keep the mean density of straw within 15 %; with a clustering of 1 the
+    /// densest tenth of the ground has 1.8 times the mean or more, and the barest less than a third.
+    #[test]
+    fn straw_lies_in_mats() {
+        let desc = LitterDesc { straw_clustering: Vary::fixed(1.0), ..LitterDesc::default() };
+        let mats = Mats::draw(&desc, &Stream::of(3, 0, Purpose::Test, 0));
+        let mut all: Vec<f32> =
+            (0..10_000).map(|k| mats.density(vec2((k % 100).to_f32(), (k / 100).to_f32()) * 0.13)).collect();
+        let mean = all.iter().sum::<f32>() / 10_000.0;
+        all.sort_by(f32::total_cmp);
+        assert!((mean - 1.0).abs() < 0.15, "{mean}");
+        assert!(all[9_000] > 1.8 && all[1_000] < 0.3, "{} {}", all[9_000], all[1_000]);
+    }
 
     #[test]
     fn swept_bodies_are_closed_and_face_outward() {

@@ -15,6 +15,7 @@ mod body;
 mod canopy;
 mod clod;
 mod color;
+mod crack;
 mod crumb;
 mod debris;
 mod desc;
@@ -37,11 +38,13 @@ mod stone_cover;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod tool;
 mod wheel;
 
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
 pub use color::SoilColor;
+pub use crack::{CracksDesc, CracksRecord};
 pub use debris::{Debris, DebrisKind};
 pub use desc::{
     BlendDesc, ClodsDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
@@ -59,6 +62,7 @@ pub use record::{
 };
 pub use site::{FULL_CELL_M, FULL_TEXEL_M, SeedRows, Site};
 pub use stone::stones;
+pub use tool::{ToolDesc, ToolRecord};
 pub use wheel::WheelDesc;
 
 pub use furrow_optics::texture::ground::MAX_LAYERS;

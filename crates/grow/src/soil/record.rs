@@ -1,5 +1,6 @@
 //! Record of the drawn parameters of a ground.
 
+use super::{CracksRecord, ToolRecord};
 use furrow_base::math::Spectrum;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,12 @@ pub struct SoilRecord {
     pub blend_sharpness: f32,
     /// Relief.
     pub relief: ReliefRecord,
+    /// Effect of rain since the last tillage, 0..1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub slaked: f32,
+    /// Cracks; `None` if there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cracks: Option<CracksRecord>,
     /// Soil aggregates.
     pub clods: ClodsRecord,
     /// Fraction of the ground covered by stones, for each population.
@@ -64,8 +71,8 @@ pub struct WheelRecord {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
-fn is_zero(metres: &f32) -> bool {
-    *metres == 0.0
+fn is_zero(value: &f32) -> bool {
+    *value == 0.0
 }
 
 /// Relief of one ground.
@@ -84,6 +91,9 @@ pub struct ReliefRecord {
     /// Wheel tracks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wheels: Vec<WheelRecord>,
+    /// Marks of tools over the whole ground.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tools: Vec<ToolRecord>,
     /// Press wheel imprint along the rows; `None` if nothing was sown.
     pub row: Option<RowReliefRecord>,
 }
@@ -97,6 +107,9 @@ pub struct RowReliefRecord {
     pub width_mm: f32,
     /// Height of the ridge.
     pub ridge_mm: f32,
+    /// Fraction of roughness and clods that is pressed flat in the furrow.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pressed: f32,
 }
 
 /// Aggregates of one ground: the number longer than L is proportional to L^−exponent.
@@ -121,6 +134,9 @@ pub struct ClodsRecord {
 pub struct LitterRecord {
     /// Fraction of the ground covered by straw.
     pub straw_cover: f32,
+    /// Number of standing stalks per m².
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub stubble_per_m2: f32,
     /// Number of sticks per m².
     pub sticks_per_m2: f32,
     /// Number of bits of dead leaves and roots per m².

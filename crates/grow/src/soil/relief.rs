@@ -4,6 +4,7 @@
 //! noise from the longest wavelength down, each with 2^−H times the amplitude of the one before, give both.
 
 use super::record::{ReliefRecord, RowReliefRecord};
+use super::tool::Tool;
 use super::wheel::Wheel;
 use super::{ReliefDesc, Site};
 use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, smoothstep, vec2};
@@ -24,6 +25,9 @@ const EXTREME_IN_TRACK: f32 = 0.4;
 const DEEP: f32 = 1.25;
 const SHOULDER: f32 = 0.2;
 
+/// Wavelength below which rain smooths the relief, metres.
+const SLAKED_M: f32 = 0.05;
+
 /// Shortest wavelength that contributes to the height, so that the requested height means the same at every grid
 /// spacing.
 const SHORTEST_M: f32 = 0.001;
@@ -40,6 +44,9 @@ pub(super) struct Relief {
     level_m: f32,
     rows: Option<Rows>,
     wheels: Vec<Wheel>,
+    tools: Vec<Tool>,
+    /// Effect of rain since the last tillage, 0..1.
+    slaked: f32,
     /// Record of the drawn parameters.
     pub(super) record: ReliefRecord,
 }
@@ -52,12 +59,24 @@ struct Rows {
     depth: f32,
     half_width: f32,
     ridge: f32,
+    /// Fraction of roughness and clods that is pressed flat in the furrow.
+    pressed: f32,
     /// Factor on the wandering of the edges: 1, or 0 to test the profile.
     wander: f32,
 }
 
+/// Position relative to the nearest seed row.
+#[derive(Clone, Copy)]
+struct Aside {
+    /// Distance from its line, metres.
+    distance: f32,
+    /// Degree to which the press wheel has pressed the ground: 1 on the furrow's floor, 0 outside.
+    print: f32,
+}
+
 impl Relief {
-    pub(super) fn new(desc: &ReliefDesc, Site { rows, level_m, .. }: Site, stream: &Stream) -> Self {
+    /// Draws the relief of a ground; `slaked` is the effect of rain since the last tillage, 0..1.
+    pub(super) fn new(desc: &ReliefDesc, slaked: f32, Site { rows, level_m, .. }: Site, stream: &Stream) -> Self {
         let child = |k| stream.child(Purpose::Soil, k);
         let hurst = desc.hurst.draw32(&mut child(1));
         let gain = 2f32.powf(-hurst);
@@ -73,10 +92,14 @@ impl Relief {
             depth_mm: desc.row.depth_mm.draw32(&mut child(5)),
             width_mm: desc.row.width_mm.draw32(&mut child(6)),
             ridge_mm: desc.row.ridge_mm.draw32(&mut child(7)),
+            pressed: desc.row.pressed.draw32(&mut child(8)),
         });
         let (across, offset) = rows.map_or((Vec2::X, 0.0), |r| (vec2(r.azimuth.cos(), -r.azimuth.sin()), r.offset_m));
         let wheels: Vec<Wheel> = (desc.wheels.iter().enumerate())
             .map(|(k, wheel)| Wheel::draw(wheel, across, offset, &mut child(50 + k.to_u64())))
+            .collect();
+        let tools: Vec<Tool> = (desc.tools.iter().enumerate())
+            .map(|(k, tool)| Tool::draw(tool, across, &mut child(80 + k.to_u64())))
             .collect();
         Self {
             noise: Perlin::new(child(0).seed32()),
@@ -93,6 +116,7 @@ impl Relief {
                 half_width: row.width_mm * 0.5e-3,
                 wander: 1.0,
                 ridge: row.ridge_mm * 1e-3,
+                pressed: row.pressed,
             }),
             record: ReliefRecord {
                 rms_mm,
@@ -101,9 +125,12 @@ impl Relief {
                 tilt_deg,
                 tilt_azimuth_deg: tilt.x.atan2(tilt.y).to_degrees().rem_euclid(360.0),
                 wheels: wheels.iter().map(Wheel::record).collect(),
+                tools: tools.iter().map(Tool::record).collect(),
                 row,
             },
             wheels,
+            tools,
+            slaked,
         }
     }
 
@@ -122,6 +149,10 @@ impl Relief {
             let shoulder = SHOULDER * rows.depth + EXTREME_IN_FURROW * sd;
             above = above.max(shoulder) + rows.ridge;
         }
+        for (groove, ridge) in self.tools.iter().map(Tool::departs) {
+            below += groove;
+            above += ridge;
+        }
         for (track, rim) in self.wheels.iter().map(Wheel::departs) {
             below = below.max(track + EXTREME_IN_TRACK * sd);
             above = above.max(rim + EXTREME * sd);
@@ -133,11 +164,22 @@ impl Relief {
     pub(super) fn height(&self, p: Vec2, cell: f32) -> f32 {
         let tracks: f32 = self.wheels.iter().map(|w| w.height(p)).sum();
         let tilted = p * (self.level_m / p.length().max(f32::MIN_POSITIVE)).min(1.0);
-        self.tilt.dot(tilted) + self.left(p) * (self.fbm(p, cell) + self.row(p)) + tracks
+        let aside = self.rows.as_ref().map(|rows| (rows, self.aside(rows, p)));
+        let tools: f32 = self.tools.iter().map(|tool| tool.height(p, cell)).sum();
+        let flat = aside.map_or(1.0, |(rows, aside)| 1.0 - rows.pressed * aside.print);
+        let rough = self.tools.iter().map(Tool::left).product::<f32>() * self.fbm(p, cell) + tools;
+        let row = aside.map_or(0.0, |(rows, aside)| self.row(rows, aside, p));
+        self.tilt.dot(tilted) + self.wheels_left(p) * (flat * rough + row) + tracks
     }
 
-    /// Returns the fraction of roughness and clods that wheels have left.
+    /// Returns the fraction of roughness and clods that wheels, press wheels and tools have left.
     pub(super) fn left(&self, p: Vec2) -> f32 {
+        let pressed = self.rows.as_ref().filter(|rows| rows.pressed > 0.0);
+        let row = pressed.map_or(1.0, |rows| 1.0 - rows.pressed * self.aside(rows, p).print);
+        self.wheels_left(p) * row * self.tools.iter().map(Tool::left).product::<f32>()
+    }
+
+    fn wheels_left(&self, p: Vec2) -> f32 {
         self.wheels.iter().map(|w| w.left(p)).product()
     }
 
@@ -146,7 +188,8 @@ impl Relief {
         let (mut sum, mut amplitude, mut wavelength, mut shift) = (0.0, self.amplitude, self.longest, 0.31);
         while wavelength >= shortest {
             let at = |c: f32, by: f64| f64::from(c) / f64::from(wavelength) + by;
-            sum += amplitude * self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32();
+            let kept = 1.0 - self.slaked * (-wavelength / SLAKED_M).exp();
+            sum += amplitude * kept * self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32();
             amplitude *= self.gain;
             wavelength *= 0.5;
             shift += 17.31;
@@ -154,22 +197,27 @@ impl Relief {
         sum
     }
 
-    fn row(&self, p: Vec2) -> f32 {
-        let Some(rows) = &self.rows else { return 0.0 };
-        // The edges wander by a few millimetres and the depth varies along the row.
-        let wander = |wavelength: f32, shift: f64| {
-            let at = |c: f32, by: f64| f64::from(c / wavelength) + by;
-            self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32()
-        };
-        let d = (p.dot(rows.across) - rows.offset
-            + rows.wander * (0.012 * wander(0.07, 201.7) + 0.006 * wander(0.025, 307.1)))
-            / rows.spacing;
-        let d = (d - d.round()).abs() * rows.spacing;
-        // Imprint of the press wheel: a flat floor, soft shoulders, and a little soil pushed up beside it.
-        let print = 1.0 - smoothstep(0.1 * rows.half_width, 1.1 * rows.half_width, d);
-        let shoulder = (-((d - 1.3 * rows.half_width) / (0.4 * rows.half_width)).powi(2)).exp();
-        let ridge = 0.5 + 0.5 * (std::f32::consts::TAU * d / rows.spacing).cos();
-        let depth = rows.depth * (1.0 + 0.5 * rows.wander * wander(0.15, 401.3));
+    /// Returns noise of the wavelength at a point, by which rows wander.
+    fn wander(&self, p: Vec2, wavelength: f32, shift: f64) -> f32 {
+        let at = |c: f32, by: f64| f64::from(c / wavelength) + by;
+        self.noise.at2(at(p.x, shift), at(p.y, -shift)).to_f32()
+    }
+
+    fn aside(&self, rows: &Rows, p: Vec2) -> Aside {
+        // The edges wander by a few millimetres.
+        let wander = 0.012 * self.wander(p, 0.07, 201.7) + 0.006 * self.wander(p, 0.025, 307.1);
+        let d = (p.dot(rows.across) - rows.offset + rows.wander * wander) / rows.spacing;
+        let distance = (d - d.round()).abs() * rows.spacing;
+        // Imprint of the press wheel: a flat floor with soft shoulders.
+        Aside { distance, print: 1.0 - smoothstep(0.1 * rows.half_width, 1.1 * rows.half_width, distance) }
+    }
+
+    fn row(&self, rows: &Rows, Aside { distance, print }: Aside, p: Vec2) -> f32 {
+        // A little soil is pushed up beside the furrow.
+        let shoulder = (-((distance - 1.3 * rows.half_width) / (0.4 * rows.half_width)).powi(2)).exp();
+        let ridge = 0.5 + 0.5 * (std::f32::consts::TAU * distance / rows.spacing).cos();
+        // The depth varies along the row.
+        let depth = rows.depth * (1.0 + 0.5 * rows.wander * self.wander(p, 0.15, 401.3));
         depth * (SHOULDER * shoulder - print) + rows.ridge * ridge
     }
 }
@@ -198,7 +246,7 @@ mod tests {
     #[test]
     fn rms_height_is_the_one_asked_for() {
         for (seed, rms) in [(1, 4.0), (2, 9.0), (3, 30.0)] {
-            let relief = Relief::new(&desc(rms), site(None), &Stream::of(seed, 0, Purpose::Test, 0));
+            let relief = Relief::new(&desc(rms), 0.0, site(None), &Stream::of(seed, 0, Purpose::Test, 0));
             let heights: Vec<f32> = (0..40_000)
                 .map(|k| relief.height(vec2((k % 200).to_f32() * 0.0437, (k / 200).to_f32() * 0.0391), 0.0005))
                 .collect();
@@ -211,7 +259,7 @@ mod tests {
     #[test]
     fn the_seed_row_lies_deeper_than_its_shoulders() {
         let rows = SeedRows { spacing_m: 0.5, azimuth: 0.3, offset_m: 0.1 };
-        let mut relief = Relief::new(&desc(0.0), site(Some(rows)), &Stream::of(1, 0, Purpose::Test, 0));
+        let mut relief = Relief::new(&desc(0.0), 0.0, site(Some(rows)), &Stream::of(1, 0, Purpose::Test, 0));
         relief.rows.iter_mut().for_each(|r| r.wander = 0.0);
         let across = vec2(rows.azimuth.cos(), -rows.azimuth.sin());
         for row in -3..3 {

@@ -548,6 +548,57 @@ fn ground_is_dry_under_fines_and_moist_between_them() {
     assert!(under(MOISTURE_LEVELS - 1) < under(0) - 0.05, "{} {}", under(MOISTURE_LEVELS - 1), under(0));
 }
 
+/// Expected: on slaked ground the small relief has less than 40 % of the height, and fewer than half of the clods are left.
+#[test]
+fn rain_smooths_the_ground_and_buries_clods() {
+    let after = |slaked: f64| {
+        let mut page = page();
+        page.slaked = Vary::fixed(slaked);
+        page.clods.over_5mm_per_m2 = Vary::fixed(3000.0);
+        page.relief.rms_mm = Vary::fixed(0.0);
+        let ground = ground(&page, 0.15);
+        let detail = &ground.fine.detail;
+        let mean = detail.iter().sum::<f32>() / detail.len().to_f32();
+        let rms = (detail.iter().map(|h| (h - mean).powi(2)).sum::<f32>() / detail.len().to_f32()).sqrt();
+        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
+        let bodies: Vec<_> = whole_clods(&groups).into_iter().filter(|(_, body)| body.len() > 6).collect();
+        let top = |body: &[Vec3]| body.iter().map(|p| p.z - ground.height(p.x, p.y)).fold(0.0, f32::max);
+        let height = bodies.iter().map(|(_, body)| top(body)).sum::<f32>() / bodies.len().to_f32();
+        (rms, bodies.len(), height)
+    };
+    let (tilled, slaked) = (after(0.0), after(1.0));
+    assert!(slaked.0 < 0.4 * tilled.0, "{slaked:?} {tilled:?}");
+    assert!(slaked.1 * 2 < tilled.1 && slaked.1 > 20, "{slaked:?} {tilled:?}");
+}
+
+/// Expected: stubble has the number of stalks that was asked for within a fifth, stands on the ground, and lies along rows:
+/// across them, positions are within a quarter of the rows' distance.
+#[test]
+fn stubble_stands_in_rows() {
+    let mut page = page();
+    (page.litter.straw_cover, page.litter.sticks_per_m2) = (Vary::fixed(0.0), Vary::fixed(0.0));
+    page.litter.bits_per_m2 = Vary::fixed(0.0);
+    page.litter.stubble_per_m2 = Vary::fixed(300.0);
+    page.litter.stubble_rows_m = Vary::fixed(0.2);
+    let ground = ground(&page, 0.5);
+    let all = litter(&page.litter, &ground, &mut Pile::new(&ground), &stream());
+    assert!((240..360).contains(&all.len()), "{}", all.len());
+    for stalk in &all {
+        let above = |p: &Vec3| p.z - ground.height(stalk.centre.x, stalk.centre.y);
+        let (lo, hi) =
+            stalk.mesh.positions.iter().map(above).fold((f32::MAX, f32::MIN), |(l, h), z| (l.min(z), h.max(z)));
+        assert!(lo < 0.0 && hi > 0.03, "{lo} {hi}");
+    }
+    // Resultant length of the phases across the best of 180 directions.
+    let along = |degrees: i32| {
+        let across = Vec2::from_angle(degrees.to_f32().to_radians());
+        let turn = |stalk: &Debris| Vec2::from_angle(std::f32::consts::TAU * stalk.centre.truncate().dot(across) / 0.2);
+        all.iter().map(turn).sum::<Vec2>().length() / all.len().to_f32()
+    };
+    let best = (0..180).map(along).fold(0.0, f32::max);
+    assert!(best > 0.7, "{best}");
+}
+
 /// Rationale: grains of many colours make a clod look like a rock. Expected: the colour within a clod has less than half of
 /// the variation between crumbs on the ground.
 #[test]

@@ -42,7 +42,7 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
     let many = |cover: f64, smallest: f64| cover * area / (0.6 * smallest * smallest);
     let crumbs = many(recipe.crumbs.cover.get(), recipe.crumbs.smallest_mm.get());
     let (pieces, plates) = match recipe.ground {
-        Ground::Dirt => (0.0, 0.0),
+        Ground::Dirt | Ground::Crust => (0.0, 0.0),
         Ground::Stony { cover, smallest_mm, .. } => (many(cover.get(), smallest_mm.get()), 0.0),
         Ground::Cracked { plate_mm, .. } => (many(FRAGMENTS.0.into(), FRAGMENTS.1.into()), period / plate_mm.get()),
     };
@@ -64,6 +64,10 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
         Ground::Dirt | Ground::Stony { .. } => {
             tile.crumbs(recipe);
             tile.dust();
+        }
+        Ground::Crust => {
+            tile.crumbs(recipe);
+            tile.slake();
         }
         Ground::Cracked { plate_mm, crack_mm, depth_mm } => {
             tile.crumbs(recipe);

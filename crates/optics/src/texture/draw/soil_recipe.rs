@@ -95,6 +95,8 @@ impl Default for Litter {
 pub enum Ground {
     /// Crumbs everywhere: a fresh seedbed.
     Dirt,
+    /// Crust, slaked by rain, without cracks: `cracks` of a scene file break it.
+    Crust,
     /// Crust, slaked by rain and cracked by drying.
     Cracked {
         /// Mean width of the plates, mm.
