@@ -240,6 +240,7 @@ fn little_known(numbers: [u32; 2]) -> (tempfile::TempDir, PathBuf, Sample) {
             source: Some("photo.jpg".into()),
             split: recipe.split.of(2),
             capture: None,
+            light: None,
             width: 4,
             height: 2,
             classes: Vec::new(),

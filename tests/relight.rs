@@ -9,6 +9,7 @@ use crate::common::dataset::{fail, make, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, run, scratch, trace};
 use furrow_dataset::Set;
 use furrow_dataset::make::timing_log;
+use furrow_dataset::read::native::Files;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
