@@ -11,13 +11,12 @@
 
 use super::crumb::Raster;
 use super::pigments::quantile;
-use super::{Rect, cell_stream, cells};
+use super::record::CracksRecord;
+use super::{CracksDesc, Rect, cell_stream, cells};
 use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, lerp, smoothstep, vec2};
-use furrow_base::ron_file::{Fraction, NonNegative, Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_optics::texture::noise::Perlin;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Side of a tile, plates.
 const TILE: f32 = 6.0;
@@ -52,55 +51,6 @@ const WALL: f32 = 0.4;
 const NARROWEST: f32 = 1.5;
 /// Approximate number of bands of a raster that are computed in parallel.
 const BANDS: usize = 32;
-
-/// Cracks of a dried crust.
-///
-/// ```
-/// use furrow_grow::soil::SoilDesc;
-/// assert!(ron::from_str::<SoilDesc>("(cracks: (cover: 0.6, plate_mm: Uniform(40, 120)))").is_ok());
-/// assert!(ron::from_str::<SoilDesc>("(cracks: (cover: 2))").is_err());
-/// ```
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct CracksDesc {
-    /// Fraction of the ground that is cracked, in patches; 0 for none.
-    pub cover: Vary<Fraction>,
-    /// Width of the plates between cracks: 20–50 in a thin crust, 50–150 in loam, more in clay.
-    pub plate_mm: Vary<Positive<10_000>>,
-    /// Width of the oldest cracks; the youngest are about a third as wide.
-    pub width_mm: Vary<NonNegative<1000>>,
-    /// Depth of the oldest cracks.
-    pub depth_mm: Vary<NonNegative<1000>>,
-    /// Height of the plates' rims above their middle.
-    pub curl_mm: Vary<NonNegative<100>>,
-}
-
-impl Default for CracksDesc {
-    fn default() -> Self {
-        Self {
-            cover: Vary::fixed(0.0),
-            plate_mm: Vary::uniform(40.0, 90.0),
-            width_mm: Vary::uniform(1.5, 4.0),
-            depth_mm: Vary::uniform(8.0, 20.0),
-            curl_mm: Vary::uniform(0.0, 0.8),
-        }
-    }
-}
-
-/// Cracks of one ground.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CracksRecord {
-    /// Fraction of the ground that is cracked.
-    pub cover: f32,
-    /// Width of the plates.
-    pub plate_mm: f32,
-    /// Width of the oldest cracks.
-    pub width_mm: f32,
-    /// Depth of the oldest cracks.
-    pub depth_mm: f32,
-    /// Height of the plates' rims.
-    pub curl_mm: f32,
-}
 
 /// Cracks of one ground, in metres.
 #[derive(Clone, Debug)]

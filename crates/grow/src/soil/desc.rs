@@ -1,6 +1,6 @@
 //! Ground in a scene file: soil, clods, stones and litter.
 
-use super::{CracksDesc, PigmentsDesc, SoilColor, ToolDesc, WheelDesc};
+use super::{PigmentsDesc, SoilColor, ToolDesc, WheelDesc};
 use furrow_base::math::Spectrum;
 use furrow_base::ron_file::{Bound, Count, Fraction, NonNegative, Num, Positive, PositiveCount, RonFile, Signed, Vary};
 use furrow_optics::optics::Rock;
@@ -208,6 +208,40 @@ impl Default for RowReliefDesc {
             width_mm: Vary::uniform(45.0, 80.0),
             ridge_mm: Vary::fixed(0.0),
             pressed: Vary::uniform(0.0, 0.6),
+        }
+    }
+}
+
+/// Cracks of a dried crust.
+///
+/// ```
+/// use furrow_grow::soil::SoilDesc;
+/// assert!(ron::from_str::<SoilDesc>("(cracks: (cover: 0.6, plate_mm: Uniform(40, 120)))").is_ok());
+/// assert!(ron::from_str::<SoilDesc>("(cracks: (cover: 2))").is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CracksDesc {
+    /// Fraction of the ground that is cracked, in patches; 0 for none.
+    pub cover: Vary<Fraction>,
+    /// Width of the plates between cracks: 20–50 in a thin crust, 50–150 in loam, more in clay.
+    pub plate_mm: Vary<Positive<10_000>>,
+    /// Width of the oldest cracks; the youngest are about a third as wide.
+    pub width_mm: Vary<NonNegative<1000>>,
+    /// Depth of the oldest cracks.
+    pub depth_mm: Vary<NonNegative<1000>>,
+    /// Height of the plates' rims above their middle.
+    pub curl_mm: Vary<NonNegative<100>>,
+}
+
+impl Default for CracksDesc {
+    fn default() -> Self {
+        Self {
+            cover: Vary::fixed(0.0),
+            plate_mm: Vary::uniform(40.0, 90.0),
+            width_mm: Vary::uniform(1.5, 4.0),
+            depth_mm: Vary::uniform(8.0, 20.0),
+            curl_mm: Vary::uniform(0.0, 0.8),
         }
     }
 }

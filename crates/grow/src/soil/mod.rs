@@ -44,11 +44,10 @@ mod wheel;
 pub use canopy::Canopy;
 pub use clod::{Clods, clods};
 pub use color::SoilColor;
-pub use crack::{CracksDesc, CracksRecord};
 pub use debris::{Debris, DebrisKind};
 pub use desc::{
-    BlendDesc, ClodsDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc, RowReliefDesc, SoilDesc,
-    StonesDesc,
+    BlendDesc, ClodsDesc, CracksDesc, CrumbsDesc, LAYERS, LayerDesc, LitterDesc, MoistureDesc, ReliefDesc,
+    RowReliefDesc, SoilDesc, StonesDesc,
 };
 pub use envelope::Envelope;
 pub use estimate::{Expected, expected};
@@ -58,11 +57,12 @@ pub use litter::litter;
 pub use pigments::PigmentsDesc;
 pub use pile::Pile;
 pub use record::{
-    ClodsRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord, WheelRecord,
+    ClodsRecord, CracksRecord, LayerRecord, LitterRecord, MoistureRecord, ReliefRecord, RowReliefRecord, SoilRecord,
+    ToolRecord, WheelRecord,
 };
 pub use site::{FULL_CELL_M, FULL_TEXEL_M, SeedRows, Site};
 pub use stone::stones;
-pub use tool::{ToolDesc, ToolRecord};
+pub use tool::ToolDesc;
 pub use wheel::WheelDesc;
 
 pub use furrow_optics::texture::ground::MAX_LAYERS;

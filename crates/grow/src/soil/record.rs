@@ -1,6 +1,5 @@
 //! Record of the drawn parameters of a ground.
 
-use super::{CracksRecord, ToolRecord};
 use furrow_base::math::Spectrum;
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +72,34 @@ pub struct WheelRecord {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
 fn is_zero(value: &f32) -> bool {
     *value == 0.0
+}
+
+/// Marks of a tool on one ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ToolRecord {
+    /// Distance between grooves.
+    pub spacing_mm: f32,
+    /// Depth of the grooves.
+    pub depth_mm: f32,
+    /// Angle between the grooves and the rows.
+    pub angle_deg: f32,
+    /// Fraction of roughness and clods that is pressed flat.
+    pub pressed: f32,
+}
+
+/// Cracks of one ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CracksRecord {
+    /// Fraction of the ground that is cracked.
+    pub cover: f32,
+    /// Width of the plates.
+    pub plate_mm: f32,
+    /// Width of the oldest cracks.
+    pub width_mm: f32,
+    /// Depth of the oldest cracks.
+    pub depth_mm: f32,
+    /// Height of the plates' rims.
+    pub curl_mm: f32,
 }
 
 /// Relief of one ground.

@@ -1,5 +1,6 @@
 //! Marks of tools that were pulled over the whole ground: harrow tines, discs of a drill, rings of a roller.
 
+use super::record::ToolRecord;
 use furrow_base::math::{ToFloat, Vec2, vec2};
 use furrow_base::ron_file::{Fraction, NonNegative, Positive, Signed, Vary};
 use furrow_base::sampling::Stream;
@@ -33,19 +34,6 @@ impl Default for ToolDesc {
             pressed: Vary::fixed(0.0),
         }
     }
-}
-
-/// Marks of a tool on one ground.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ToolRecord {
-    /// Distance between grooves.
-    pub spacing_mm: f32,
-    /// Depth of the grooves.
-    pub depth_mm: f32,
-    /// Angle between the grooves and the rows.
-    pub angle_deg: f32,
-    /// Fraction of roughness and clods that is pressed flat.
-    pub pressed: f32,
 }
 
 /// Exponent of the grooves' profile: above 1, grooves are narrower than ridges. `MEAN` is the mean of the profile.
