@@ -108,8 +108,8 @@ const ALLOWED: &[(&str, &str)] = &[
     // Established implementations of image metrics.
     ("nv_flip", "compare/flip.rs"),
     ("palette", "compare/color.rs"),
-    // Label maps need lossless pixels; generated textures need 16 bits and text chunks.
-    ("png", "output/png.rs texture/draw/"),
+    // Label maps need lossless pixels; generated textures need 16 bits and text chunks; some programs store EXIF in those.
+    ("png", "output/png.rs texture/draw/ texture/orientation.rs"),
     // Tables of a dataset.
     ("parquet", "dataset/index/table.rs"),
     ("pollster", "raster/gpu.rs"),

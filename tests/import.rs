@@ -646,4 +646,8 @@ fn a_photograph_without_its_end_is_refused() {
         let words = refused(&out, &arguments);
         assert!(words.contains("a.jpg: this JPEG is cut short"), "{words}");
     }
+    // The masks of the whole photograph are read, but as soil alone.
+    let output = import(&out, &["--format", "masks", "--images", &fine, "--masks", &masks]);
+    let warned = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && warned.contains("no pixel of any image is crop or weed"), "{warned}");
 }

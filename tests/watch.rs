@@ -442,7 +442,9 @@ fn a_slider_is_a_look_until_it_is_written() {
     let written =
         events.until(|s| s["values"].as_object().is_some_and(|v| v.len() == 1) && s["picture"]["asked"] == s["asked"]);
     assert_eq!(written["picture"]["hash"], moved["picture"]["hash"], "the image must equal that of the slider");
-    assert_eq!(watched.post("write", &json!({ "path": "nothing", "value": 1 })).0, 400);
+    for path in ["nothing", "seed"] {
+        assert_eq!(watched.post("write", &json!({ "path": path, "value": 1 })).0, 400, "{path} has no slider");
+    }
     // An invalid value is not written to the file.
     let before = watched.text();
     let (status, message) = watched.post("write", &json!({ "path": "plants[0].growth.Bbch", "value": -1 }));

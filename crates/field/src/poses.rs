@@ -38,7 +38,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<(f64, Pose)>> {
     let mut all: Vec<(f64, Pose)> = Vec::new();
     let mut columns: Option<Columns> = None;
     let mut begun = false;
-    for (line, text) in (1..).zip(text(bytes)?.lines()) {
+    let text = text(bytes)?;
+    if !text.contains('\n') && text.trim_end().contains('\r') {
+        return Err(Error::input("its lines end in carriage returns alone, so that it is one line")
+            .help("save the file with line feeds, the line ends of Unix or Windows"));
+    }
+    for (line, text) in (1..).zip(text.lines()) {
         let (text, comment) = text.split_once('#').unwrap_or((text, ""));
         let words: Vec<&str> = words(text).take(MOST_COLUMNS + 1).collect();
         if words.is_empty() {
@@ -250,6 +255,19 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rationale: the whole of such a file is one line, and behind `#` it is one comment. Expected: an error that names the
+    /// line ends; carriage returns before line feeds, or at the end of one line, are none.
+    #[test]
+    fn carriage_returns_alone_are_refused() {
+        let pose = "3 0.1 0.2 0.6 0.5 -0.5 0.1 0.7";
+        for text in [format!("# by hand\r{pose}\r"), format!("{pose}\r4{}", &pose[1..])] {
+            let shown = read(text.as_bytes()).unwrap_err().to_string();
+            assert!(shown.contains("carriage returns alone"), "{shown}");
+        }
+        assert_eq!(read(format!("{pose}\r").as_bytes()).unwrap().len(), 1);
+        assert_eq!(read(format!("# by hand\r\n{pose}\r\n").as_bytes()).unwrap().len(), 1);
+    }
 
     /// Rationale: a table read in the wrong column order gives poses that look right and are not. Expected: the same pose for every column
     /// order, spelling and separator, and for nanoseconds; a byte order mark has no effect. Source: the same pose in the TUM RGB-D

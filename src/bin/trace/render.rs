@@ -149,6 +149,13 @@ pub(crate) struct Made<'a> {
 
 #[cfg(feature = "datasets")]
 impl Args {
+    /// Returns an option that was given and that [`image`](Self::image) does not read, if there is one.
+    pub(crate) fn beyond_image(&self) -> Option<&'static str> {
+        let given =
+            [(self.out.is_some(), "--out"), (self.pixel.is_some(), "--pixel"), (self.profile.profile, "--profile")];
+        given.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
+    }
+
     /// Renders the image of a scene file without writing it, and returns what `then` makes of it. `progress` gets the fraction
     /// of the samples that is done, `warn` the warnings.
     pub(crate) fn image<T>(

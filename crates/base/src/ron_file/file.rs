@@ -1,7 +1,7 @@
 //! A RON file: its text, its deserialization, and errors that point into it.
 
 use super::fault::{Fault, NAME_EXPECTED, locate, plain};
-use super::place::{Step, fields_around, lacks, mismatch, offset_of, path_at, place, quoted, value_end};
+use super::place::{Step, fields_around, lacks, mismatch, offset_of, path_at, place, quoted, too_deep, value_end};
 use super::schema::{self, Name};
 use super::suggest::nearest;
 use crate::error::{Kind, Place, Span};
@@ -18,6 +18,9 @@ const LARGEST: u64 = 4 << 20;
 
 /// Longest value in bytes that is underlined as a whole.
 const MOST_UNDERLINED: usize = 48;
+
+/// Largest number of brackets around a value. The parser's own limit does not count the brackets of `Some`.
+const MOST_NESTED: usize = 100;
 
 /// Text and path of a RON file.
 #[derive(Clone, Debug)]
@@ -109,6 +112,7 @@ impl RonFile {
                 .fault(&Fault { raw_len: 0, start: 0, end: 0, message: "this file is empty".to_owned(), help })
                 .lasting());
         }
+        self.check_depth()?;
         options().from_str(&self.text).map_err(|e| self.refused(&e, |_, _| Vec::new(), |path| (path.len(), Vec::new())))
     }
 
@@ -117,7 +121,15 @@ impl RonFile {
         if self.text.trim().is_empty() {
             return self.parse();
         }
+        self.check_depth()?;
         options().from_str(&self.text).map_err(|e| self.refused(&e, schema::required::<T>, schema::known::<T>))
+    }
+
+    /// Returns an error if brackets are nested so deeply that parsing them, or explaining what is wrong, takes long.
+    fn check_depth(&self) -> Result<()> {
+        let Some(at) = too_deep(&self.text, MOST_NESTED) else { return Ok(()) };
+        let error = Error::input("brackets are nested too deeply").help("no file needs a hundred of them");
+        Err(error.at(self.place_of(at, at + 1)).lasting())
     }
 
     /// Converts a parser error. `required` returns the required fields of a struct, given its name and a missing field.
@@ -383,6 +395,21 @@ mod tests {
         );
         let m = RonFile::of("Field(soil: (clods: (max_mm: -1)))").parse::<Sun>().unwrap_err().to_string();
         assert!(!m.contains("see:") || m.contains("trace explain"), "{m}");
+    }
+
+    /// Rationale: `Some(` escapes the parser's limit, and a file of a megabyte took 12 s. Expected: the bracket beyond the
+    /// limit is refused, whatever encloses it; a hundred brackets are read.
+    #[test]
+    fn deep_brackets_are_refused() {
+        for open in ["Some(", "(", "[", "{", "Uniform(", "/* ( */ \"(\", ("] {
+            let text = format!("Sun(azimuth_deg: {}", open.repeat(200_000));
+            assert!(message(&text).contains("brackets are nested too deeply"), "{open}");
+        }
+        let deep = |n: usize| format!("{}1{}", "Some(".repeat(n), ")".repeat(n));
+        assert!(RonFile::of(&deep(100)).check_syntax().is_ok());
+        assert!(
+            RonFile::of(&deep(101)).check_syntax().unwrap_err().to_string().starts_with("page.ron:1:505: brackets")
+        );
     }
 
     #[test]

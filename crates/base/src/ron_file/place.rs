@@ -138,6 +138,26 @@ pub(super) fn mismatch(text: &str) -> Option<(usize, Option<usize>)> {
     open.pop().map(|o| (text.len(), Some(o.0)))
 }
 
+/// Returns the offset of the first opening bracket that stands within `most` others.
+pub(super) fn too_deep(text: &str, most: usize) -> Option<usize> {
+    // Nearly all files have few brackets; the scan below is slower.
+    if text.bytes().filter(|byte| b"([{".contains(byte)).count() <= most {
+        return None;
+    }
+    let mut depth = 0_usize;
+    let mut at = skip(text, 0);
+    while let Some(c) = text[at..].chars().next() {
+        match c {
+            '(' | '[' | '{' if depth == most => return Some(at),
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        at = skip(text, if c == '"' { quote_end(text, at) } else { at + c.len_utf8() });
+    }
+    None
+}
+
 /// Returns the byte ranges of all quoted strings outside comments, in order, including quotes and raw-string markers.
 pub(super) fn quoted(text: &str) -> Vec<Range<usize>> {
     let mut all = Vec::new();
@@ -344,6 +364,14 @@ Field(
     }
 
     #[test]
+    fn depth_counts_open_brackets_outside_texts_and_comments() {
+        assert_eq!(too_deep("a(b[c{d(1)}])", 3), Some(7));
+        assert_eq!(too_deep("a(b[c{d(1)}])", 4), None);
+        assert_eq!(too_deep("[(), (), {}, (1), \"((\", /* (( */ ()]", 2), None);
+        assert_eq!(too_deep(")))((()", 2), Some(5));
+    }
+
+    #[test]
     fn quoted_texts_are_found_outside_comments() {
         let found: Vec<&str> = quoted(TEXT).into_iter().map(|at| &TEXT[at]).collect();
         assert_eq!(found, [r#""a \" b, (""#, r##"r#"c " ("#"##, "\"leaf\"", "\"stalk\""]);
@@ -356,6 +384,7 @@ Field(
             prop_assert!(text.get(range).is_some());
             prop_assert!(text.get(token(&text, 0)).is_some());
             let _ = mismatch(&text);
+            let _ = too_deep(&text, n);
             prop_assert!(words(&text).into_iter().all(|word| text.get(word.at).is_some()));
             prop_assert!(quoted(&text).into_iter().all(|at| text.get(at).is_some()));
         }

@@ -21,6 +21,7 @@ use crate::read::checksum_record::{ChecksumRecord, write_files};
 use crate::read::native;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
+use crate::read::place::place;
 use crate::read::set::Set;
 use furrow_base::error::Kind;
 use furrow_base::input::{self, below};
@@ -106,6 +107,7 @@ fn copy(home: &Set, folder: &Path) -> Result<Set> {
         let file = below(&home.folder, &path)?;
         Ok(File { bytes: input::contents(&file).map_err(Error::reading(&file))?, path })
     };
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     write_changed(folder, &paths.into_iter().map(read).collect::<Result<Vec<File>>>()?)?;
     Set::open(folder)
 }
@@ -209,7 +211,7 @@ impl Run<'_> {
             .images
             .iter()
             .try_for_each(|image| carry(&self.here, self.home, image, |path| !native::is_native(path)))?;
-        let (from, to) = (below(&self.here.folder, &id.path())?, below(&self.home.folder, &id.path())?);
+        let (from, to) = (below(&self.here.folder, &id.path())?, place(&self.home.folder, &id.path())?);
         stream_atomically(&to, |out| {
             let mut archive = input::open(&from).map_err(|refusal| refusal.into_error(&from))?;
             std::io::copy(&mut archive, out).map(drop).map_err(Error::io(&to))

@@ -23,6 +23,7 @@ pub(crate) fn begin(folder: &Path, recipe: Recipe, files: &[File], named: bool) 
         return go_on(folder, recipe, files, named);
     }
     refuse_full(folder)?;
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     write_changed(folder, files)?;
     // The recipe is written last, so that a folder with a recipe always has its scene.
     if create_atomically(&path, &recipe.text()?)? { Ok(recipe) } else { go_on(folder, recipe, files, named) }

@@ -16,6 +16,7 @@ use crate::{format, index, report};
 use furrow_base::error::Kind;
 use furrow_base::{Error, Result};
 use furrow_output::{is_unfinished, remove_unfinished};
+use furrow_render::scene::tag::Class;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
@@ -116,16 +117,29 @@ pub fn ranges(numbers: &[u64]) -> String {
     parts.iter().map(text).collect::<Vec<_>>().join(",")
 }
 
-/// Returns what the import of this dataset left out, turned or could not trust: one line for each kind of warning. Empty
-/// for a rendered dataset.
+/// Returns what the import of this dataset left out, turned or could not trust: one line for each kind of warning, and
+/// one if no pixel is crop or weed. Empty for a rendered dataset.
 pub fn dropped(set: &Set) -> Result<Vec<String>> {
     let mut totals = Totals::default();
-    if matches!(set.recipe.made, ImageOrigin::Imported { .. }) {
-        for record in set.all() {
-            totals.add(&record?.warnings);
-        }
+    if !matches!(set.recipe.made, ImageOrigin::Imported { .. }) {
+        return Ok(totals.lines());
     }
-    Ok(totals.lines())
+    let (mut plants, mut ignored) = (0_u64, 0_u64);
+    for record in set.all() {
+        let record = record?;
+        totals.add(&record.warnings);
+        let shares = record.classes.iter().filter(|share| share.class != Class::Soil);
+        plants += shares.map(|share| share.pixels).sum::<u64>();
+        ignored += record.ignored;
+    }
+    let mut lines = totals.lines();
+    if plants == 0 {
+        lines.push(format!(
+            "no pixel of any image is crop or weed, and {ignored} have no label; if the labels mean something else, give \
+             their meanings with --classes or --colors"
+        ));
+    }
+    Ok(lines)
 }
 
 /// Returns the checksums of the recipe and of the scene's files, which belong to no image.

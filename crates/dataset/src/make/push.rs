@@ -21,6 +21,7 @@ use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native;
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
+use crate::read::place::create_folders;
 use crate::read::set::Set;
 use crate::{index, report};
 use furrow_base::input::{below, refuse_links};
@@ -250,6 +251,7 @@ impl Push {
                 }
                 // Checked again, since the command may have taken hours.
                 refuse_links(&set.folder, Path::new("pushed"))?;
+                create_folders(&set.folder, Path::new("pushed"))?;
                 write_atomically(&path, &compact(&note(false))?)?;
             }
         }

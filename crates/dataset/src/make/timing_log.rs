@@ -6,6 +6,7 @@
 //! network file system can get lost.
 
 use crate::make::render::Times;
+use crate::read::place::create_folders;
 use furrow_base::input::refuse_links;
 use furrow_base::math::ToFloat;
 use furrow_base::{Error, Result};
@@ -163,8 +164,8 @@ impl TimingLog {
     /// Creates the file with the first run number that is not in use.
     fn open(&self) -> Result<(PathBuf, File)> {
         refuse_links(&self.dataset, Path::new("ledger"))?;
+        create_folders(&self.dataset, Path::new("ledger"))?;
         let folder = self.dataset.join("ledger");
-        std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
         let mut run = 1;
         loop {
             let path = folder.join(format!("shard-{}-run-{run}.jsonl", self.shard));

@@ -89,7 +89,7 @@ impl Rle {
         Self { size: [height, width], counts: pack(&runs) }
     }
 
-    /// Packs run lengths, starting with zeros.
+    /// Packs run lengths, starting with zeros. Each must fit `i64`.
     pub fn of_runs(size: [u32; 2], runs: &[u64]) -> Self {
         Self { size, counts: pack(runs) }
     }

@@ -6,6 +6,7 @@ use crate::File;
 use crate::model::recipe::{Recipe, compact};
 use crate::read::checksum::Checksum;
 use crate::read::native;
+use crate::read::place::place;
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
 use furrow_output::{FileSet, write_atomically, write_together};
@@ -67,7 +68,7 @@ impl ChecksumRecord {
     /// Writes the record, which must happen after all files listed in it are written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let written = Written { checksums: self.clone(), seal_sha256: self.hash()? };
-        write_atomically(&below(folder, &Self::path_below(self.index))?, &compact(&written)?)
+        write_atomically(&place(folder, &Self::path_below(self.index))?, &compact(&written)?)
     }
 
     /// Returns the SHA-256 of all fields, in hex.
@@ -103,7 +104,7 @@ pub(crate) fn write_files_beside(folder: &Path, files: &[File], there: &BTreeMap
             if file.bytes.is_empty() {
                 return Err(Error::failed(format!("{}: refused to write an empty file", file.path)));
             }
-            let path = below(folder, &file.path)?;
+            let path = place(folder, &file.path)?;
             match large.get(file.bytes.as_slice()) {
                 Some(there) => together.add_equal(there, &path, &file.bytes)?,
                 None => together.add(&path, &file.bytes)?,

@@ -7,4 +7,5 @@ pub mod label_maps;
 pub mod links;
 pub mod native;
 pub mod packs;
+pub(crate) mod place;
 pub mod set;

@@ -12,6 +12,7 @@ use crate::read::native::{self, Files};
 use crate::read::packs::Id;
 use crate::read::packs::Packing;
 use crate::read::packs::record::Packs;
+use crate::read::place::{gone, place};
 use furrow_base::error::Kind;
 use furrow_base::input::below;
 use furrow_base::math::ToInt;
@@ -57,9 +58,7 @@ impl Set {
         if !wrong || self.folder.join(FILE).is_file() {
             return error;
         }
-        Error::failed(format!("{FILE} has disappeared from this folder during the work: {}", error.message()))
-            .help("if the folder was moved or its disk was unmounted, bring it back and run the same command again")
-            .in_file(&self.folder)
+        gone(&self.folder)
     }
 
     /// Returns the name of an image: its number in six digits or more.
@@ -214,7 +213,7 @@ impl<'a> SetWriter<'a> {
 
     /// Writes a file in pieces, so that it may be larger than memory. The file appears complete or not at all.
     pub fn file(&mut self, path: &str, write: impl FnOnce(&mut Stream<'_>) -> Result<()>) -> Result<()> {
-        let full = below(self.folder, path)?;
+        let full = place(self.folder, path)?;
         let mut sum = None;
         stream_atomically(&full, |file| {
             let mut stream = Stream { path: &full, file, hash: Sha256::new(), bytes: 0 };
@@ -290,7 +289,7 @@ mod tests {
         std::fs::remove_file(folder.path().join(FILE)).unwrap();
         let error = set.blame(missing());
         assert_eq!(error.exit_code(), 1);
-        assert!(error.message().contains("has disappeared") && error.message().contains("beet.ron"), "{error}");
+        assert_eq!(error.message(), "dataset.json has disappeared from this folder during the work");
         assert_eq!(set.blame(Error::interrupted()).exit_code(), 75);
     }
 }

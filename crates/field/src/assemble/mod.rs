@@ -131,7 +131,9 @@ impl Source {
             None => library.page(&self.page().path)?,
             Some(text) => library.page_of(&self.page().path, text),
         };
-        let text = values.iter().try_fold(Spliced::of(page), |text, value| value.apply::<FieldDesc>(&text))?;
+        let text = values.iter().try_fold(Spliced::of(page.clone()), |text, value| value.apply::<FieldDesc>(&text));
+        // A value cannot be assigned in an empty file or in one with a syntax error, which is then the mistake.
+        let text = text.map_err(|e| page.check_syntax().err().unwrap_or(e))?;
         // The hash of the scene is that of the text with these values.
         library.page_of(&self.page().path, &text.page.text);
         let growing = library.growing;

@@ -25,7 +25,8 @@ pub(super) fn scanned(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Result<V
     let whole = whole.unwrap_or(View::NONE);
     let most = 4.0 * LONGEST_REACH.powi(2);
     if whole.area.area() > most {
-        let words = format!("the drive sees {:.0} m² of ground, more than {most} m²", whole.area.area());
+        let area = view::above(whole.area.area(), most);
+        let words = format!("the drive sees {area} m² of ground, more than {} m²", view::three_digits(most));
         let help = "use fewer frames, or lower reach_m";
         return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
     }

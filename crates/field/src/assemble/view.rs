@@ -12,7 +12,7 @@ use super::ground_view::{GroundView, Viewpoint, meets};
 use super::terrain::{Near, Seen, ViewLimits, ViewRay};
 use crate::desc::Detail;
 use crate::drive::{Capture, FIRST};
-use furrow_base::math::{ToFloat, Vec2, vec2};
+use furrow_base::math::{RoundTo, ToFloat, Vec2, vec2};
 use furrow_base::ron_file::Step;
 use furrow_base::{Error, Result};
 use furrow_grow::soil::Rect;
@@ -97,12 +97,28 @@ pub(super) fn by_cameras(drawn: &Drawn<'_>, warnings: &mut Vec<String>) -> Resul
     let most = 4.0 * reach(drawn)?.powi(2);
     // The area of a single camera is already bounded by the reach and by the distance travelled during the exposure.
     if drawn.captures.len() > 1 && area > most {
-        let words = format!("the drive sees {area:.0} m² of ground, more than the {most} m² of one field");
+        let words = format!(
+            "the drive sees {} m² of ground, more than the {} m² of one field",
+            above(area, most),
+            three_digits(most)
+        );
         let help =
             "use fewer frames, drive along a row to the north or east, drive through several fields, or raise reach_m";
         return Err(drawn.page.blame(&[Step::Field("drive")], Error::input(words).help(help)));
     }
     Ok(VisibleGround { view: whole, each })
+}
+
+/// Writes a positive number with three significant digits, or all digits before the point.
+pub(super) fn three_digits(value: f32) -> String {
+    let whole = f64::from(value).log10().floor().clamp(-6.0, 2.0);
+    format!("{value:.0$}", (2.0 - whole).trunc_to::<usize>())
+}
+
+/// Writes `value` with three significant digits, or with more if it would read as `less`, which is smaller.
+pub(super) fn above(value: f32, less: f32) -> String {
+    let short = three_digits(value);
+    if short == three_digits(less) { value.to_string() } else { short }
 }
 
 /// Returns the distinct camera poses of a drive; the ground is then built only near their views. Returns an empty list if all of the
@@ -285,4 +301,20 @@ fn beyond(places: impl Iterator<Item = Vec2>, area: Rect, below: Vec2) -> (f32, 
         }
     }
     (bare / ground.max(1.0), farthest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: "0 m², more than the 0.36 m²" tells nothing. Expected: both numbers with three significant digits, and
+    /// the larger one never reads as the smaller.
+    #[test]
+    fn areas_are_written_so_that_they_differ() {
+        for (value, words) in [(0.36, "0.360"), (0.0071, "0.00710"), (4.0, "4.00"), (25.55, "25.5"), (1600.2, "1600")] {
+            assert_eq!(three_digits(value), words);
+        }
+        assert_eq!(above(0.42, 0.36), "0.420");
+        assert_eq!(above(0.360_02, 0.36), "0.36002");
+    }
 }

@@ -3,8 +3,9 @@
 //! A picture is returned as viewers show it, turned by its EXIF orientation. Models are the exception: their texture
 //! coordinates refer to the pixels as stored. Colour profiles are not applied. Refused, with the reason: other formats,
 //! JPEG files without their end (decoders fill the rest with grey), JPEG files in CMYK, and pictures above the limits.
-//! Sources: ITU-T T.81, annex B (JPEG segments); PNG, third edition, 5.3 and 11.3.4.5 (chunks, `eXIf`).
+//! Source: ITU-T T.81, annex B (JPEG segments).
 
+use super::orientation::orientation;
 use furrow_base::input::{self, Refusal};
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
@@ -176,28 +177,6 @@ fn turned((w, h): (u32, u32), orientation: u8) -> (u32, u32) {
     if orientation >= 5 { (h, w) } else { (w, h) }
 }
 
-/// Returns the EXIF orientation of a file; a file without one, or with a wrong one, is not turned.
-fn orientation(bytes: &[u8], decoder: &mut impl ImageDecoder) -> Orientation {
-    let read = match exif_chunk(bytes) {
-        Some(chunk) => Orientation::from_exif_chunk(chunk.strip_prefix(b"Exif\0\0").unwrap_or(chunk)),
-        None => decoder.orientation().ok(),
-    };
-    read.unwrap_or(Orientation::NoTransforms)
-}
-
-/// Returns the `eXIf` chunk of a PNG, which may follow the pixels; `None` for a JPEG.
-fn exif_chunk(bytes: &[u8]) -> Option<&[u8]> {
-    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
-    while let Some(([a, b, c, d, kind @ ..], data)) = rest.split_first_chunk::<8>() {
-        let length = u32::from_be_bytes([*a, *b, *c, *d]).to_usize();
-        if kind == b"eXIf" {
-            return data.get(..length);
-        }
-        rest = data.get(length.checked_add(4)?..)?;
-    }
-    None
-}
-
 /// Returns a fault for a JPEG that a decoder would misread: a truncated file, or colours of a printer.
 fn check_jpeg(bytes: &[u8]) -> Result<(), Fault> {
     if is_cut_short(bytes) {
@@ -348,6 +327,30 @@ mod tests {
         [(2, 2), (w - 3, 2), (2, h - 3), (w - 3, h - 3)].map(letter).iter().collect()
     }
 
+    /// Returns pictures that state the orientation 6 where other programs write it, each with the name of the place.
+    fn turned_elsewhere() -> [(&'static str, Vec<u8>); 4] {
+        const XMP: &[u8] = b"<x:xmpmeta><rdf:Description tiff:Orientation=\"6\"/></x:xmpmeta>";
+        let exif: Vec<u8> = [b"Exif\0\0".to_vec(), exif(6, true)].concat();
+        let digits: String = exif.iter().map(|byte| format!("{byte:02x}")).collect();
+        let lines = [&digits[..20], &digits[20..]].join("\n");
+        let profile = format!("\nexif\n  {}\n{lines}\n", exif.len()).into_bytes();
+        let packed = [b"Raw profile type exif\0\0", &stored_zlib(&profile)[..]].concat();
+        let within = |chunk: Vec<u8>| {
+            let mut bytes = png();
+            bytes.splice(33..33, chunk);
+            bytes
+        };
+        let segment = [b"http://ns.adobe.com/xap/1.0/\0", XMP].concat();
+        let mut edited = jpeg(None);
+        edited.splice(2..2, [&[0xff, 0xe1][..], &(segment.len().to_u16() + 2).to_be_bytes(), &segment].concat());
+        [
+            ("plain profile", within(chunk(*b"tEXt", &[b"Raw profile type exif\0", &profile[..]].concat()))),
+            ("packed profile", within(chunk(*b"zTXt", &packed))),
+            ("XMP of a PNG", within(chunk(*b"iTXt", &[b"XML:com.adobe.xmp\0\0\0\0\0", XMP].concat()))),
+            ("XMP of a JPEG", edited),
+        ]
+    }
+
     /// Source: the EXIF standard's names for the position of the first row and column. Expected: a picture as viewers show
     /// it, from JPEG and from PNG, whose `eXIf` chunk may stand before or behind the pixels; any other value of the tag
     /// leaves the picture as it is.
@@ -370,6 +373,10 @@ mod tests {
                 assert_eq!((picture.pixels.width(), picture.pixels.height()), size_shown);
                 assert_eq!(size(&path).unwrap(), size_shown);
             }
+        }
+        for (place, bytes) in turned_elsewhere() {
+            let picture = decode(&bytes, MAX).unwrap();
+            assert_eq!((corners(&picture).as_str(), picture.orientation), ("BRWG", 6), "{place}");
         }
         for bytes in [jpeg(None), jpeg(Some(0)), jpeg(Some(9)), png()] {
             let picture = decode(&bytes, MAX).unwrap();
@@ -407,22 +414,25 @@ mod tests {
         assert!(decode(&png(), 20).unwrap_err().words().contains("sides of more than 20 pixels"));
     }
 
+    /// Returns a zlib stream of one stored block, with its checksum (Adler-32).
+    fn stored_zlib(raw: &[u8]) -> Vec<u8> {
+        let (a, b) = raw.iter().fold((1_u32, 0_u32), |(a, b), byte| {
+            let a = (a + u32::from(*byte)) % 65521;
+            (a, (b + a) % 65521)
+        });
+        let length = raw.len().to_u16();
+        [&[0x78, 0x01, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), raw, &(b << 16 | a).to_be_bytes()]
+            .concat()
+    }
+
     /// Returns a PNG of one row of two pixels, with this depth and type of colour, filtered data, palette and opacities.
     fn row(depth: u8, color: u8, data: &[u8], palette: Option<(&[u8], &[u8])>) -> Vec<u8> {
         let header = [&[0, 0, 0, 2, 0, 0, 0, 1, depth, color][..], &[0; 3]].concat();
         let (colors, opacities) = palette
             .map_or((vec![], vec![]), |(colors, opacities)| (chunk(*b"PLTE", colors), chunk(*b"tRNS", opacities)));
         let raw = [&[0], data].concat();
-        // A zlib stream of one stored block, with its checksum (Adler-32).
-        let (a, b) = raw.iter().fold((1_u32, 0_u32), |(a, b), byte| {
-            let a = (a + u32::from(*byte)) % 65521;
-            (a, (b + a) % 65521)
-        });
-        let length = raw.len().to_u16();
-        let zlib =
-            [&[0x78, 0x01, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), &raw, &(b << 16 | a).to_be_bytes()]
-                .concat();
-        let parts = [chunk(*b"IHDR", &header), colors, opacities, chunk(*b"IDAT", &zlib), chunk(*b"IEND", &[])];
+        let data = chunk(*b"IDAT", &stored_zlib(&raw));
+        let parts = [chunk(*b"IHDR", &header), colors, opacities, data, chunk(*b"IEND", &[])];
         [b"\x89PNG\r\n\x1a\n".to_vec(), parts.concat()].concat()
     }
 

@@ -17,6 +17,7 @@ pub mod marks;
 mod need;
 pub mod noise;
 mod openexr;
+mod orientation;
 pub mod panorama;
 mod petiole;
 mod primaries;

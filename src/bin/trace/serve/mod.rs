@@ -52,11 +52,14 @@ enum Request {
     Render(RenderRequest),
 }
 
-/// An image to render.
+/// An image to render: a [`SceneSource`] and options. serde cannot refuse unknown keys beside a flattened struct.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RenderRequest {
-    #[serde(flatten)]
-    source: SceneSource,
+    file: Option<PathBuf>,
+    scene: Option<Value>,
+    #[serde(default)]
+    folder: PathBuf,
     /// Options of `trace --scene`.
     #[serde(default)]
     arguments: Vec<String>,
@@ -80,7 +83,7 @@ pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
             .help("use the Python module `furrow`, or see `trace serve --help`"));
     }
     let mut kept = Kept::default();
-    for line in io::stdin().lock().lines() {
+    for line in io::stdin().lock().split(b'\n') {
         let line = line.map_err(|e| Error::failed(format!("cannot read stdin: {e}")))?;
         let answer = supervised(|| answer(&line, &mut kept)).and_then(|answer| answer);
         if answer.is_err() {
@@ -94,29 +97,45 @@ pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-fn answer(line: &str, kept: &mut Kept) -> Result<Answer> {
-    let request = serde_json::from_str(line)
-        .map_err(|e| Error::misuse(format!("this is not a request: {e}")).help("see `trace serve --help`"))?;
-    match request {
+/// Reads a request. Errors name a byte that is not UTF-8, and unknown keys.
+fn request(line: &[u8]) -> Result<Request> {
+    let wrong = |what: String| Error::misuse(format!("this is not a request: {what}")).help("see `trace serve --help`");
+    let text = std::str::from_utf8(line).map_err(|e| {
+        let at = e.valid_up_to();
+        wrong(format!("byte {} of the line, {:#04x}, is not UTF-8 text", at + 1, line[at]))
+    })?;
+    serde_json::from_str(text).map_err(|e| wrong(e.to_string()))
+}
+
+fn answer(line: &[u8], kept: &mut Kept) -> Result<Answer> {
+    match request(line)? {
         Request::Open(file) => {
             let file = furrow_base::input::shipped::scene_file(file);
             let text = SceneSource::of(file.clone()).text()?;
             Ok(Answer::of("scene", to_json(&text)).with("file", &file.to_string_lossy().into()))
         }
         Request::Write(source) => Ok(Answer::of("text", Value::from(source.absolute_text()?).to_string())),
-        Request::Render(request) => image(&request, kept),
+        Request::Render(request) => image(request, kept),
     }
 }
 
 /// Renders an image and describes it.
-fn image(request: &RenderRequest, kept: &mut Kept) -> Result<Answer> {
-    let path = request.source.path().display().to_string();
-    let words = ["--scene".to_owned(), path, "--quiet".to_owned()].into_iter().chain(request.arguments.iter().cloned());
+fn image(request: RenderRequest, kept: &mut Kept) -> Result<Answer> {
+    let RenderRequest { file, scene, folder, arguments, progress } = request;
+    let source = SceneSource { file, scene, folder };
+    let path = source.path().display().to_string();
+    let words = ["--scene".to_owned(), path, "--quiet".to_owned()].into_iter().chain(arguments);
     let options = Options::try_parse_from(words).map_err(|e| unparsed(&e))?.render;
-    let scene = kept.scene(&request.source, options.edit()?)?;
+    if let Some(option) = options.beyond_image() {
+        return Err(Error::misuse(format!(
+            "the argument {option} has no effect in a request: its answer is the image"
+        ))
+        .help("leave it out"));
+    }
+    let scene = kept.scene(&source, options.edit()?)?;
     let warnings = RefCell::new(Vec::new());
     let warn = |words: &str| warnings.borrow_mut().push(words.to_owned());
-    let sent = request.progress.then(Progress::begin);
+    let sent = progress.then(Progress::begin);
     let progress = |done: f64| sent.iter().for_each(|progress| progress.send(done));
     let (answer, files) = options.image(scene, &progress, &warn, |made| {
         let files = made.image.field().grown().files.clone();
@@ -138,4 +157,36 @@ fn unparsed(error: &clap::Error) -> Error {
     let text = error.render().to_string();
     let words = text.strip_prefix("error: ").unwrap_or(&text);
     Error::misuse(words.split("\n\nUsage").next().unwrap_or(words).split("\n\nFor more").next().unwrap_or(words).trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(line: &[u8]) -> String {
+        let error = answer(line, &mut Kept::default()).err().expect("an error");
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    }
+
+    /// Rationale: a line that was not UTF-8 ended the server, and a misspelt key or an argument without effect was passed
+    /// over. Expected: an error that names it.
+    #[test]
+    fn malformed_requests_are_refused_with_their_cause() {
+        assert!(refused(b"{\"open\": \"\xff\"}").contains("byte 11 of the line, 0xff, is not UTF-8"));
+        assert!(refused(b"").contains("this is not a request: EOF"));
+        for line in [
+            r#"{"render": {"file": "a.ron", "extra": 1}}"#,
+            r#"{"write": {"scene": {}, "extra": 1}}"#,
+            r#"{"open": "a.ron", "extra": 1}"#,
+        ] {
+            let shown = refused(line.as_bytes());
+            assert!(shown.contains("this is not a request") && (shown.contains("`extra`") || line.contains("open")));
+        }
+        for [option, value] in [["--out", "x"], ["--pixel", "1,1"], ["--profile", ""]] {
+            let arguments: Vec<&str> = [option, value].into_iter().filter(|word| !word.is_empty()).collect();
+            let line = serde_json::json!({ "render": { "file": "a.ron", "arguments": arguments } }).to_string();
+            assert!(refused(line.as_bytes()).contains(&format!("the argument {option} has no effect")), "{option}");
+        }
+    }
 }

@@ -16,14 +16,15 @@ const UNNAMED: &str = "<scene>";
 
 /// A scene file, by its path or as JSON.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct SceneSource {
     /// The scene file, or the name of a shipped one.
-    file: Option<PathBuf>,
+    pub(super) file: Option<PathBuf>,
     /// A scene as JSON.
-    scene: Option<serde_json::Value>,
+    pub(super) scene: Option<serde_json::Value>,
     /// Folder that the paths of a scene as JSON are relative to.
     #[serde(default)]
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
 }
 
 impl SceneSource {

@@ -264,6 +264,8 @@ impl ServerState {
             "write" => {
                 let Written { path, value } = serde_json::from_slice(body).map_err(wrong)?;
                 let _alone = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+                let only = BTreeMap::from([(path.clone(), value)]);
+                self.session.shown(|shown| sliders::check_paths(&shown.sliders, &only))?;
                 let seen = self.session.shown(|shown| shown.text.clone());
                 let new = sliders::write(self.session.path(), &path, value, &seen)?;
                 self.session

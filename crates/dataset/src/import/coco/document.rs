@@ -32,10 +32,10 @@ pub(super) struct Image {
 }
 
 impl Image {
-    /// Returns width and height, if both are given.
-    pub(super) fn size(&self) -> Option<(u32, u32)> {
-        let side = |side: &Option<Whole>| side.as_ref().and_then(|n| u32::try_from(n.0).ok()).filter(|n| *n > 0);
-        Some((side(&self.width)?, side(&self.height)?))
+    /// Returns width and height, if both are given. A picture can be smaller than them.
+    pub(super) fn size(&self) -> Option<(u64, u64)> {
+        let side = |side: Option<Whole>| side.map(|side| side.0).filter(|side| *side > 0);
+        Some((side(self.width)?, side(self.height)?))
     }
 }
 
@@ -309,8 +309,10 @@ impl<'de> Deserialize<'de> for Counts {
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut all: A) -> std::result::Result<Counts, A::Error> {
                 let mut runs = Vec::new();
-                while let Some(run) = all.next_element::<Whole>()? {
-                    runs.push(run.0);
+                while let Some(Whole(run)) = all.next_element()? {
+                    // No image has more pixels, and packed run lengths cannot be longer.
+                    let small = i64::try_from(run).is_ok();
+                    runs.push(if small { run } else { return Err(A::Error::custom(format!("{run} is too large"))) });
                 }
                 Ok(Counts::Runs(runs))
             }
@@ -353,6 +355,14 @@ mod tests {
             (r#"{"segmentation": {"size": [2, 2]}, "id": 7}"#, "the run lengths lack `counts`"),
             (r#"{"segmentation": {"size": [2, 2], "counts": [1, -1]}, "id": 7}"#, "a whole number from 0"),
             (r#"{"segmentation": {"size": [2], "counts": [1]}, "id": 7}"#, "`segmentation`: invalid length 1"),
+            (
+                r#"{"segmentation": {"size": [2, 2], "counts": [18446744073709551615, 5]}, "id": 7}"#,
+                "`segmentation`: 18446744073709551615 is too large",
+            ),
+            (
+                r#"{"segmentation": {"size": [2, 4294967296], "counts": [1]}, "id": 7}"#,
+                "`segmentation`: 4294967296 is too large",
+            ),
             (r#"{"id": 7, "image_id": 1, "category_id": 1, "iscrowd": 2}"#, "`iscrowd`: 2.0 is neither 0 nor 1"),
             (r#"{"id": 7, "category_id": 1}"#, "line 3: missing field `image_id`"),
             (r#"{"id": 7, "bbox": [NaN, 1], "image_id": 1}"#, "`bbox`: expected value"),
@@ -363,18 +373,33 @@ mod tests {
         }
         let shown = wrong(r#"{"id": {}, "image_id": 1}"#);
         assert!(shown.contains("annotation at position 2 of the list in line 3, `id`"), "{shown}");
+        // Behind the last annotation no entry is to blame.
+        for (damaged, words) in [
+            ("X\n", "trailing characters at line 4 column 1"),
+            ("\0", "trailing characters"),
+            ("{\"images\": []}", "trailing characters"),
+        ] {
+            let text = "{\"images\": [], \"categories\": [],\n\"annotations\":\n [{\"id\": 6, \"image_id\": 1, \"category_id\": 1}]}\n";
+            let shown = parse(Path::new("a.json"), (text.to_owned() + damaged).as_bytes()).err().unwrap().to_string();
+            assert!(shown.starts_with("a.json: this is not a COCO file") && shown.contains(words), "{shown}");
+        }
+        let lacking = b"{\"images\": [], \"categories\": [{\"id\": 2, \"name\": \"crop\"}]}";
+        let shown = parse(Path::new("a.json"), lacking).err().unwrap().to_string();
+        assert!(shown.contains("instances: missing field `annotations`"), "{shown}");
         assert!(parse(Path::new("a.json"), b"[1").err().unwrap().message().contains("not a COCO file"));
     }
 
     #[test]
     fn the_spellings_of_labelling_tools_are_read() {
         let text = "\u{feff}{\"images\": [{\"id\": \"a\", \"file_name\": \"a.png\", \"width\": 60.0, \"height\": 40},
-            {\"id\": 2.0, \"file_name\": \"b.png\", \"width\": 0, \"height\": 0}],
+            {\"id\": 2.0, \"file_name\": \"b.png\", \"width\": 0, \"height\": 0},
+            {\"id\": 3, \"file_name\": \"c.png\", \"width\": 4294967336, \"height\": 1e12}],
             \"categories\": [{\"id\": -1, \"name\": \"crop\", \"keypoints\": null}],
             \"annotations\": [{\"image_id\": 2, \"category_id\": -1, \"iscrowd\": false, \"segmentation\": [1, 2, 3, 4, 5, 6]},
             {\"id\": 4, \"image_id\": 2, \"category_id\": -1, \"iscrowd\": null, \"keypoints\": null, \"segmentation\": null}]}";
         let read = parse(Path::new("a.json"), text.as_bytes()).unwrap();
         assert_eq!((read.images[0].size(), read.images[1].size()), (Some((60, 40)), None));
+        assert_eq!(read.images[2].size(), Some((4_294_967_336, 1_000_000_000_000)));
         assert_eq!((&read.images[1].id, &read.categories[0].id), (&Id("2".into()), &Id("-1".into())));
         let [first, second] = &read.annotations[..] else { unreachable!("two annotations") };
         assert!(

@@ -56,8 +56,8 @@ struct Annotated {
     path: PathBuf,
     /// The annotation file.
     document: Arc<Path>,
-    /// Width and height in the annotation file, if it states them.
-    size: Option<(u32, u32)>,
+    /// Width and height in the annotation file, if it states them. They are compared, not used.
+    size: Option<(u64, u64)>,
     things: Vec<Thing>,
     warnings: Vec<String>,
 }
@@ -315,7 +315,7 @@ impl Source for Coco {
         let image = &self.images[place];
         let Shot { size, pixels: rgb, mut warnings, stored, orientation } =
             photograph(furrow_output::open_photo(&image.path)?);
-        if let Some(listed) = image.size.filter(|listed| *listed != size) {
+        if let Some(listed) = image.size.filter(|listed| *listed != wide(size)) {
             return Err(image.other_size(listed, size, stored, orientation));
         }
         warnings.extend(image.warnings.iter().cloned());
@@ -336,10 +336,10 @@ impl Source for Coco {
 
 impl Annotated {
     /// Returns the error about a picture whose size is not the one in the annotation file.
-    fn other_size(&self, listed: (u32, u32), size: (u32, u32), stored: (u32, u32), orientation: u8) -> Error {
+    fn other_size(&self, listed: (u64, u64), size: (u32, u32), stored: (u32, u32), orientation: u8) -> Error {
         let ((w, h), (x, y)) = (size, listed);
         let document = self.document.display();
-        let error = if listed == stored {
+        let error = if listed == wide(stored) {
             Error::input(format!(
                 "its EXIF orientation {orientation} turns it to {w} × {h} pixels; {document} was drawn on the picture \
                  as stored, {x} × {y}"
@@ -351,6 +351,10 @@ impl Annotated {
         };
         error.in_file(&self.path)
     }
+}
+
+fn wide((w, h): (u32, u32)) -> (u64, u64) {
+    (w.into(), h.into())
 }
 
 type Points = BTreeMap<(u32, u16), [Option<Keypoint>; 3]>;

@@ -54,12 +54,15 @@ pub(super) fn line_of(text: &str, id: &str) -> Option<usize> {
 fn entry(text: &[u8], end: usize) -> Option<Spot> {
     let mut scan = Scan::new(text);
     while scan.at < end && scan.step() {}
-    let what = scan.list().filter(|_| scan.place > 0)?;
+    let what = scan.list().filter(|_| scan.place > 0 && scan.depth >= ENTRY)?;
     let (place, line, key) = (scan.place, scan.line, scan.key.take());
     // The id may follow.
     while scan.id.is_none() && scan.place == place && scan.step() {}
     Some(Spot { what, place, id: scan.id.filter(|_| scan.place == place), line, key })
 }
+
+/// Number of open brackets in an entry: those of the document, of the list and its own.
+const ENTRY: usize = 3;
 
 /// Scanner of JSON that need not be valid. It knows the list, the entry and the key that it is in.
 struct Scan<'a> {
@@ -103,7 +106,7 @@ impl<'a> Scan<'a> {
             b'\n' => self.lines += 1,
             b'[' | b'{' => {
                 self.depth += 1;
-                if self.depth == 3 && *byte == b'{' {
+                if self.depth == ENTRY && *byte == b'{' {
                     (self.place, self.line) = (self.place + 1, self.lines + 1);
                     (self.key, self.id) = (None, None);
                 }
@@ -134,7 +137,7 @@ impl<'a> Scan<'a> {
                 (self.list, self.place) = (string.to_vec(), 0);
                 (self.key, self.id) = (None, None);
             }
-            3 => {
+            ENTRY => {
                 if string == b"id" {
                     self.id = id(value.trim_ascii_start());
                 }
@@ -182,5 +185,9 @@ mod tests {
         assert_eq!(at("{\"c\": 1").unwrap(), "annotation at position 3 of the list in line 4, `c`");
         assert_eq!(at("\"n\": \"}\\\"{\"").unwrap(), "image 7 in line 2, `n`");
         assert_eq!(at("{\"images\""), None);
+        // Between and behind the entries.
+        for words in ["\"n\": \"}\\\"{\"}", "\"n\": \"}\\\"{\"}],", "{\"c\": 1}", "{\"c\": 1}]", "{\"c\": 1}]}"] {
+            assert_eq!(at(words), None, "{words}");
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::read::archive::{BLOCK, entry_name};
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
 use crate::read::native;
+use crate::read::place::place;
 use furrow_base::Result;
 use furrow_base::input;
 use furrow_base::math::ToInt;
@@ -80,7 +81,7 @@ impl PackRecord {
     /// Writes the record, which must happen after the archive is written.
     pub(crate) fn write(&self, folder: &Path, id: Id) -> Result<()> {
         let written = Written { seal_sha256: self.hash()?, record: self.clone() };
-        write_atomically(&input::below(folder, &id.seal())?, &compact(&written)?)
+        write_atomically(&place(folder, &id.seal())?, &compact(&written)?)
     }
 
     /// Returns the SHA-256 of all fields, in hex.

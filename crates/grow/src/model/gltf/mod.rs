@@ -118,7 +118,12 @@ impl Reader<'_> {
             let name = node.name.as_ref().or(mesh.name.as_ref()).cloned().unwrap_or_else(|| format!("node {index}"));
             let to = world[index];
             let pose = match node.skin {
-                Some(skin) => Pose::of(self.document, self.accessors, &world, skin, &to)?,
+                Some(skin) => {
+                    if item(&self.document.skins, skin, "skin")?.joints.is_empty() {
+                        self.notes.about("skins without joints, so their meshes stay in the bind pose", &name);
+                    }
+                    Pose::of(self.document, self.accessors, &world, skin, &to)?
+                }
                 None => None,
             };
             for primitive in &mesh.primitives {
@@ -220,6 +225,9 @@ impl Reader<'_> {
         }
         self.warn_of_colors(primitive, name)?;
         let bound = if pose.is_some() { bound(accessors, primitive, mesh.positions.len())? } else { Vec::new() };
+        if pose.is_some() && bound.is_empty() {
+            self.notes.about("no `JOINTS_0` and `WEIGHTS_0`, so the skin is passed over", name);
+        }
         let bent = pose.filter(|_| !bound.is_empty());
         if let Some((pose, to)) = bent {
             pose.bend(&mut mesh, &bound, to)?;

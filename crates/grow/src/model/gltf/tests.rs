@@ -179,7 +179,7 @@ fn sparse_accessors_are_read() {
 /// Source: 3.7.3.3: a skinned mesh is placed by its joints, not by its node. The right half follows the second joint.
 #[test]
 fn skins_are_applied_at_rest() {
-    let read = |lifted: f64| {
+    let changed = |lifted: f64, change: &dyn Fn(&mut Value)| {
         square(|d, b| {
             let back = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -3.0, 0.0, 0.0, 1.0];
             let binds = accessor(d, b, "MAT4", &[back, back].concat());
@@ -201,8 +201,10 @@ fn skins_are_applied_at_rest() {
                 { "translation": [0, 0, lifted] },
             ]);
             d["skins"] = json!([{ "joints": [1, 2], "inverseBindMatrices": binds }]);
+            change(d);
         })
     };
+    let read = |lifted: f64| changed(lifted, &|_| ());
     let rest = read(0.0).unwrap();
     assert_eq!(corner(&rest, vec2(1.0, 1.0)), vec3(1.0, 1.0, 0.0));
     let bent = read(0.5).unwrap();
@@ -211,6 +213,18 @@ fn skins_are_applied_at_rest() {
     // Weights that do not sum to one are normalised; a vertex without weights stays at its node.
     assert_eq!(corner(&bent, vec2(1.0, 1.0)), vec3(1.0, 1.0, 0.5));
     assert_eq!(corner(&bent, vec2(0.0, 1.0)), vec3(0.0, 1.0, 0.0));
+    assert_eq!(bent.warnings, Vec::<String>::new());
+    // A skin that cannot bend its mesh is named.
+    let jointless = changed(0.5, &|d| d["skins"][0]["joints"] = json!([])).unwrap();
+    assert_eq!(jointless.warnings, ["skins without joints, so their meshes stay in the bind pose: `leaf`"]);
+    for attribute in ["JOINTS_0", "WEIGHTS_0"] {
+        let unbound = changed(0.5, &|d: &mut Value| {
+            d["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove(attribute);
+        });
+        let unbound = unbound.unwrap();
+        assert_eq!(unbound.warnings, ["no `JOINTS_0` and `WEIGHTS_0`, so the skin is passed over: `leaf`"]);
+        assert_eq!(corner(&unbound, vec2(1.0, 0.0)), vec3(1.0, 0.0, 0.0));
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Lines of OBJ and MTL files: text in UTF-8 or ISO 8859-1, with or without a byte order mark, and lines that continue.
 
+use furrow_base::math::ToFloat;
 use std::borrow::Cow;
 
 /// Returns the text of a file. Bytes that are not UTF-8 are taken for ISO 8859-1, which older Windows programs write.
@@ -63,6 +64,12 @@ impl Statement<'_> {
         word.parse().map_err(|_| self.wrong(&format!("`{word}` is not a number")))
     }
 
+    /// Reads a number of a material, which must be finite in single precision.
+    pub(super) fn finite(&self, word: &str) -> Result<f32, String> {
+        let number = self.number(word)?.to_f32();
+        if number.is_finite() { Ok(number) } else { Err(self.wrong(&format!("`{word}` is not a finite number"))) }
+    }
+
     /// Reads the first N numbers; `few` are enough, and the others are then 0.
     pub(super) fn numbers<const N: usize>(&self, few: usize) -> Result<[f64; N], String> {
         let mut numbers = [0.0; N];
@@ -99,5 +106,9 @@ mod tests {
         assert_eq!(statements("v 1\rv 2\\").count(), 2);
         let commented = statements("Kd 0.5 # grey").next().unwrap();
         assert_eq!((commented.words().count(), commented.numbers::<3>(1).unwrap()), (1, [0.5, 0.0, 0.0]));
+        assert_eq!(commented.finite("-2.5"), Ok(-2.5));
+        for word in ["nan", "-inf", "1e39"] {
+            assert_eq!(commented.finite(word), Err(format!("line 1: `{word}` is not a finite number")));
+        }
     }
 }

@@ -8,7 +8,7 @@ use super::super::notes::Notes;
 use super::super::settle::{ModelError, fraction, warn_of_color};
 use super::lines::{Statement, statements, text};
 use furrow_base::geometry::AlphaMask;
-use furrow_base::math::{ToFloat, Vec2};
+use furrow_base::math::Vec2;
 use furrow_optics::texture::Surface;
 use furrow_optics::texture::{ColorSpace, Header, Texture, Wrap};
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ impl Map {
 }
 
 /// A material as its file describes it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Material {
     name: String,
     color: Option<[f32; 3]>,
@@ -113,8 +113,15 @@ impl<'a> Materials<'a> {
             let found = materials(&text(&bytes).map_err(wrong)?, notes).map_err(wrong)?;
             // The first material of a name counts, as in other programs.
             for material in found {
-                if !self.all.iter().any(|known| known.name == material.name) {
-                    self.all.push(material);
+                match self.all.iter().find(|known| known.name == material.name) {
+                    None => self.all.push(material),
+                    Some(known) if *known == material => {}
+                    Some(_) => {
+                        notes.about(
+                            "materials that are described twice and differently; the first counts",
+                            &material.name,
+                        );
+                    }
                 }
             }
         }
@@ -147,8 +154,8 @@ impl<'a> Materials<'a> {
         };
         // The Blinn–Phong exponent n corresponds to GGX α = √(2 / (n + 2)). Source: Walter et al. 2007. The roughness of
         // physically based extensions is that of glTF, α = roughness².
-        let shiny = material.shininess.filter(|n| *n >= 0.0).map(|n| (2.0 / (n + 2.0)).sqrt());
-        let rough = material.roughness.map(|roughness| fraction(roughness).powi(2));
+        let shiny = material.shininess.map(|n| (2.0 / (n + 2.0)).sqrt());
+        let rough = material.roughness.map(|roughness| roughness.powi(2));
         Ok(Appearance {
             surface: Surface {
                 name: material.name.clone(),
@@ -187,14 +194,17 @@ fn materials(text: &str, notes: &mut Notes) -> Result<Vec<Material>, String> {
             all.push(Material { name: statement.rest.into_owned(), ..Material::default() });
             continue;
         }
-        let Some(material) = all.last_mut() else { continue };
-        read(material, &statement, notes)?;
+        match all.last_mut() {
+            Some(material) => read(material, &statement, notes)?,
+            None if HARMLESS.contains(&statement.keyword) => {}
+            None => notes.about("passed over: statements of the MTL file before the first `newmtl`", statement.keyword),
+        }
     }
     Ok(all)
 }
 
 fn read(material: &mut Material, of: &Statement<'_>, notes: &mut Notes) -> Result<(), String> {
-    let last = || of.number(of.words().last().unwrap_or_default()).map(ToFloat::to_f32);
+    let last = || of.finite(of.words().last().unwrap_or_default());
     match of.keyword {
         "Kd" if of.rest.starts_with("spectral") || of.rest.starts_with("xyz") => {
             notes.about("passed over: colours as spectra or XYZ", &material.name);
@@ -208,11 +218,14 @@ fn read(material: &mut Material, of: &Statement<'_>, notes: &mut Notes) -> Resul
             if of.rest.starts_with("-halo") {
                 notes.about("passed over: the option -halo of `d`", &material.name);
             }
-            material.dissolve = Some(last()?);
+            material.dissolve = Some(share(of, last()?, &material.name, notes));
         }
-        "Tr" => material.transparency = Some(last()?),
-        "Ns" => material.shininess = Some(last()?),
-        "Pr" => material.roughness = Some(last()?),
+        "Tr" => material.transparency = Some(share(of, last()?, &material.name, notes)),
+        "Ns" => match last()? {
+            exponent if exponent >= 0.0 => material.shininess = Some(exponent),
+            _ => notes.about("passed over: negative exponents `Ns`", &material.name),
+        },
+        "Pr" => material.roughness = Some(share(of, last()?, &material.name, notes)),
         "map_Kd" => material.picture = Some(map(of, &material.name, notes)?),
         "map_d" => material.cut = Some(map(of, &material.name, notes)?),
         "Ke" | "Pm" if of.rest.split_whitespace().all(|word| word.parse() == Ok(0.0)) => {}
@@ -222,11 +235,23 @@ fn read(material: &mut Material, of: &Statement<'_>, notes: &mut Notes) -> Resul
     Ok(())
 }
 
+/// Cuts a number to 0 to 1, with a warning if it is beyond.
+fn share(of: &Statement<'_>, number: f32, material: &str, notes: &mut Notes) -> f32 {
+    if !(0.0..=1.0).contains(&number) {
+        notes.about(format!("numbers `{}` that are not between 0 and 1, cut to them", of.keyword), material);
+    }
+    fraction(number)
+}
+
 /// Reads one number for grey, or three.
 fn color(of: &Statement<'_>) -> Result<[f32; 3], String> {
     let few = if of.words().count() == 1 { 1 } else { 3 };
-    let [r, g, b] = of.numbers::<3>(few)?.map(ToFloat::to_f32);
-    Ok(if few == 1 { [r; 3] } else { [r, g, b] })
+    of.numbers::<3>(few)?;
+    let mut color = [0.0; 3];
+    for (band, word) in color.iter_mut().zip(of.words()) {
+        *band = of.finite(word)?;
+    }
+    Ok(if few == 1 { [color[0]; 3] } else { color })
 }
 
 /// Reads the options of a picture and its file name, which may have spaces.
@@ -247,9 +272,9 @@ fn map(of: &Statement<'_>, material: &str, notes: &mut Notes) -> Result<Map, Str
                 // The last word is the file's name, even if it is a number.
                 while numbers.len() < most
                     && let Some((first, _)) = rest.split_once(char::is_whitespace)
-                    && let Ok(number) = first.parse()
+                    && first.parse::<f32>().is_ok()
                 {
-                    numbers.push(number);
+                    numbers.push(of.finite(first)?);
                     rest = rest[first.len()..].trim_start();
                 }
                 let pair =

@@ -81,6 +81,42 @@ fn colours_beyond_one_are_reported_and_comments_left_out() {
     assert_eq!(model.warnings, Vec::<String>::new());
 }
 
+/// Rationale: a damaged number gave a plausible surface without a word. Expected: a number that is not finite is refused
+/// with its line, like that of a vertex; one out of range is cut or passed over with a warning.
+#[test]
+fn numbers_of_materials_are_checked() {
+    for damaged in
+        ["Kd .2 nan .1", "Kd inf", "Kd 1e39 0 0", "d nan", "Tr -inf", "Ns nan", "Pr NaN", "map_Kd -s nan a.png"]
+    {
+        let shown = refused(SQUARE, &format!("{GREEN}{damaged}\n"));
+        assert!(shown.contains("m.mtl: line 3: `") && shown.contains("` is not a finite number"), "{damaged}: {shown}");
+    }
+    for (beyond, warning) in [
+        ("d 1.5", "numbers `d` that are not between 0 and 1, cut to them: `green`"),
+        ("Tr -0.2", "numbers `Tr` that are not between 0 and 1, cut to them: `green`"),
+        ("Pr 7", "numbers `Pr` that are not between 0 and 1, cut to them: `green`"),
+        ("Kd .2 -5 .1", "colours that are not between 0 and 1, cut to them: `green`"),
+        ("Ns -5", "passed over: negative exponents `Ns`: `green`"),
+    ] {
+        assert_eq!(read(SQUARE, &format!("{GREEN}{beyond}\n")).warnings, [warning], "{beyond}");
+    }
+    assert_eq!(read(SQUARE, &format!("{GREEN}Pr 7\n")).surfaces[0].roughness, Some(1.0));
+    assert_eq!(read(SQUARE, &format!("{GREEN}Pr 1\nd 1\nNs 0\n")).warnings, Vec::<String>::new());
+}
+
+/// Expected: of two materials of one name the first counts, with a warning if they differ; statements that belong to no
+/// material are named.
+#[test]
+fn materials_described_twice_and_statements_without_one_are_reported() {
+    let twice = read(SQUARE, &format!("{GREEN}{}", GREEN.replace("0.5", "0.9")));
+    assert_eq!(twice.surfaces[0].color, [0.1, 0.5, 0.1]);
+    assert_eq!(twice.warnings, ["materials that are described twice and differently; the first counts: `green`"]);
+    let library_twice = format!("mtllib m.mtl\n{SQUARE}");
+    assert_eq!(read(&library_twice, GREEN).warnings, Vec::<String>::new());
+    let stray = read(SQUARE, &format!("Ka 0 0 0\nKd 1 0 0\n{GREEN}"));
+    assert_eq!(stray.warnings, ["passed over: statements of the MTL file before the first `newmtl`: `Kd`"]);
+}
+
 #[test]
 fn missing_materials_and_coordinates_are_reported() {
     let white = read(&SQUARE.replace("usemtl green", "usemtl blue"), GREEN);
