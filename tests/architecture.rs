@@ -141,7 +141,10 @@ const ALLOWED: &[(&str, &str)] = &[
     ),
     // Weights, in the format that training frameworks read.
     ("safetensors", "train/weights.rs"),
-    ("sha2", "field/library.rs field/named_file.rs model/files.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs"),
+    (
+        "sha2",
+        "field/library.rs field/named_file.rs model/files.rs dataset/ train/data/photos.rs train/run.rs train/weights.rs",
+    ),
     ("signal_hook", "cli/signal.rs"),
     // Parts hit by the samples of a pixel: nearly always one or two.
     ("smallvec", "film/tally.rs output/exr/cryptomatte.rs"),
