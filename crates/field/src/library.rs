@@ -474,12 +474,11 @@ impl Library {
 
     fn note(&mut self, path: &Path) -> Result<()> {
         let known = self.before.as_deref().filter(|_| self.trusts_images).and_then(|before| before.files.get(path));
-        let digest = match known {
-            Some(known) => *known,
-            None => {
-                self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
-                digest(path)?
-            }
+        let digest = if let Some(known) = known {
+            *known
+        } else {
+            self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
+            digest(path)?
         };
         self.files.insert(path.into(), digest);
         Ok(())
