@@ -33,6 +33,20 @@ fn has_comment(file: &Path) -> bool {
     fs::read(file).unwrap().windows(5).any(|bytes| bytes == b"seed:")
 }
 
+/// Returns the bytes of a PNG without its EXIF and XMP chunks, which images of datasets lack.
+fn without_tags(file: &Path) -> Vec<u8> {
+    let bytes = fs::read(file).unwrap();
+    let (mut kept, mut rest) = (bytes[..8].to_vec(), &bytes[8..]);
+    while let [a, b, c, d, kind @ ..] = rest {
+        let (chunk, behind) = rest.split_at(12 + u32::from_be_bytes([*a, *b, *c, *d]) as usize);
+        if !kind.starts_with(b"eXIf") && !kind.starts_with(b"iTXt") {
+            kept.extend(chunk);
+        }
+        rest = behind;
+    }
+    kept
+}
+
 /// Mean absolute difference of two images' values.
 fn apart(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
@@ -276,7 +290,8 @@ fn each_byte_lies_once() {
 }
 
 /// Rationale: generating a dataset may take months, across program versions. Expected: a recipe without an image format
-/// keeps writing images as before, with the bytes of the single field including the comment, also with `--image-format png`;
+/// keeps writing images as before, with the bytes of the single field including the comment but not the camera's tags, also
+/// with `--image-format png`;
 /// new datasets have no comment. The format that a dataset was started with is kept, and another one is refused.
 #[test]
 fn datasets_of_before_keep_their_bytes() {
@@ -294,7 +309,7 @@ fn datasets_of_before_keep_their_bytes() {
     run(&one, &["--index", "1", "--width", "96", "--spp", "2"]);
     for name in ["rgb.png", "nir.png", "semantics.png"] {
         let file = old.join("images/000001").join(name);
-        assert!(has_comment(&file) && fs::read(&file).unwrap() == fs::read(one.join(name)).unwrap(), "{name}");
+        assert!(has_comment(&file) && fs::read(&file).unwrap() == without_tags(&one.join(name)), "{name}");
     }
     assert!(!has_comment(&old.join("coco/images/val/000001.png")));
     succeed(verb("verify", &old, &["--rerender", "2"]));

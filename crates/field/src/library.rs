@@ -413,12 +413,11 @@ impl Library {
     /// Notes the hash of a file's contents, and returns it.
     fn note(&mut self, path: &Path) -> Result<[u8; 32]> {
         let known = self.before.as_deref().filter(|_| self.trusts_images).and_then(|before| before.files.get(path));
-        let hash = match known {
-            Some(known) => *known,
-            None => {
-                self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
-                digest(path)?
-            }
+        let hash = if let Some(known) = known {
+            *known
+        } else {
+            self.bytes_read += std::fs::metadata(path).map_or(0, |about| about.len());
+            digest(path)?
         };
         self.files.insert(path.into(), hash);
         Ok(hash)

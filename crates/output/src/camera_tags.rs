@@ -161,7 +161,7 @@ impl CameraTags {
         add("furrow:WorldToCamera", list(world_to_camera.iter().flatten().copied()));
         add("furrow:AnalogGain", list(bands.indices().iter().map(|k| photograph.shot.analog_gain[*k])));
         add("furrow:ExposureTimeS", list(bands.indices().iter().map(|k| photograph.shot.time_s[*k])));
-        let names: String = bands.names().iter().map(|name| format!("<rdf:li>{name}</rdf:li>")).collect();
+        let names: String = bands.names().iter().flat_map(|name| ["<rdf:li>", name, "</rdf:li>"]).collect();
         format!(
             "<?xpacket begin=\"\u{feff}\" id=\"W5M0MpCehiHzreSzNTczkc9d\"?>\n\
              <x:xmpmeta xmlns:x=\"adobe:ns:meta/\">\n\

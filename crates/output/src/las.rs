@@ -144,7 +144,7 @@ impl Las {
         let packing = if compressed { Some(self.packing()?) } else { None };
         if let Some(packing) = &packing {
             let mut bytes = Vec::new();
-            packing.write_to(&mut bytes).map_err(|error| failed(error.into()))?;
+            packing.write_to(&mut bytes).map_err(failed)?;
             records.push(((LazVlr::USER_ID, LazVlr::RECORD_ID, "points compressed by LASzip"), bytes));
         }
         let length: usize = records.iter().map(|(_, bytes)| usize::from(RECORD_HEADER) + bytes.len()).sum();
@@ -213,7 +213,7 @@ fn packed(begin: Vec<u8>, points: &[u8], packing: LazVlr) -> Result<Vec<u8>, Las
     Ok(out.into_inner())
 }
 
-fn failed(error: LasZipError) -> Error {
+fn failed(error: impl std::fmt::Display) -> Error {
     Error::failed(format!("cannot compress points: {error}"))
 }
 
