@@ -10,7 +10,7 @@ use super::shipped::species as shipped_species;
 use super::species::{LeafImage, NamedMaterial, Species, unlikely};
 use super::species_text::SpeciesFile;
 use furrow_base::input::{self, Outside, Scope, shipped};
-use furrow_base::math::{Spectrum, ToFloat, ToInt};
+use furrow_base::math::{Spectrum, ToInt};
 use furrow_base::ron_file::{Pick, RonFile, nearest};
 use furrow_base::{Error, Result};
 use furrow_grow::model::{Model, Up};

@@ -331,7 +331,7 @@ mod tests {
     fn turned_elsewhere() -> [(&'static str, Vec<u8>); 4] {
         const XMP: &[u8] = b"<x:xmpmeta><rdf:Description tiff:Orientation=\"6\"/></x:xmpmeta>";
         let exif: Vec<u8> = [b"Exif\0\0".to_vec(), exif(6, true)].concat();
-        let digits: String = exif.iter().map(|byte| format!("{byte:02x}")).collect();
+        let digits = exif.iter().fold(String::new(), |digits, byte| format!("{digits}{byte:02x}"));
         let lines = [&digits[..20], &digits[20..]].join("\n");
         let profile = format!("\nexif\n  {}\n{lines}\n", exif.len()).into_bytes();
         let packed = [b"Raw profile type exif\0\0", &stored_zlib(&profile)[..]].concat();

@@ -54,7 +54,7 @@ fn raw_profile(bytes: &[u8]) -> Option<Vec<u8>> {
     let is_exif = |keyword: &str| ["Raw profile type exif", "Raw profile type APP1"].contains(&keyword);
     let plain = reader.info().uncompressed_latin1_text.iter();
     let mut plain = plain.filter(|text| is_exif(&text.keyword)).map(|text| text.text.clone());
-    let packed = reader.info().compressed_latin1_text.iter().filter(|text| is_exif(&text.keyword));
+    let mut packed = reader.info().compressed_latin1_text.iter().filter(|text| is_exif(&text.keyword));
     let text = plain.next().or_else(|| {
         let mut packed = packed.next().cloned()?;
         packed.decompress_text_with_limit(MOST_TEXT).ok()?;
