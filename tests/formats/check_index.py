@@ -19,7 +19,7 @@ for record, row in zip(records, images.to_dict("records"), strict=True):
     assert row["spp"] == (sampling["spp"] if sampling else asked), row["spp"]
 plants = [plant for record in records for plant in record["plants"]]
 # Each row names its image as the table of images does, also in CSV.
-ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
+ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame", "light"]
 told = {row["image"]: row for row in images[ORIGIN].to_dict("records")}
 read = lambda name: pandas.read_csv(root / "traits" / name, dtype={"image": str})
 leaves = pandas.read_parquet(root / "traits/leaves.parquet")

@@ -17,13 +17,13 @@ plants, leaves, views = read("plants.csv"), read("leaves.csv"), read("images.csv
 assert list(views["image"]) == list(images)
 assert len(plants) == sum(len(i.record["plants"]) for i in images.values())
 assert len(leaves) == sum(len(p["leaves"]) for i in images.values() for p in i.record["plants"])
-ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
-assert list(plants.columns[:11]) == [*ORIGIN, "plant", "id", "class", "species"]
-assert list(leaves.columns[:10]) == [*ORIGIN, "plant", "leaf", "id"]
-assert list(views.columns[:7]) == ORIGIN
+ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame", "light"]
+assert list(plants.columns[:12]) == [*ORIGIN, "plant", "id", "class", "species"]
+assert list(leaves.columns[:11]) == [*ORIGIN, "plant", "leaf", "id"]
+assert list(views.columns[:8]) == ORIGIN
 for rows in (plants, leaves, views):
-    # One image per field: no camera, no day, no frame.
-    assert (rows["field"] == rows["number"]).all() and rows[["camera", "day", "frame"]].isna().all(axis=None)
+    # One image per field: no camera, no day, no frame, no light.
+    assert (rows["field"] == rows["number"]).all() and rows[["camera", "day", "frame", "light"]].isna().all(axis=None)
     assert all(images[name].record["index"] == number for name, number in zip(rows["image"], rows["number"]))
 
 table = pd.read_parquet(dataset / "traits" / "leaves.parquet")
