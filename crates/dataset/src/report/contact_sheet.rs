@@ -27,7 +27,7 @@ const QUALITY: u8 = 82;
 
 /// Returns the contact sheet. `names` are the images of each split, in the order of [`Split::ALL`].
 pub(super) fn sheet(set: &Set, names: &[Vec<String>; 3]) -> Result<Markup> {
-    let all: Vec<&String> = chosen(names.each_ref().map(Vec::len))
+    let all: Vec<&String> = chosen(names.each_ref().map(Vec::len), set.recipe.lights().to_usize())
         .into_iter()
         .zip(names)
         .flat_map(|(places, names)| places.into_iter().map(move |k| &names[k]))
@@ -147,8 +147,8 @@ fn tools(properties: &[ImageProperties]) -> Markup {
 }
 
 /// Returns the indices of the images to show for splits of these sizes: the same number from each split if it has
-/// enough, spread evenly over it.
-fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
+/// enough, spread evenly over it and over the `lights` of a view, whose images follow one another.
+fn chosen(sizes: [usize; Split::ALL.len()], lights: usize) -> [Vec<usize>; Split::ALL.len()] {
     let mut quota = [0; Split::ALL.len()];
     while quota.iter().sum::<usize>() < MOST && quota != sizes {
         // Chooses the split with the fewest chosen images among those with images left.
@@ -157,7 +157,9 @@ fn chosen(sizes: [usize; Split::ALL.len()]) -> [Vec<usize>; Split::ALL.len()] {
             quota[k] += 1;
         }
     }
-    std::array::from_fn(|k| (0..quota[k]).map(|i| i * sizes[k] / quota[k]).collect())
+    // A split never cuts a view, so its size is a multiple of `lights`.
+    let place = |i: usize, k: usize| i * sizes[k] / quota[k] / lights * lights + i % lights;
+    std::array::from_fn(|k| (0..quota[k]).map(|i| place(i, k)).collect())
 }
 
 /// Returns the card of one image: image, labels, caption.
@@ -286,11 +288,15 @@ mod tests {
 
     #[test]
     fn every_split_is_shown_in_the_contact_sheet() {
-        assert_eq!(chosen([10, 1, 1]), [(0..10).collect(), vec![0], vec![0]]);
-        let many = chosen([80_000, 10_000, 10_000]);
+        assert_eq!(chosen([10, 1, 1], 1), [(0..10).collect(), vec![0], vec![0]]);
+        let many = chosen([80_000, 10_000, 10_000], 1);
         assert_eq!(many.each_ref().map(Vec::len), [8, 8, 8]);
         assert_eq!(many[0][1], 10_000);
-        assert_eq!(chosen([100, 0, 2]).map(|p| p.len()), [22, 0, 2]);
-        assert_eq!(chosen([0, 0, 0]).map(|p| p.len()), [0, 0, 0]);
+        assert_eq!(chosen([100, 0, 2], 1).map(|p| p.len()), [22, 0, 2]);
+        assert_eq!(chosen([0, 0, 0], 1).map(|p| p.len()), [0, 0, 0]);
+        // Every light of 48 images is shown equally often, and all images if there is room for them.
+        let lit = chosen([48, 0, 0], 4)[0].clone();
+        assert!((0..4).all(|light| lit.iter().filter(|k| **k % 4 == light).count() == 6), "{lit:?}");
+        assert_eq!(chosen([12, 4, 0], 4), [(0..12).collect(), (0..4).collect(), vec![]]);
     }
 }

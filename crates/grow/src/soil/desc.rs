@@ -55,8 +55,8 @@ pub struct SoilDesc {
     /// Relief of the ground.
     #[serde(default)]
     pub relief: ReliefDesc,
-    /// Effect of rain since the last tillage: 0 freshly tilled, 0.5 a thin crust with the larger clods left, 1 a smooth,
-    /// slaked surface without crumbs. The book's page on soil has the formula.
+    /// Effect of rain since the last tillage: 0 freshly tilled, 0.5 a thin crust, 1 a slaked surface without crumbs; clods
+    /// above about 20 mm remain. The book's page on soil has the formula.
     #[serde(default = "dry_since")]
     pub slaked: Vary<Fraction>,
     /// Cracks of a dried crust; default none.

@@ -146,6 +146,7 @@ pub struct MomentRecord {
     /// Degrees east.
     pub longitude_deg: f64,
     /// Universal time, rounded to seconds.
+    #[serde(deserialize_with = "Utc::of_record")]
     pub utc: Utc,
 }
 

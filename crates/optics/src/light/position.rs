@@ -79,6 +79,12 @@ impl Utc {
         Self { year, month, day, hour: of_day / 3600, minute: of_day / 60 % 60, second: of_day % 60 }
     }
 
+    /// Reads the time of a record, which is JSON; scene files are RON and have errors with places.
+    pub(super) fn of_record<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        Self::parse(&text).map_err(serde::de::Error::custom)
+    }
+
     /// Returns year, month and day.
     pub fn date(self) -> [u32; 3] {
         [self.year.unsigned_abs(), self.month, self.day]

@@ -64,7 +64,7 @@ layered! {
         pub azimuth_deg: (Num<Signed<360>>, Num<Signed<360>>) = Given<(Num<Signed<360>>, Num<Signed<360>>)>,
         /// Rotation rate, turns per second, or scans per second of a `Rosette`; default 10.
         pub rotation_hz: Num<Positive<1000>> = Given<Num<Positive<1000>>>,
-        /// Pulse rate; default 18,084 per second for each beam.
+        /// Pulse rate; default 289,352 per second of all beams.
         #[schemars(extend("x-example" = "StepDeg(0.2)"))]
         pub pulses: PulsesDesc = Given<PulsesDesc>,
         /// Full divergence of a beam between the directions of 1/e² of its intensity, milliradians, which is 1.7 times
