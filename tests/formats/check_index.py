@@ -19,12 +19,13 @@ for record, row in zip(records, images.to_dict("records"), strict=True):
     assert row["spp"] == (sampling["spp"] if sampling else asked), row["spp"]
 plants = [plant for record in records for plant in record["plants"]]
 # Each row names its image as the table of images does, also in CSV.
-ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame", "light"]
+ORIGIN = ["image", "number", "split", "field", "camera", "day", "frame"]
 told = {row["image"]: row for row in images[ORIGIN].to_dict("records")}
 read = lambda name: pandas.read_csv(root / "traits" / name, dtype={"image": str})
 leaves = pandas.read_parquet(root / "traits/leaves.parquet")
 for rows in (table, leaves, read("plants.csv"), read("leaves.csv"), read("images.csv")):
-    assert list(rows.columns[: len(ORIGIN)]) == ORIGIN, list(rows.columns)
+    # One light, so the column of lights is empty.
+    assert list(rows.columns[: len(ORIGIN) + 1]) == [*ORIGIN, "light"] and rows["light"].isna().all(), list(rows.columns)
     assert len(rows) > 0 and all(row == told[row["image"]] for row in rows[ORIGIN].to_dict("records"))
 assert list(read("images.csv")["image"]) == list(images["image"])
 NAMES = "holes shot_holes bites tears chlorosis blotches spots scorched scorch reddening dust splash wilt pale_young"

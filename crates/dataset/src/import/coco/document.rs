@@ -76,11 +76,10 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Document> {
         for (rust, words) in [("expected f64", "expected a number"), ("expected f32", "expected a number")] {
             what = what.replace(rust, words);
         }
-        match spot::of(text, e.line(), e.column()) {
-            // The error about a missing key is at the end of the entry.
-            Some(spot) => {
-                Error::input(format!("{}: {what}", spot.within(!what.starts_with("missing field")))).help(HELP)
-            }
+        // The error about a missing key is at the bracket that closes the entry.
+        let lacks = what.starts_with("missing field");
+        match spot::of(text, e.line(), e.column().saturating_sub(usize::from(lacks))) {
+            Some(spot) => Error::input(format!("{}: {what}", spot.within(!lacks))).help(HELP),
             None => Error::input(format!("this is not a COCO file of instances: {e}")),
         }
         .in_file(path)
