@@ -129,16 +129,13 @@ impl Renderer {
                 lit.push((*light, scene.camera, scene.lights.clone()));
             }
         }
+        let Some((light, camera)) = lit.first().map(|(light, camera, _)| (*light, *camera)) else {
+            return Ok(BTreeMap::new());
+        };
         // An exposure time of its own moves the rays of a blurred camera.
-        if let Some((_, first, _)) = lit.first() {
-            let first = *first;
-            lit.retain(|(_, camera, _)| *camera == first);
-        }
-        let Some((_, camera, _)) = lit.first() else { return Ok(BTreeMap::new()) };
+        lit.retain(|(_, other, _)| *other == camera);
         let window = Window::full(camera.width(), camera.height());
-        if let Some((light, ..)) = lit.first() {
-            field.relight(*light)?;
-        }
+        field.relight(light)?;
         let world = field.world()?;
         let worlds: Vec<World<'_>> = lit.iter().map(|(_, _, lights)| world.under(lights)).collect();
         let integrator = View::Path.integrator(path(&self.options.techniques));

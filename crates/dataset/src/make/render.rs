@@ -104,7 +104,7 @@ pub struct CachedField {
     next: Vec<u64>,
 }
 
-/// What images of one view under several lights share.
+/// Data that the images of one view under several lights share.
 #[derive(Default)]
 struct CachedView {
     /// Number of the view among those of the field and day that were built last.
@@ -215,8 +215,7 @@ pub fn render(
     Ok(RenderedSample { sample, text, times: Times { grow, draw, label: label + begin.elapsed() } })
 }
 
-/// Returns the lights of an image and of those images that are made next and show the same view, as many as fit into
-/// [`FILMS`].
+/// Returns the lights of an image and of the following images of the same view. [`FILMS`] limits their number.
 fn of_view(recipe: &Recipe, index: u64, next: &[u64]) -> Result<Vec<u64>> {
     let Rendering { width, height, .. } = recipe.rendering()?;
     let film = u64::from(*width) * u64::from(*height) * size_of::<Pixel>().to_u64();

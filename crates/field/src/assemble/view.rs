@@ -307,7 +307,7 @@ fn beyond(places: impl Iterator<Item = Vec2>, area: Rect, below: Vec2) -> (f32, 
 mod tests {
     use super::*;
 
-    /// Rationale: "0 m², more than the 0.36 m²" tells nothing. Expected: both numbers with three significant digits, and
+    /// Rationale: "0 m², more than the 0.36 m²" is a contradiction. Expected: both numbers with three significant digits, and
     /// the larger one never reads as the smaller.
     #[test]
     fn areas_are_written_so_that_they_differ() {
