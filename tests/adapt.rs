@@ -8,6 +8,7 @@
 //! interrupted or not; one clear error for invalid arguments. Source: the construction of the images, and the output of
 //! `train adapt --help`.
 
+use crate::common::training::wait_for_steps;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_output::{ImageData, write_png};
 use furrow_train::measure::Report;
@@ -16,7 +17,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
-use std::time::Duration;
 
 const SIZE: (u32, u32) = (64, 48);
 
@@ -116,18 +116,17 @@ fn photographs_without_labels_make_a_network_better_on_others_like_them() {
     assert!(few.iter().all(|bytes| *bytes == few[0]), "the weights depend on labels or folders");
 
     // After interruptions, the same command resumes and ends with the same weights.
-    let (whole, stopped) = (folder.join("whole"), folder.join("stopped"));
-    succeed(&adapt(&images, &whole, 6));
+    let stopped = folder.join("stopped");
     let mut stops = 0;
-    for pause in [400, 900] {
-        let mut child = train(&adapt(&images, &stopped, 6)).stderr(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(pause));
-        let _ = Command::new("sh").arg("-c").arg(format!("kill -TERM {}", child.id())).status();
+    for steps in [1, 12] {
+        let mut child = train(&adapt(&images, &stopped, 40)).stderr(Stdio::null()).spawn().unwrap();
+        wait_for_steps(&stopped, steps, &mut child);
+        let _ = Command::new("kill").arg("-TERM").arg(child.id().to_string()).status();
         stops += usize::from(!child.wait().unwrap().success());
     }
     assert!(stops > 0, "every run finished before it could be stopped");
-    succeed(&adapt(&images, &stopped, 6));
-    assert_eq!(weights(&stopped), weights(&whole));
+    succeed(&adapt(&images, &stopped, 40));
+    assert_eq!(weights(&stopped), weights(&adapted));
 
     // The report and the plan record that photographs were used.
     let page = fs::read_to_string(adapted.join("report.html")).unwrap();

@@ -6,6 +6,7 @@
 //! clear error with exit code 2 if a run cannot be resumed. Source: the output of `train fit --help`.
 
 use crate::common::python::{ask, python};
+use crate::common::training::wait_for_steps;
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
@@ -120,14 +121,6 @@ fn eight_images_are_learnt_by_every_network_and_judged_so() {
             assert!(out.join("eval/set").join(name).is_file(), "{name}");
         }
         assert!(!out.join("checkpoint.safetensors").exists());
-    }
-}
-
-/// Waits until the log of a training holds `steps` rows below its header, or until the training ends.
-fn wait_for_steps(run: &Path, steps: usize, child: &mut std::process::Child) {
-    let rows = || fs::read_to_string(run.join("log.csv")).map_or(0, |log| log.lines().count());
-    while rows() <= steps && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
     }
 }
 

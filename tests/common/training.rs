@@ -6,7 +6,7 @@ use furrow_base::sampling::{Purpose, Stream};
 use furrow_dataset::model::classes::Classes;
 use furrow_train::data::{Band, Pick, Selection, Shape};
 use furrow_train::fit::hyper::NormalizationMode;
-use furrow_train::fit::{Callbacks, Hyperparameters, Plan};
+use furrow_train::fit::{Callbacks, Hyperparameters, Plan, log};
 use furrow_train::net::{Network, Role, parameters};
 use furrow_train::run::TrainedModel;
 use furrow_train::session::{self, Machine};
@@ -130,4 +130,12 @@ pub fn normalised(learnt: &TrainedModel, pictures: &[u8], (width, height): (u32,
         learnt.card.normalization.apply(image, bands);
     }
     pixels
+}
+
+/// Waits until the log of a training holds `steps` rows below its header, or until the training ends.
+pub fn wait_for_steps(run: &Path, steps: usize, child: &mut std::process::Child) {
+    let rows = || std::fs::read_to_string(run.join(log::CSV)).map_or(0, |log| log.lines().count());
+    while rows() <= steps && child.try_wait().expect("the state of a training").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
 }
