@@ -7,7 +7,11 @@
 //!
 //! Colours are the opponent colours (R + 2 G + B) / 4, G − (R + B) / 2 and R − B, each standardized by its mean and standard
 //! deviation in the image, so that exposure, white balance and contrast do not matter.
+//!
+//! Where colours separate plants from soil, but the network finds only part of the plants, [`super::self_training`] replaces the
+//! fraction of plant pixels.
 
+use super::self_training;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
 
 /// Number of bins of the colour grid along each axis.
@@ -26,15 +30,33 @@ const SURE: f64 = 1e-3;
 /// the indices of red, green and blue among them. The ratios between the plant classes are kept.
 pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilities: &mut [f32]) {
     let n = pixels.len() / bands;
-    let bins = bins(pixels, bands, rgb);
+    let colours = standardized(pixels, bands, rgb);
+    let bins: Vec<u16> = colours.iter().map(bin).collect();
     let (soil, plants) = probabilities.split_at_mut(n);
+    // Summed instead of 1 − soil, which would round small probabilities away.
+    let mut own = vec![0.0f64; n];
+    for plane in plants.chunks_exact(n.max(1)) {
+        own.iter_mut().zip(plane).for_each(|(own, p)| *own += f64::from(*p));
+    }
     let alike = alike(&bins, soil);
+    let combined = |own: f64, of_colour: f64| {
+        let odds = (1.0 - WEIGHT) * log_odds(own) + WEIGHT * log_odds(of_colour);
+        1.0 / (1.0 + (-odds).exp())
+    };
+    let by_colour = |of_colour: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        own.iter().enumerate().map(|(at, own)| combined(*own, of_colour(at))).collect()
+    };
+    let mut plant = by_colour(&|at| alike[usize::from(bins[at])]);
+    if let Some(learnt) = self_training::probabilities(&colours, &own) {
+        let grown = by_colour(&|at| learnt[at]);
+        let mask = |p: &[f64]| -> Vec<bool> { p.iter().map(|p| *p > 0.5).collect() };
+        if self_training::separates(&colours, &mask(&plant), &mask(&grown)) {
+            plant = grown;
+        }
+    }
     let classes = plants.len() / n.max(1);
     for (at, soil) in soil.iter_mut().enumerate() {
-        // Summed instead of 1 − soil, which would round small probabilities away.
-        let own: f64 = plants.iter().skip(at).step_by(n).map(|p| f64::from(*p)).sum();
-        let odds = (1.0 - WEIGHT) * log_odds(own) + WEIGHT * log_odds(alike[usize::from(bins[at])]);
-        let plant = 1.0 / (1.0 + (-odds).exp());
+        let (own, plant) = (own[at], plant[at]);
         *soil = (1.0 - plant).to_f32();
         for p in plants.iter_mut().skip(at).step_by(n) {
             *p = (if own > 0.0 { f64::from(*p) * plant / own } else { plant / classes.to_f64() }).to_f32();
@@ -47,8 +69,8 @@ fn log_odds(p: f64) -> f64 {
     (p / (1.0 - p)).ln()
 }
 
-/// Returns the grid bin of each pixel's colour.
-fn bins(pixels: &[f32], bands: usize, rgb: [usize; 3]) -> Vec<u16> {
+/// Returns the opponent colours of each pixel, standardized over the image: lightness, greenness, and red against blue.
+fn standardized(pixels: &[f32], bands: usize, rgb: [usize; 3]) -> Vec<[f32; 3]> {
     let opponent = |pixel: &[f32]| {
         let [r, g, b] = rgb.map(|place| pixel[place]);
         [0.25 * (r + 2.0 * g + b), g - 0.5 * (r + b), r - b]
@@ -64,15 +86,20 @@ fn bins(pixels: &[f32], bands: usize, rgb: [usize; 3]) -> Vec<u16> {
         let mean = sum / n;
         (mean.to_f32(), (squares / n - mean * mean).max(0.0).sqrt().to_f32().max(f32::EPSILON))
     });
-    let bin = |value: f32, (mean, sd): (f32, f32)| {
-        let place = ((value - mean) / sd + REACH) * (BINS.to_f32() / (2.0 * REACH));
-        place.max(0.0).trunc_to::<usize>().min(BINS - 1)
-    };
     let of = |pixel: &[f32]| {
         let values = opponent(pixel);
-        (0..3).fold(0, |at, axis| at * BINS + bin(values[axis], scales[axis])).to_u16()
+        std::array::from_fn(|axis| (values[axis] - scales[axis].0) / scales[axis].1)
     };
     pixels.chunks_exact(bands).map(of).collect()
+}
+
+/// Returns the grid bin of a standardized colour.
+fn bin(colour: &[f32; 3]) -> u16 {
+    let along = |value: f32| {
+        let place = (value + REACH) * (BINS.to_f32() / (2.0 * REACH));
+        place.max(0.0).trunc_to::<usize>().min(BINS - 1)
+    };
+    colour.iter().fold(0, |at, value| at * BINS + along(*value)).to_u16()
 }
 
 /// Returns the fraction of plant pixels among the pixels of each bin and its neighbours, after blurring; 0 in empty bins.

@@ -17,6 +17,7 @@ mod appearance;
 mod colour;
 mod plants;
 mod rows;
+mod self_training;
 
 use super::data::Band;
 use furrow_base::math::ToInt;
