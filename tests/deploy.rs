@@ -536,6 +536,18 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
     let stated: Prediction = run::read_json(&out.join("prediction.json")).unwrap();
     assert_eq!(stated.pictures.keys().collect::<Vec<_>>(), ["large", "same", "small"]);
 
+    assert!(stated.evidence.is_empty() && stated.appearance.is_none(), "nothing was refined");
+
+    // What refinement changed is recorded and printed; one image is too little for appearance.
+    let refined = at("refined");
+    let told = succeed(train(&["predict", "any-field", path(&photos.join("large.png")), "--out", path(&refined)]));
+    let told = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert!(told.contains("refinement: plants ") && told.contains("appearance skipped"), "{told}");
+    let described: Prediction = run::read_json(&refined.join("prediction.json")).unwrap();
+    assert_eq!((described.appearance, described.evidence.len()), (Some(false), 1));
+    let found = &described.evidence["large"];
+    assert!((0.0..=1.0).contains(&found.vegetation) && (0.0..=1.0).contains(&found.reclassified), "{found:?}");
+
     // Masks written beside the photographs would overwrite them.
     let message = fail(train(&["predict", path(&RGB), path(&photos), "--out", path(&photos)]), 2);
     assert!(

@@ -12,6 +12,7 @@ use furrow_train::deploy::guard::{self, Implausible};
 use furrow_train::deploy::input_images::{self, InputImage, Prediction};
 use furrow_train::deploy::predict::{self, Options, Predictions};
 use furrow_train::ensemble::Ensemble;
+use furrow_train::refine::Evidence;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
@@ -133,6 +134,11 @@ impl Job<'_> {
             let each = predicted.seconds / predicted.done.to_f64();
             let pictures = if predicted.done == 1 { "image" } else { "images" };
             furrow_cli::message!("{} {pictures}, {each:.3} s in the network per image", predicted.done);
+            let all: Vec<&Evidence> = predicted.evidence.values().collect();
+            let refine = trained.card.refine;
+            if let Some(words) = Evidence::summary(&all, refine.rows, refine.appearance, predicted.appearance) {
+                furrow_cli::message!("{words}");
+            }
         }
         Ok(predicted)
     }

@@ -9,7 +9,7 @@
 
 use super::guard::Implausible;
 use crate::data::{Band, Pick, Resize, Selection, Shape, bands};
-use crate::refine::Refine;
+use crate::refine::{Evidence, Refine};
 use crate::run::{self, ModelCard};
 use furrow_base::{Error, Result};
 use furrow_dataset::Set;
@@ -329,10 +329,17 @@ pub struct Prediction {
     /// Result of the last prediction in this folder, if it labelled implausibly little vegetation as crop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub implausible: Option<Implausible>,
+    /// `true` if the last prediction in this folder learnt an appearance model from its images, `false` if it was asked to but could not, absent if it
+    /// was not asked to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub appearance: Option<bool>,
     /// Class names in the order of the class numbers, with their sRGB colours.
     pub classes: Vec<(String, [u8; 3])>,
     /// Path of the image of each prediction, by prediction name.
     pub pictures: BTreeMap<String, String>,
+    /// What refinement changed in each image, by prediction name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub evidence: BTreeMap<String, Evidence>,
 }
 
 /// Default of `resize` for files of version 0.1, which always stretched.
@@ -360,7 +367,7 @@ impl Prediction {
         if there.as_ref().is_some_and(|t| t.refine != card.refine) {
             return refuse(&path, "this folder holds predictions with another --refine".into());
         }
-        let mut all = there.map(|t| t.pictures).unwrap_or_default();
+        let (mut all, evidence) = there.map(|t| (t.pictures, t.evidence)).unwrap_or_default();
         for picture in pictures {
             let photo = picture.identity()?;
             match all.get(&picture.name) {
@@ -391,8 +398,10 @@ impl Prediction {
             refine: card.refine,
             crops: card.crops.clone(),
             implausible: None,
+            appearance: None,
             classes,
             pictures: all,
+            evidence,
         };
         run::write_json(&path, &prediction)?;
         Ok(prediction)
@@ -405,9 +414,18 @@ impl Prediction {
         run::write_json(&path, &Self { implausible: Some(implausible.clone()), ..there })
     }
 
-    /// Removes the named images, which could not be read, unless a prediction of them exists; deletes the file if none is left.
-    pub fn forget(mut self, folder: &Path, names: &[&str]) -> Result<()> {
-        let names: BTreeSet<&str> = names.iter().copied().collect();
+    /// Adds what refinement changed, and whether an appearance model was learnt. Removes the images `unread`, which could not be read, unless a prediction of them exists; deletes the file
+    /// if none is left.
+    pub fn finish(
+        mut self,
+        folder: &Path,
+        unread: &[&str],
+        evidence: &BTreeMap<String, Evidence>,
+        appearance: bool,
+    ) -> Result<()> {
+        let names: BTreeSet<&str> = unread.iter().copied().collect();
+        self.appearance = self.refine.appearance.then_some(appearance);
+        self.evidence.extend(evidence.clone());
         self.pictures.retain(|name, _| !names.contains(name.as_str()) || folder.join(&files(name)[0]).exists());
         let path = folder.join(PREDICTION);
         if self.pictures.is_empty() {

@@ -8,7 +8,7 @@ use super::overlay;
 use crate::data::resize::{self, Input};
 use crate::enlarge;
 use crate::ensemble::Ensemble;
-use crate::refine::{Appearance, Refine};
+use crate::refine::{Appearance, Evidence, Refine};
 use crate::run::ModelCard;
 use crate::session::Machine;
 use crate::torch::multiscale::{self, Scores};
@@ -16,6 +16,7 @@ use crate::torch::{Model, device, guarded};
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_output::ImageData as Png;
+use std::collections::BTreeMap;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,6 +53,10 @@ pub struct Predictions {
     pub seconds: f64,
     /// Number of pixels of each class, in the order of the class numbers.
     pub pixels: Vec<u64>,
+    /// What refinement changed in each image, by prediction name; empty without refinement.
+    pub evidence: BTreeMap<String, Evidence>,
+    /// `true` if an appearance model of crop and weeds was learnt from the images.
+    pub appearance: bool,
 }
 
 /// An image that has been read and prepared for the network.
@@ -133,8 +138,9 @@ fn predict_here(
         written.sort_by_key(|(number, _)| *number);
         made.done = written.len();
         made.pixels = vec![0; card.classes.len()];
-        for (_, drawn) in written {
+        for (number, drawn) in written {
             made.paths.extend(drawn.paths);
+            made.evidence.extend(drawn.evidence.map(|found| (pictures[number].name.clone(), found)));
             for (sum, pixels) in made.pixels.iter_mut().zip(drawn.pixels) {
                 *sum += pixels;
             }
@@ -145,9 +151,8 @@ fn predict_here(
         let words = format!("stopped: {} of {} images are predicted", made.done, pictures.len());
         return Err(Error::stopped(words).help("run the same command again to predict all of them").in_file(out));
     }
-    if !unread.is_empty() {
-        prediction.forget(out, &unread)?;
-    }
+    made.appearance = appearance.is_some();
+    prediction.finish(out, &unread, &made.evidence, made.appearance)?;
     made.paths.push(out.join(PREDICTION));
     Ok(made)
 }
@@ -212,6 +217,7 @@ struct Drawn {
     paths: [PathBuf; 2],
     /// Number of pixels of each class.
     pixels: Vec<u64>,
+    evidence: Option<Evidence>,
 }
 
 /// Starts a thread that writes the predictions sent to it; sets `failed` if a file cannot be written.
@@ -294,7 +300,7 @@ fn draw(
     appearance: Option<&Appearance>,
 ) -> Result<Drawn> {
     let (width, height) = (ready.width, ready.height);
-    scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
+    let evidence = scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
     let colors = card.classes.colors();
     let classes = enlarge::classes_at(&scores.values, scores.size, (width, height));
     let over = overlay::draw(&ready.rgb, &classes, width, &colors);
@@ -316,5 +322,5 @@ fn draw(
     for class in &classes {
         pixels[usize::from(*class)] += 1;
     }
-    Ok(Drawn { paths, pixels })
+    Ok(Drawn { paths, pixels, evidence })
 }

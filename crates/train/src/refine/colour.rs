@@ -27,8 +27,8 @@ const WEIGHT: f64 = 0.7;
 const SURE: f64 = 1e-3;
 
 /// Refines the class probabilities of an image in place: one plane per class, soil first. `pixels` has `bands` values a pixel; `rgb` holds
-/// the indices of red, green and blue among them. The ratios between the plant classes are kept.
-pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilities: &mut [f32]) {
+/// the indices of red, green and blue among them. The ratios between the plant classes are kept. Returns `true` if self-training was used.
+pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilities: &mut [f32]) -> bool {
     let n = pixels.len() / bands;
     let colours = standardized(pixels, bands, rgb);
     let bins: Vec<u16> = colours.iter().map(bin).collect();
@@ -47,11 +47,12 @@ pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilitie
         own.iter().enumerate().map(|(at, own)| combined(*own, of_colour(at))).collect()
     };
     let mut plant = by_colour(&|at| alike[usize::from(bins[at])]);
+    let mut is_learnt = false;
     if let Some(learnt) = self_training::probabilities(&colours, &own) {
         let grown = by_colour(&|at| learnt[at]);
         let mask = |p: &[f64]| -> Vec<bool> { p.iter().map(|p| *p > 0.5).collect() };
         if self_training::separates(&colours, &mask(&plant), &mask(&grown)) {
-            plant = grown;
+            (plant, is_learnt) = (grown, true);
         }
     }
     let classes = plants.len() / n.max(1);
@@ -62,6 +63,7 @@ pub(super) fn refine(pixels: &[f32], bands: usize, rgb: [usize; 3], probabilitie
             *p = (if own > 0.0 { f64::from(*p) * plant / own } else { plant / classes.to_f64() }).to_f32();
         }
     }
+    is_learnt
 }
 
 fn log_odds(p: f64) -> f64 {

@@ -15,6 +15,7 @@
 
 mod appearance;
 mod colour;
+mod evidence;
 mod plants;
 mod rows;
 mod self_training;
@@ -25,6 +26,7 @@ use furrow_dataset::model::classes::Classes;
 use serde::{Deserialize, Serialize};
 
 pub use appearance::{Appearance, Examples, Features};
+pub use evidence::Evidence;
 
 /// Refinement steps to apply, in the order of the table above.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -128,23 +130,36 @@ impl Refine {
     }
 
     /// Refines the probabilities of an image in place, classes × height × width. `appearance` is the result of
-    /// [`Appearance::learn`] for its field; the step is skipped if it is `None`.
-    pub fn apply(self, seen: &Seen<'_>, probabilities: &mut [f32], appearance: Option<&Appearance>) {
-        self.recolour(seen, probabilities);
+    /// [`Appearance::learn`] for its field; the step is skipped if it is `None`. Returns what changed.
+    pub fn apply(self, seen: &Seen<'_>, probabilities: &mut [f32], appearance: Option<&Appearance>) -> Evidence {
+        let n = seen.extent().0 * seen.extent().1;
+        let network = plants::classes(n, probabilities);
+        let learnt_colours = self.recolour(seen, probabilities);
+        let coloured = plants::classes(n, probabilities);
+        let row_score = self.vote(seen, probabilities, appearance);
+        let found = Evidence::of(&network, &coloured, &plants::classes(n, probabilities));
+        Evidence { learnt_colours, row_score, ..found }
+    }
+
+    /// Applies `plants`, `rows` and `appearance`. Returns the row score.
+    fn vote(self, seen: &Seen<'_>, probabilities: &mut [f32], appearance: Option<&Appearance>) -> Option<f64> {
         if !self.plants {
-            return;
+            return None;
         }
         let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
         if !self.rows {
             let classes = found.voted();
-            return found.write(probabilities, |_, region| classes[region]);
+            found.write(probabilities, |_, region| classes[region]);
+            return None;
         }
-        let odds = found.arranged();
+        let (odds, row_score) = found.arranged();
         let Some((appearance, features)) = appearance.filter(|_| self.appearance).zip(seen.features) else {
-            return found.write(probabilities, |_, region| plants::crop_or_weed(odds[region]));
+            found.write(probabilities, |_, region| plants::crop_or_weed(odds[region]));
+            return row_score;
         };
         let looks = appearance.log_odds(&found.regions, seen.extent(), features);
         found.write(probabilities, |at, region| plants::crop_or_weed(odds[region] + looks[at]));
+        row_score
     }
 
     /// Returns the plants of an image as examples for [`Appearance::learn`]; the probabilities are refined by `colour` in place.
@@ -153,13 +168,13 @@ impl Refine {
         let features = seen.features.filter(|_| self.appearance)?;
         self.recolour(seen, probabilities);
         let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
-        Some(Examples::of(&found.regions, seen.extent(), &found.arranged(), features))
+        Some(Examples::of(&found.regions, seen.extent(), &found.arranged().0, features))
     }
 
-    fn recolour(self, seen: &Seen<'_>, probabilities: &mut [f32]) {
-        if let (true, Some(rgb)) = (self.colour, colour_bands(seen.bands)) {
-            colour::refine(seen.pixels, seen.bands.len(), rgb, probabilities);
-        }
+    /// Applies `colour`. Returns `true` if the colours of plants were learnt from the image.
+    fn recolour(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> bool {
+        let rgb = colour_bands(seen.bands).filter(|_| self.colour);
+        rgb.is_some_and(|rgb| colour::refine(seen.pixels, seen.bands.len(), rgb, probabilities))
     }
 }
 

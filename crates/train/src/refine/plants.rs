@@ -17,7 +17,7 @@ const PLACE: f64 = 50.0;
 /// Zero of the distance term, in half row spacings from a row: nearer regions lean to crop, farther ones to weed.
 const NEAR: f64 = 0.3;
 /// Surplus of the row score, standard deviations, that gives rows a probability of 0.5.
-const LIKELY: f64 = 2.0;
+pub(super) const LIKELY: f64 = 2.0;
 /// Surplus of the row score, standard deviations, below which the lines found are ignored.
 const CHANCE: f64 = 1.0;
 /// Probability added to the mean of both classes over a region, so that the log odds stay finite.
@@ -55,10 +55,12 @@ impl PlantRegions {
         self.sums.chunks_exact(self.classes.max(1)).map(winner).collect()
     }
 
-    /// Returns the log odds of crop over weed of each region, from the network, rows and sizes. The classes must be soil, crop and weed.
-    pub(super) fn arranged(&self) -> Vec<f64> {
+    /// Returns the log odds of crop over weed of each region, from the network, rows and sizes, and the row score, `None` without
+    /// plants. The classes must be soil, crop and weed.
+    pub(super) fn arranged(&self) -> (Vec<f64>, Option<f64>) {
         let (regions, size) = (&self.regions, self.size);
-        let rows = Rows::of(regions, size).filter(|rows| rows.surplus >= CHANCE).map(|rows| {
+        let found = Rows::of(regions, size);
+        let rows = found.filter(|rows| rows.surplus >= CHANCE).map(|rows| {
             let likely = 1.0 / (1.0 + (LIKELY - rows.surplus).exp());
             (likely, rows.distances(regions, size))
         });
@@ -69,7 +71,7 @@ impl PlantRegions {
             let place = rows.as_ref().map_or(0.0, |(likely, distances)| PLACE * likely * (NEAR - distances[region]));
             network + (area / largest).ln() + place
         };
-        self.sums.chunks_exact(3).enumerate().map(odds).collect()
+        (self.sums.chunks_exact(3).enumerate().map(odds).collect(), found.map(|rows| rows.surplus))
     }
 
     /// Assigns each plant pixel the class that `won(pixel, region)` returns; regions are numbered from 0. That class takes the
@@ -84,6 +86,11 @@ impl PlantRegions {
                 .for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });
         }
     }
+}
+
+/// Returns the class with the highest probability at each pixel.
+pub(super) fn classes(n: usize, probabilities: &[f32]) -> Vec<u8> {
+    (0..n).map(|at| best(at, n, probabilities).to_u8()).collect()
 }
 
 /// Returns the class with the highest probability at a pixel; ties go to the lower class number, as in the argmax of predictions.

@@ -120,7 +120,6 @@ fn fit(colours: &[[f32; 3]], labels: &[bool], step: usize) -> Option<Vector4<f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use furrow_base::math::ToInt;
     use furrow_base::sampling::{Purpose, Stream};
 
     /// Builds the standardized colours of an image with leaves in every tenth pixel, of `green` ± 1 where soil is 0 ± 1, and the
@@ -172,8 +171,7 @@ mod tests {
         }
         assert!(probabilities(&[], &[]).is_none());
         assert!(!separates(&[], &[], &[]));
-        let few: Vec<f64> =
-            (0..own.len()).map(|at| if at < (own.len().to_f64() * 5e-4).to_usize() { 0.9 } else { 0.1 }).collect();
+        let few: Vec<f64> = (0..own.len()).map(|at| if at < own.len() / 2000 { 0.9 } else { 0.1 }).collect();
         assert!(probabilities(&colours, &few).is_none());
     }
 }

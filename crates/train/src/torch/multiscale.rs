@@ -3,7 +3,7 @@
 use super::{Model, values};
 use crate::data::Band;
 use crate::data::resize::Input;
-use crate::refine::{Appearance, Examples, Features, Refine, Seen};
+use crate::refine::{Appearance, Evidence, Examples, Features, Refine, Seen};
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use tch::Kind;
@@ -42,12 +42,18 @@ impl Scores {
     }
 
     /// Applies the refinement, if there is one; the values are probabilities afterwards. `inputs` are the network's inputs for the image.
-    pub fn refine(&mut self, refine: Refine, inputs: &[Input], bands: &[Band], appearance: Option<&Appearance>) {
-        if let (false, Some(input)) = (refine.is_none(), inputs.iter().find(|input| input.size == self.size)) {
-            self.normalize();
-            let (seen, probabilities) = self.seen(input, bands);
-            refine.apply(&seen, probabilities, appearance);
-        }
+    /// Returns what changed, `None` without refinement.
+    pub fn refine(
+        &mut self,
+        refine: Refine,
+        inputs: &[Input],
+        bands: &[Band],
+        appearance: Option<&Appearance>,
+    ) -> Option<Evidence> {
+        let input = inputs.iter().find(|input| input.size == self.size).filter(|_| !refine.is_none())?;
+        self.normalize();
+        let (seen, probabilities) = self.seen(input, bands);
+        Some(refine.apply(&seen, probabilities, appearance))
     }
 
     /// Returns the plants of the image as examples for the appearance model of its field.
