@@ -432,6 +432,116 @@ fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
     assert!((model.position.z - near.unwrap().z).abs() < 2e-3, "{} {}", model.position, near.unwrap());
 }
 
+/// Builds a field with `soil` and `models`, seen from 0.8 m.
+fn sown(folder: &Path, models: &str) -> furrow_base::Result<Field> {
+    let camera = "Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 0.8))";
+    let soil = "layers: [], colors: [Loess], stones: [], litter: (bits_per_m2: 0, straw_per_m2: 0, sticks_per_m2: 0)";
+    let page = folder.join("sown.ron");
+    let text = format!(
+        "Field(seed: 3, camera: {camera}, lights: [Constant(radiance: (1, 1, 1, 1))], soil: ({soil}), models: [{models}])"
+    );
+    std::fs::write(&page, text).unwrap();
+    assemble::field(&page, &Options { width: Some(96), ..Options::default() })
+}
+
+const ROWS: &str = "(file: \"square.obj\", name: \"mat\", up: Z, class: Crop, scale: Uniform(0.02, 0.04), rows: (spacing_m: 0.25, \
+                    in_row_m: 0.1, jitter_along_m: 0, jitter_across_m: 0, emergence: 1, doubles: 0, azimuth_deg: 30))";
+const PATCHES: &str =
+    "(file: \"square.obj\", up: Z, class: Weed, scale: 0.01, turn_deg: 0, spread: (per_m2: 150, k: 50))";
+
+/// Rationale: a user's plant model is sown as a species is. Expected: copies are on the rows, in the distance of their seeds, with
+/// different directions and scales; each is a plant of its own in records and label map; all share one mesh; a weed does not move them.
+#[test]
+fn models_are_sown_in_rows_and_by_density() {
+    let (_keep, folder) = scratch();
+    write(&folder, "square.obj", SQUARE);
+    write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    let field = sown(&folder, ROWS).unwrap_or_else(|e| panic!("{e}"));
+    let plants = &field.plants;
+    assert!(
+        plants.len() > 20 && plants.iter().all(|p| p.class == Class::Crop && p.species == "mat"),
+        "{}",
+        plants.len()
+    );
+    let (sin, cos) = 30f32.to_radians().sin_cos();
+    for plant in plants {
+        let across = plant.position.truncate().dot(vec2(cos, -sin)) / 0.25;
+        assert!((across - across.round()).abs() < 1e-3, "{} is beside its row", plant.position);
+        assert!((0.02..0.04).contains(&(plant.radius / 2f32.sqrt())), "{}", plant.radius);
+        let next = plants.iter().filter(|p| p.number != plant.number).map(|p| p.position.distance(plant.position));
+        assert!((next.fold(f32::MAX, f32::min) - 0.1).abs() < 0.02);
+    }
+    let numbers_of = |plants: &[furrow_field::PlantRecord]| {
+        let both: std::collections::BTreeSet<(u32, u32)> = plants.iter().map(|p| (p.number, p.id)).collect();
+        both.len()
+    };
+    assert_eq!(numbers_of(plants), plants.len());
+    let copies: Vec<&Part> = field.scene.parts.iter().filter(|part| part.tag.plant > 0).collect();
+    assert_eq!(copies.len(), plants.len());
+    assert!(copies.iter().all(|part| std::sync::Arc::ptr_eq(&part.mesh, &copies[0].mesh)), "copies share their mesh");
+    let mut turns: Vec<i32> = copies
+        .iter()
+        .map(|part| {
+            (part.placement().unwrap().direction(Vec3::X).truncate().to_angle() / 0.5).floor().rem_euclid(12.0) as i32
+        })
+        .collect();
+    turns.sort_unstable();
+    turns.dedup();
+    assert!(turns.len() > 8, "directions are random: {turns:?}");
+    assert_eq!(field.conditions.crops.len(), 1);
+    assert!((field.conditions.crops[0].rows.spacing_m - 0.25).abs() < 1e-6);
+
+    let both = sown(&folder, &format!("{ROWS}, {PATCHES}")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(both.plants[..plants.len()], plants[..], "weeds must not move the crop");
+    let weeds = both.plants.len() - plants.len();
+    // About 1.1 m² are planted. The standard deviation of the number is below 20 % (k = 50, and Poisson).
+    assert!((60..300).contains(&weeds), "{weeds}");
+    assert_eq!(both.conditions.weeds[0].species, "square");
+    let labels = shoot(&both, 1, 2).1;
+    let seen = |class| {
+        let of = labels.tags.iter().filter(|tag| tag.class == class && tag.plant > 0).map(|tag| tag.plant);
+        of.collect::<std::collections::BTreeSet<u32>>().len()
+    };
+    assert!(seen(Class::Crop) > 10 && seen(Class::Weed) > 10, "{} {}", seen(Class::Crop), seen(Class::Weed));
+}
+
+/// Expected: a labelled model with several plants gives each copy as many, all with numbers of their own; its position on the rows is
+/// independent of the view.
+#[test]
+fn copies_of_several_plants_are_numbered_apart() {
+    let (_keep, folder) = scratch();
+    let (_, bytes) = small();
+    write(&folder, "scene.glb", bytes);
+    let once = placed(&folder, "(file: \"scene.glb\")").unwrap_or_else(|e| panic!("{e}"));
+    let rows = "(file: \"scene.glb\", scale: 0.2, rows: (spacing_m: 0.5, in_row_m: 0.4, emergence: 1, doubles: 0))";
+    let field = sown(&folder, rows).unwrap_or_else(|e| panic!("{e}"));
+    let numbers: std::collections::BTreeSet<u32> = field.plants.iter().map(|plant| plant.number).collect();
+    assert_eq!(numbers.len(), field.plants.len());
+    assert!(field.plants.len() >= 4 * once.plants.len() && field.plants.len() % once.plants.len() == 0);
+    let classes = |plants: &[furrow_field::PlantRecord]| plants.iter().map(|plant| plant.class).collect::<Vec<_>>();
+    assert_eq!(classes(&field.plants[..once.plants.len()]), classes(&once.plants));
+}
+
+/// Expected: contradictory placements are refused where they are written.
+#[test]
+fn a_sown_model_has_one_placement() {
+    let (_keep, folder) = scratch();
+    write(&folder, "square.obj", SQUARE);
+    write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
+    let refused = |more: &str| {
+        let models = format!("(file: \"square.obj\", up: Z, class: Weed, scale: 0.01, {more})");
+        let error = sown(&folder, &models).err().unwrap_or_else(|| panic!("{more} must be refused"));
+        assert_eq!(error.exit_code(), 2);
+        error.to_string()
+    };
+    let words = refused("rows: (), spread: (per_m2: 5)");
+    assert!(words.contains("`rows` or `spread`, not both") && words.contains("(per_m2: 5)"), "{words}");
+    let words = refused("spread: (), position_m: (0.5, 0.25)");
+    assert!(words.contains("no position of its own") && words.contains("(0.5, 0.25)"), "{words}");
+    let words = refused("spread: (per_m2: 100000000)");
+    assert!(words.contains("lower per_m2 here"), "{words}");
+}
+
 #[test]
 fn what_a_model_needs_counts_into_the_scenes_hash() {
     let (_keep, folder) = scratch();

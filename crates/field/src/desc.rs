@@ -86,15 +86,16 @@ pub struct FieldDesc {
     /// Single plants at given positions.
     #[serde(default)]
     pub plants: Vec<PlacedDesc>,
-    /// Models from disk at given positions.
+    /// Models from disk: single ones at given positions, or plants sown in rows or by density.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ModelDesc>,
 }
 
 impl FieldDesc {
-    /// Returns `true` if the scene has ground, crops or weeds, so that its extent depends on the view.
+    /// Returns `true` if the scene has ground, crops, weeds or sown models, so that its extent depends on the view.
     pub(crate) fn has_ground(&self) -> bool {
-        self.soil.is_some() || !self.crops.is_empty() || !self.weeds.is_empty()
+        let sown = || self.models.iter().any(ModelDesc::is_sown);
+        self.soil.is_some() || !self.crops.is_empty() || !self.weeds.is_empty() || sown()
     }
 }
 
@@ -320,13 +321,16 @@ pub struct PlacedDesc {
     pub condition: Option<ConditionDesc>,
 }
 
-/// A model from disk at a given position: a scanned plant, a stone, a tool. Each is one plant, or one object, in the labels.
+/// A model from disk: a scanned plant, a stone, a tool. Each is one plant, or one object, in the labels. It is placed once, at
+/// `position_m`, unless it is sown in `rows` or by its `spread`; each copy then draws its own scale, rotation and height.
 ///
 /// ```
 /// use furrow_base::ron_file::RonFile;
 /// use furrow_field::desc::ModelDesc;
 /// let file = RonFile::of(r#"Model(file: "thistle.glb", class: Weed, position_m: (0.1, Uniform(-0.1, 0.1)), scale: 0.01)"#);
 /// let model: ModelDesc = file.parse().unwrap();
+/// let crop = RonFile::of(r#"Model(file: "beet.glb", class: Crop, rows: (spacing_m: 0.5), scale: Uniform(0.8, 1.2))"#);
+/// assert!(crop.parse::<ModelDesc>().unwrap().is_sown());
 /// assert!(RonFile::of(r#"Model(file: "thistle.glb", clas: Weed)"#).parse::<ModelDesc>().is_err());
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -347,16 +351,26 @@ pub struct ModelDesc {
     /// Class of its pixels. Not needed if the file has labels, like those that `trace export` writes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub class: Option<Class>,
-    /// Position of its origin, metres east and north.
+    /// Seed rows: the model is then a crop, and each seed that emerged is a copy of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(spacing_m: 0.5, in_row_m: 0.2)"))]
+    pub rows: Option<RowsDesc>,
+    /// Density and clustering: the model is then placed like a weed, with as many copies as the density gives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(per_m2: 20)"))]
+    pub spread: Option<WeedsDesc>,
+    /// Position of its origin, metres east and north; not for a model with `rows` or `spread`.
     #[serde(default = "origin")]
     #[schemars(extend("x-example" = "(0.1, Uniform(-0.1, 0.1))"))]
     pub position_m: (Vary<Signed<1000>>, Vary<Signed<1000>>),
     /// Height of its origin above the ground there, metres; a negative value sinks it in.
     #[serde(default = "no_turn::<Signed<100>>")]
     pub lift_m: Vary<Signed<100>>,
-    /// Rotation about the vertical axis, degrees clockwise when seen from above.
-    #[serde(default = "no_turn::<Signed<360>>")]
-    pub turn_deg: Vary<Signed<360>>,
+    /// Rotation about the vertical axis, degrees clockwise when seen from above. Default: 0; with `rows` or `spread`, each copy has a
+    /// random direction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "Uniform(0, 360)"))]
+    pub turn_deg: Option<Vary<Signed<360>>>,
     /// Scale factor: 0.001 for a file in millimetres.
     #[serde(default = "as_it_is::<Positive<1_000_000>>")]
     pub scale: Vary<Positive<1_000_000>>,
@@ -378,6 +392,18 @@ pub struct ModelDesc {
     /// Reflectance in near infrared. Default: 0.45 for materials that transmit light, the red reflectance for opaque ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nir: Option<Num<Fraction>>,
+}
+
+impl ModelDesc {
+    /// Returns `true` if the model is sown in rows or by density instead of placed once.
+    pub fn is_sown(&self) -> bool {
+        self.rows.is_some() || self.spread.is_some()
+    }
+
+    /// Returns `true` if the model has the default position.
+    pub(crate) fn at_origin(&self) -> bool {
+        self.position_m == origin()
+    }
 }
 
 /// A fraction in each of R, G, B, NIR.

@@ -57,7 +57,7 @@ pub enum PathDesc {
         #[serde(default = "walk")]
         speed_m_s: Vary<Positive<100>>,
     },
-    /// A straight line from the world's origin, parallel to the rows of the field's first crop.
+    /// A straight line from the world's origin, parallel to the rows of the field's first crop, or else of its first model in rows.
     AlongRows {
         /// Speed over the ground, m/s; default 0.5.
         #[serde(default = "walk")]

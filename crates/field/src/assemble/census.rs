@@ -22,6 +22,8 @@ pub(super) enum Population {
     Weed(usize),
     /// All items of `plants`.
     Placed,
+    /// The item of `models` with this index, which is sown by its field `rows` or `spread`.
+    Model(usize, &'static str),
 }
 
 /// A population and the index range of its plants among all plants.
@@ -30,14 +32,14 @@ pub(super) type Members = (Population, Range<usize>);
 impl Population {
     /// Returns the path of the setting that controls the number of plants, and advice on how to get fewer.
     pub(super) fn place(self) -> (Vec<Step<'static>>, &'static str) {
-        match self {
-            Self::Crop(k) => (
-                vec![Step::Field("crops"), Step::Item(k), Step::Field("rows")],
-                "widen the distances or lower the jitter here",
-            ),
-            Self::Weed(k) => (vec![Step::Field("weeds"), Step::Item(k), Step::Field("spread")], "lower per_m2 here"),
-            Self::Placed => (vec![Step::Field("plants")], "place fewer plants"),
-        }
+        let (list, k, field) = match self {
+            Self::Crop(k) => ("crops", k, "rows"),
+            Self::Weed(k) => ("weeds", k, "spread"),
+            Self::Model(k, field) => ("models", k, field),
+            Self::Placed => return (vec![Step::Field("plants")], "place fewer plants"),
+        };
+        let fewer = if field == "rows" { "widen the distances or lower the jitter here" } else { "lower per_m2 here" };
+        (vec![Step::Field(list), Step::Item(k), Step::Field(field)], fewer)
     }
 }
 

@@ -6,18 +6,17 @@ use super::field_day::FieldDay;
 use super::illumination::{DrawnLights, LightAddress};
 use super::options::Options;
 use super::season::Season;
-use super::{lidar, rig};
+use super::{lidar, rig, seed_rows};
 use crate::desc::FieldDesc;
 use crate::drive::Capture;
 use crate::estimate::usual_memory;
 use crate::layer::Layer;
 use crate::library::Library;
 use furrow_base::Result;
-use furrow_base::math::{ToInt, Vec2, Vec3};
+use furrow_base::math::{Vec2, Vec3};
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_grow::plant::GrowOptions;
-use furrow_grow::scatter::Rows;
 use furrow_grow::soil::{Envelope, Ground, SeedRows};
 use furrow_optics::sensor::{Camera, Lidar};
 use std::ops::Range;
@@ -164,12 +163,10 @@ impl<'a> Drawn<'a> {
         self.captures.iter().filter_map(|capture| finest(&capture.camera)).reduce(f32::min).unwrap_or(1e-3)
     }
 
-    /// Returns the seed rows of the first crop, which shape the ground; `None` without crops.
+    /// Returns the seed rows of the first crop, or else of the first model in rows, which shape the ground; `None` without rows.
     pub(super) fn seed_rows(&self) -> Option<SeedRows> {
-        self.sown.clone().next().map(|k| {
-            let rows = Rows::draw(&self.desc.crops[k].rows, &self.stream(Purpose::Scatter, k.to_u64()));
-            SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m }
-        })
+        let rows = seed_rows::first_rows(self.desc, self.sown.clone(), &|purpose, k| self.stream(purpose, k));
+        rows.map(|rows| SeedRows { spacing_m: rows.spacing_m, azimuth: rows.azimuth, offset_m: rows.offset_m })
     }
 
     /// Returns the bounds of the ground's height.

@@ -7,7 +7,7 @@ use super::member::Member;
 use super::preview::CountedPlant;
 use super::seedling::{PlantSite, Seedling, grow};
 use super::view::VisibleGround;
-use super::{ground, sow};
+use super::{ground, model_spots, sow};
 use crate::desc::Detail;
 use crate::estimate::{Estimate, Share};
 use crate::library::Library;
@@ -96,14 +96,36 @@ pub(super) fn estimate(drawn: &Drawn<'_>, library: &mut Library, sight: &Visible
     if let Some(preview) = &drawn.options.preview {
         preview.keep_counted(counted);
     }
-    for (k, model) in drawn.desc.models.iter().enumerate() {
-        let model = library.model(drawn.page, model)?;
-        let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
-        let cost = Cost::of(triangles.to_f64(), model.parts.len().to_f64());
-        add(&[Step::Field("models"), Step::Item(k)], cost, "place fewer models, or coarser ones");
+    for k in 0..drawn.desc.models.len() {
+        let (at, cost, advice) = model(drawn, library, sight, k)?;
+        add(&at, cost, advice);
     }
     shares.extend(pictured(drawn, library)?);
     Ok(Estimate { shares })
+}
+
+/// Estimates the cost of model `k`: one copy of its meshes, and an instance for each position where it is sown. A preview has a copy for
+/// each. Returns the path of the setting that controls the number, the cost, and advice.
+fn model(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    sight: &VisibleGround,
+    k: usize,
+) -> Result<(Vec<Step<'static>>, Cost, &'static str)> {
+    let model = library.model(drawn.page, &drawn.desc.models[k])?;
+    let triangles = model.parts.iter().map(|part| part.mesh.triangles.len()).sum::<usize>();
+    let parts = model.parts.len().to_f64();
+    let copy = Cost::of(triangles.to_f64(), parts);
+    let at = vec![Step::Field("models"), Step::Item(k)];
+    let Some(spots) = model_spots::spots(drawn, k, sight, &[])? else {
+        return Ok((at, copy, "place fewer models, or coarser ones"));
+    };
+    let number = spots.len().to_f64();
+    if drawn.options.preview.is_some() {
+        return Ok((at, copy * number, "sow fewer models, or coarser ones"));
+    }
+    let instance = Cost::work(BYTES_PER_INSTANCE + parts * BYTES_PER_INSTANCED_ORGAN, SECONDS_PER_INSTANCE);
+    Ok((at, copy + instance * number, "sow fewer models, or models of fewer parts"))
 }
 
 /// Returns a warning if `detail: Auto` has chosen a mesh for each plant and the plants take long: shared meshes take a fraction. It is not

@@ -1,12 +1,13 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
 use super::drawn::{Asked, Drawn};
-use super::{Options, Source, estimate, ground, known, plausibility, sight};
+use super::{Options, Source, estimate, ground, known, model_spots, models, plausibility, sight};
+use crate::desc::ModelDesc;
 use crate::library::Library;
 use furrow_base::Result;
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::sampling::Purpose;
-use furrow_grow::scatter::{Rows, WeedsRecord};
+use furrow_grow::scatter::{Rows, RowsRecord, WeedsRecord};
 use furrow_optics::sensor::CameraRecord;
 use std::sync::PoisonError;
 
@@ -85,22 +86,29 @@ impl Source {
     }
 }
 
-fn expected_plants(Asked { drawn, warnings, .. }: Asked<'_>) -> Result<f64> {
+fn expected_plants(Asked { drawn, library, warnings }: Asked<'_>) -> Result<f64> {
     let desc = drawn.desc;
     let placed = desc.plants.len().to_f64();
-    if drawn.sown.is_empty() && desc.weeds.is_empty() {
+    if drawn.sown.is_empty() && desc.weeds.is_empty() && !desc.models.iter().any(ModelDesc::is_sown) {
         return Ok(placed);
     }
-    let crops = drawn.sown.clone().map(|k| {
-        let rows = Rows::draw(&desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k.to_u64())).record();
-        rows.emergence * (1.0 + rows.doubles) / f64::from(rows.spacing_m * rows.in_row_m)
-    });
+    let per_m2_of =
+        |rows: &RowsRecord| rows.emergence * (1.0 + rows.doubles) / f64::from(rows.spacing_m * rows.in_row_m);
+    let crops = drawn
+        .sown
+        .clone()
+        .map(|k| per_m2_of(&Rows::draw(&desc.crops[k].rows, &drawn.stream(Purpose::Scatter, k.to_u64())).record()));
     let weeds = desc
         .weeds
         .iter()
         .zip(1000..)
         .map(|(weed, k)| f64::from(WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, k)).per_m2));
-    let per_m2: f64 = crops.chain(weeds).sum();
+    let mut per_m2: f64 = crops.chain(weeds).sum();
+    for (k, model) in desc.models.iter().enumerate().filter(|(_, model)| model.is_sown()) {
+        let rows = model_spots::rows(drawn, k).map(|rows| per_m2_of(&rows.record()));
+        let copies = rows.or_else(|| model_spots::spread(drawn, k).map(|spread| f64::from(spread.per_m2)));
+        per_m2 += copies.unwrap_or(0.0) * models::plants_in(model, &*library.model(drawn.page, model)?).to_f64();
+    }
     let sight = sight::sight(drawn, warnings)?;
     let area = match &sight.each[..] {
         [seen] if sight.view.is_graded() => seen.area(),

@@ -97,7 +97,7 @@ pub(super) fn cultivate(
         let taken: Vec<Disc> = earth.stones.iter().map(|s| (s.centre.truncate(), s.radius)).collect();
         let (seedlings, _) = sow::seedlings(drawn, library, sight, &taken)?;
         // Plants first: they push the clods aside, not the other way round.
-        let stocked = populate::populate(drawn, library, &seedlings, Some(floor), sight)?;
+        let stocked = populate::populate(drawn, library, &seedlings, Some(floor), (sight, &taken))?;
         profiler.enter(Phase::Clods);
         let meshes = || stocked.parts.parts.iter().map(|part| part.mesh.clone()).collect();
         let same = known.clone().and_then(|bed| preview?.laid(&CoverInputs { bed, plants: meshes() }));

@@ -1,9 +1,11 @@
 //! Records of a built field: species table, model names, drawn crops and weeds.
 
 use super::drawn::Drawn;
+use super::model_spots;
 use super::models::{self, called};
 use super::record::{CropRecord, SpeciesRecord, WeedRecord};
 use crate::PlantRecord;
+use crate::desc::ModelDesc;
 use crate::library::Library;
 use furrow_base::math::ToInt;
 use furrow_base::ron_file::Step;
@@ -56,7 +58,7 @@ fn tell_apart(drawn: &Drawn<'_>, species: &[SpeciesRecord]) -> Result<()> {
     Ok(())
 }
 
-/// Returns the records of the crops that this field has, with their drawn values.
+/// Returns the records of the crops that this field has and of models in rows, with their drawn values.
 pub(super) fn crop_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<CropRecord>> {
     let mut all = Vec::new();
     for k in drawn.sown.clone() {
@@ -65,10 +67,14 @@ pub(super) fn crop_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
         let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k.to_u64())).record();
         all.push(CropRecord { species, rows });
     }
+    for (k, desc) in sown_plants(drawn) {
+        let rows = model_spots::rows(drawn, k).map(|rows| rows.record());
+        all.extend(rows.map(|rows| CropRecord { species: called(desc), rows }));
+    }
     Ok(all)
 }
 
-/// Returns the records of the weeds, with their drawn values.
+/// Returns the records of the weeds and of models sown by density, with their drawn values.
 pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<WeedRecord>> {
     let mut all = Vec::new();
     for (k, weed) in drawn.desc.weeds.iter().enumerate() {
@@ -76,7 +82,16 @@ pub(super) fn weed_records(drawn: &Drawn<'_>, library: &mut Library) -> Result<V
         let spread = WeedsRecord::draw(&weed.spread, &drawn.stream(Purpose::Scatter, 1000 + k.to_u64()));
         all.push(WeedRecord { species, spread });
     }
+    for (k, desc) in sown_plants(drawn) {
+        let spread = model_spots::spread(drawn, k);
+        all.extend(spread.map(|spread| WeedRecord { species: called(desc), spread }));
+    }
     Ok(all)
+}
+
+/// Returns the models that are plants, with their indices; those that are sown have rows or a spread.
+fn sown_plants<'a>(drawn: &Drawn<'a>) -> impl Iterator<Item = (usize, &'a ModelDesc)> {
+    drawn.desc.models.iter().enumerate().filter(|(_, desc)| desc.class != Some(Class::Soil))
 }
 
 /// Sets each plant's `kind` to the number of its species in the table, from 1.

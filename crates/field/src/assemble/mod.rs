@@ -24,6 +24,7 @@ mod lidar;
 mod lighting;
 mod member;
 mod mistakes;
+mod model_spots;
 mod models;
 mod options;
 mod plausibility;
@@ -35,6 +36,7 @@ mod relight;
 mod rig;
 mod scanner;
 mod season;
+mod seed_rows;
 mod seedling;
 mod sight;
 mod sow;
@@ -231,7 +233,7 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
         None => {
             profiler.enter(Phase::Plants);
             let (seedlings, _) = sow::seedlings(&drawn, library, &sight, &[])?;
-            (populate::populate(&drawn, library, &seedlings, None, &sight)?, None)
+            (populate::populate(&drawn, library, &seedlings, None, (&sight, &[]))?, None)
         }
         Some(soil) => {
             options.progress.enter(Stage::Ground);

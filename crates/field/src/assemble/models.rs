@@ -1,23 +1,28 @@
-//! Places models from disk on the ground and labels them.
+//! Places models from disk on the ground, one by one or in rows and patches, and labels them.
 
 use super::contents::Contents;
 use super::drawn::{Drawn, Floor};
 use super::extent::FARTHEST;
-use super::identity;
 use super::preview::PlacedModel;
+use super::stand::SHADOW;
+use super::view::VisibleGround;
+use super::{identity, model_spots};
 use crate::desc::ModelDesc;
 use crate::library::Library;
 use crate::{PartKind, PlantRecord};
-use furrow_base::geometry::Mesh;
+use furrow_base::geometry::{Mesh, Placement};
 use furrow_base::math::{Mat3, Spectrum, ToInt, Vec3};
 use furrow_base::ron_file::{Num, Step};
 use furrow_base::sampling::Purpose;
+use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
 use furrow_grow::model::{self, Label, Model};
+use furrow_grow::scatter::{Disc, Spot};
 use furrow_render::material::{Material, ModelSurface, SurfaceOverride};
-use furrow_render::scene::Part;
 use furrow_render::scene::tag::{Class, MOST_PLANTS, Tag};
+use furrow_render::scene::{Instance, Part};
 use std::collections::{BTreeMap, BTreeSet};
+use std::f32::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,13 +35,67 @@ const SMALLEST_M: f32 = 5e-4;
 /// Mean visible reflectance of a green leaf.
 const LEAF: f32 = 0.1;
 
+/// The ground that models are placed on, what is seen of it, and the stones on it.
+pub(super) struct ModelGround<'a> {
+    pub(super) floor: Option<Floor<'a>>,
+    pub(super) sight: &'a VisibleGround,
+    pub(super) stones: &'a [Disc],
+}
+
+impl ModelGround<'_> {
+    fn height(&self, x: f32, y: f32) -> f32 {
+        self.floor.map_or(0.0, |f| f.height(x, y))
+    }
+}
+
+/// An item of `models` and its file.
+struct Entry<'a> {
+    k: usize,
+    desc: &'a ModelDesc,
+    kind: PartKind,
+    model: Arc<Model>,
+    /// Material index of each surface.
+    materials: Vec<u32>,
+}
+
+impl Entry<'_> {
+    fn place(&self) -> [Step<'static>; 2] {
+        [Step::Field("models"), Step::Item(self.k)]
+    }
+
+    fn part(&self, i: usize, mesh: Arc<Mesh>, tag: Tag, instance: Option<Instance>) -> Part {
+        let surface = self.model.parts[i].surface;
+        let mask = self.model.surfaces[surface].mask.clone();
+        Part { mesh, mask, material: self.materials[surface], tag, instance }
+    }
+
+    /// Returns the tag of each part, after `numbered` plants.
+    fn tags(&self, drawn: &Drawn<'_>, numbered: usize) -> Result<Vec<Tag>> {
+        let tags = self.model.parts.iter().map(|part| tag(self.desc.class, part.label.as_ref(), numbered));
+        tags.collect::<Option<_>>().ok_or_else(|| {
+            let words = format!("label maps can number at most {MOST_PLANTS} plants; this model exceeds that");
+            drawn.page.blame(&self.place(), Error::input(words).help("place fewer plants"))
+        })
+    }
+
+    /// Returns an error if a part that is `size` metres large reaches farther than [`FARTHEST`] from the world's origin.
+    fn within_reach(&self, drawn: &Drawn<'_>, part: &str, reach: f32, size: f32) -> Result<()> {
+        if reach.is_finite() && reach <= FARTHEST {
+            return Ok(());
+        }
+        let words = format!("`{part}` of this model is {size:.0} m large or too far from the origin");
+        let fault = Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001");
+        Err(drawn.page.blame(&self.place(), fault))
+    }
+}
+
 /// Adds all models to `parts`. `numbered` is the number of plants that already have a label number. Returns the plants among the models.
 pub(super) fn models(
     drawn: &Drawn<'_>,
     library: &mut Library,
     parts: &mut Contents,
     numbered: usize,
-    floor: Option<Floor<'_>>,
+    ground: &ModelGround<'_>,
 ) -> Result<Vec<PlantRecord>> {
     let names = names(drawn)?;
     let mut records: Vec<PlantRecord> = Vec::new();
@@ -44,33 +103,30 @@ pub(super) fn models(
     for (k, desc) in drawn.desc.models.iter().enumerate() {
         let named = names.iter().position(|name| desc.name.as_ref() == Some(name));
         let kind = named.map_or(PartKind::Model, |place| PartKind::Named(place.to_u8()));
-        let found = place(drawn, library, parts, (k, desc, kind), last, floor)?;
+        let entry = open(drawn, library, parts, (k, desc, kind))?;
+        let found = match model_spots::spots(drawn, k, ground.sight, ground.stones)? {
+            None => place(drawn, library, parts, &entry, last, ground)?,
+            Some(spots) => sow(drawn, library, parts, &entry, (last, &spots), ground)?,
+        };
         last = found.iter().map(|r| r.number.to_usize()).max().unwrap_or(last);
         records.extend(found);
     }
     Ok(records)
 }
 
-fn place(
+/// Loads the file of a model and creates its materials.
+fn open<'a>(
     drawn: &Drawn<'_>,
     library: &mut Library,
     all: &mut Contents,
-    (k, desc, kind): (usize, &ModelDesc, PartKind),
-    numbered: usize,
-    floor: Option<Floor<'_>>,
-) -> Result<Vec<PlantRecord>> {
-    let at = [Step::Field("models"), Step::Item(k)];
+    (k, desc, kind): (usize, &'a ModelDesc, PartKind),
+) -> Result<Entry<'a>> {
     let model = library.model(drawn.page, desc)?;
     if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
         let fault = Error::input("this model's file defines no class")
             .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
-        return Err(drawn.page.blame(&at, fault));
+        return Err(drawn.page.blame(&[Step::Field("models"), Step::Item(k)], fault));
     }
-    let mut stream = drawn.stream(Purpose::Scatter, 3000 + k.to_u64());
-    let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
-    let turn = desc.turn_deg.draw32(&mut stream).to_radians();
-    let scale = desc.scale.draw32(&mut stream);
-    let foot = Vec3::new(x, y, floor.map_or(0.0, |f| f.height(x, y)) + desc.lift_m.draw32(&mut stream));
     let repaint = SurfaceOverride {
         roughness: desc.roughness.map(Num::f32),
         transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
@@ -81,47 +137,146 @@ fn place(
     if let Some(words) = bright(desc, &model, &surfaces) {
         library.warn(drawn.page, &desc.file, &words)?;
     }
-    let materials: Vec<u32> = surfaces.into_iter().map(|s| all.material(Material::ModelSurface(s))).collect();
+    let materials = surfaces.into_iter().map(|s| all.material(Material::ModelSurface(s))).collect();
+    Ok(Entry { k, desc, kind, model, materials })
+}
+
+/// Places a single model.
+fn place(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    all: &mut Contents,
+    entry: &Entry<'_>,
+    numbered: usize,
+    ground: &ModelGround<'_>,
+) -> Result<Vec<PlantRecord>> {
+    let Entry { k, desc, model, .. } = entry;
+    let mut stream = model_spots::stream(drawn, *k);
+    let (x, y) = (desc.position_m.0.draw32(&mut stream), desc.position_m.1.draw32(&mut stream));
+    let turn = desc.turn_deg.as_ref().map_or(0.0, |turn| turn.draw32(&mut stream)).to_radians();
+    let scale = desc.scale.draw32(&mut stream);
+    let foot = Vec3::new(x, y, ground.height(x, y) + desc.lift_m.draw32(&mut stream));
     let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    let meshes = meshes(drawn, k, &PlacedModel { model: model.clone(), turn, scale, foot });
-    if let Some(words) = odd_size(&meshes, desc.class) {
+    let meshes = meshes(drawn, *k, &PlacedModel { model: model.clone(), turn, scale, foot });
+    if let Some(words) = size(&meshes).and_then(|size| odd_size(size, desc.class)) {
         library.warn(drawn.page, &desc.file, &words)?;
     }
-    for (part, mesh) in model.parts.iter().zip(meshes) {
-        let tag = tag(desc.class, part.label.as_ref(), numbered).ok_or_else(|| {
-            let words = format!("label maps can number at most {MOST_PLANTS} plants; this model exceeds that");
-            drawn.page.blame(&at, Error::input(words).help("place fewer plants"))
-        })?;
+    let tags = entry.tags(drawn, numbered)?;
+    for (i, (mesh, tag)) in meshes.into_iter().zip(tags).enumerate() {
         let (lo, hi) = mesh.bounds().unwrap_or_default();
         let reach = lo.abs().max(hi.abs()).max_element();
-        if !reach.is_finite() || reach > FARTHEST {
-            let size = (hi - lo).max_element();
-            let words = format!("`{}` of this model is {size:.0} m large or too far from the origin", part.name);
-            let fault = Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001");
-            return Err(drawn.page.blame(&at, fault));
-        }
+        entry.within_reach(drawn, &model.parts[i].name, reach, (hi - lo).max_element())?;
         if tag.plant > 0 {
             plants.entry(tag.plant).or_default().push(all.parts.len());
         }
-        let mask = model.surfaces[part.surface].mask.clone();
-        all.push(Part { mesh, mask, material: materials[part.surface], tag, instance: None }, kind);
+        all.push(entry.part(i, mesh, tag, None), entry.kind);
     }
     let plants = plants.into_iter().map(|(number, parts)| {
         // Plant number within the model, independent of the number of plants before it.
         let own = u64::from(number) - numbered.to_u64();
         let id = identity::of(drawn.seed, drawn.index, identity::MODELS + k.to_u64(), own);
-        let parts: Vec<&Part> = parts.iter().map(|i| &all.parts[*i]).collect();
-        record((number, id), &parts, called(desc), foot, &model)
+        let parts: Vec<(&Mesh, Tag)> = parts.iter().map(|i| (&*all.parts[*i].mesh, all.parts[*i].tag)).collect();
+        record((number, id), &parts, called(desc), foot, model)
     });
     Ok(plants.collect())
 }
 
-/// Returns a warning if the size of a model suggests that its file is in another unit than metres.
-fn odd_size(meshes: &[Arc<Mesh>], class: Option<Class>) -> Option<String> {
-    let largest = if matches!(class, Some(Class::Crop | Class::Weed)) { LARGEST_PLANT_M } else { LARGEST_M };
+/// Places a copy of a model at each of the positions `spots`, after `numbered` plants. All copies share the meshes of the file; those of a
+/// preview, which finds changed parts by their meshes, have their own. Returns the records of the plants that reach the view.
+fn sow(
+    drawn: &Drawn<'_>,
+    library: &mut Library,
+    all: &mut Contents,
+    entry: &Entry<'_>,
+    (mut numbered, spots): (usize, &[Spot]),
+    ground: &ModelGround<'_>,
+) -> Result<Vec<PlantRecord>> {
+    let Entry { k, desc, model, .. } = entry;
+    let meshes: Vec<Arc<Mesh>> = model.parts.iter().map(|part| Arc::new(part.mesh.clone())).collect();
+    let (templates, extent) = (templates(entry, &meshes, &entry.tags(drawn, 0)?), size(&meshes).unwrap_or(0.0));
+    let vertices = || meshes.iter().flat_map(|mesh| &mesh.positions);
+    let radius = vertices().map(|p| p.truncate().length()).fold(0.0, f32::max);
+    let height = vertices().map(|p| p.z).fold(0.0, f32::max);
+    let (view, mut records) = (ground.sight.shown(drawn), Vec::new());
+    for (i, spot) in spots.iter().enumerate() {
+        drawn.options.wanted()?;
+        let placement = copy(drawn, entry, *spot, ground);
+        let scale = placement.scale;
+        if let Some(words) = odd_size(extent * scale, desc.class).filter(|_| i == 0) {
+            library.warn(drawn.page, &desc.file, &words)?;
+        }
+        let reach = radius.max(height) * scale + placement.offset.abs().max_element();
+        entry.within_reach(drawn, &called(desc), reach, extent * scale)?;
+        if !view.is_none_or(|view| view.grown((radius + SHADOW * height) * scale).contains(spot.at)) {
+            continue;
+        }
+        let placement = Arc::new(placement);
+        for (i, (mesh, tag)) in meshes.iter().zip(entry.tags(drawn, numbered)?).enumerate() {
+            let part = if drawn.options.preview.is_some() {
+                let mut own = Mesh::clone(mesh);
+                own.transform(placement.matrix(), placement.offset);
+                entry.part(i, Arc::new(own), tag, None)
+            } else {
+                entry.part(i, mesh.clone(), tag, Some(Instance { placement: placement.clone(), tint: Vec3::ONE }))
+            };
+            all.push(part, entry.kind);
+        }
+        let address = |own: u32| mix(spot.key) ^ u64::from(own);
+        records.extend(templates.iter().map(|plant| PlantRecord {
+            number: plant.number + numbered.to_u32(),
+            id: identity::of(drawn.seed, drawn.index, identity::MODELS + k.to_u64(), address(plant.number)),
+            position: placement.point(plant.position),
+            height: plant.height * scale,
+            radius: plant.radius * scale,
+            ..plant.clone()
+        }));
+        numbered += templates.iter().map(|plant| plant.number.to_usize()).max().unwrap_or(0);
+    }
+    Ok(records)
+}
+
+/// Draws rotation, scale and height of the copy of a model at a position.
+fn copy(drawn: &Drawn<'_>, entry: &Entry<'_>, spot: Spot, ground: &ModelGround<'_>) -> Placement {
+    let Entry { k, desc, .. } = entry;
+    let stream = model_spots::copy_stream(drawn, *k, spot);
+    let child = |number| stream.child(Purpose::Page, number);
+    let turn = match &desc.turn_deg {
+        Some(turn) => turn.draw32(&mut child(0)).to_radians(),
+        None => child(0).range32(0.0, TAU),
+    };
+    let height = ground.height(spot.at.x, spot.at.y) + desc.lift_m.draw32(&mut child(2));
+    let rotation = Mat3::from_rotation_z(-turn);
+    Placement { rotation, scale: desc.scale.draw32(&mut child(1)), offset: spot.at.extend(height) }
+}
+
+/// Returns the records of the plants in a model that is placed at the world's origin without rotation and scale.
+fn templates(entry: &Entry<'_>, meshes: &[Arc<Mesh>], tags: &[Tag]) -> Vec<PlantRecord> {
+    let mut plants: BTreeMap<u32, Vec<(&Mesh, Tag)>> = BTreeMap::new();
+    for (mesh, tag) in meshes.iter().zip(tags).filter(|(_, tag)| tag.plant > 0) {
+        plants.entry(tag.plant).or_default().push((mesh, *tag));
+    }
+    let record = |(number, parts): (u32, Vec<(&Mesh, Tag)>)| {
+        record((number, 0), &parts, called(entry.desc), Vec3::ZERO, &entry.model)
+    };
+    plants.into_iter().map(record).collect()
+}
+
+/// Returns the number of plants in a model.
+pub(super) fn plants_in(desc: &ModelDesc, model: &Model) -> usize {
+    let tags = model.parts.iter().filter_map(|part| tag(desc.class, part.label.as_ref(), 0));
+    tags.map(|tag| tag.plant).filter(|plant| *plant > 0).collect::<BTreeSet<_>>().len()
+}
+
+/// Returns the largest side of the box around meshes, metres; `None` without vertices.
+fn size(meshes: &[Arc<Mesh>]) -> Option<f32> {
     let bounds = meshes.iter().filter_map(|mesh| mesh.bounds());
     let (lo, hi) = bounds.reduce(|(lo, hi), (low, high)| (lo.min(low), hi.max(high)))?;
-    let size = (hi - lo).max_element();
+    Some((hi - lo).max_element())
+}
+
+/// Returns a warning if the size of a model suggests that its file is in another unit than metres.
+fn odd_size(size: f32, class: Option<Class>) -> Option<String> {
+    let largest = if matches!(class, Some(Class::Crop | Class::Weed)) { LARGEST_PLANT_M } else { LARGEST_M };
     if size > largest {
         Some(format!("it is {size:.0} m large; lengths are in metres: a file in millimetres needs scale: 0.001"))
     } else if size < SMALLEST_M {
@@ -178,10 +333,10 @@ fn meshes(drawn: &Drawn<'_>, k: usize, stood: &PlacedModel) -> Vec<Arc<Mesh>> {
 }
 
 /// Returns the record of a plant that is a model or part of one.
-fn record((number, id): (u32, u32), parts: &[&Part], name: String, foot: Vec3, model: &Model) -> PlantRecord {
+fn record((number, id): (u32, u32), parts: &[(&Mesh, Tag)], name: String, foot: Vec3, model: &Model) -> PlantRecord {
     let mut all = Mesh::default();
-    for part in parts {
-        all.positions.extend_from_slice(&part.mesh.positions);
+    for (mesh, _) in parts {
+        all.positions.extend_from_slice(&mesh.positions);
     }
     let (lo, hi) = all.bounds().unwrap_or((foot, foot));
     // A single plant is at the scene file's position; one of several is at the centre of its own bounding box.
@@ -194,14 +349,14 @@ fn record((number, id): (u32, u32), parts: &[&Part], name: String, foot: Vec3, m
         species: name,
         eppo: String::new(),
         kind: 0,
-        class: parts[0].tag.class,
+        class: parts[0].1.class,
         position,
         axis: Vec3::Z,
         bbch: 0,
         age_days: 0.0,
         height: hi.z - position.z,
         radius: across,
-        leaves: parts.iter().map(|p| p.tag.leaf).max().unwrap_or(0),
+        leaves: parts.iter().map(|(_, tag)| tag.leaf).max().unwrap_or(0),
         leaf_axes: Vec::new(),
         rig: Vec::new(),
         condition: None,

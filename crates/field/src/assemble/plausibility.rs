@@ -1,6 +1,7 @@
 //! Warnings about settings that are valid but probably not intended. The field is built all the same.
 
 use super::drawn::{Drawn, Floor};
+use super::model_spots;
 use crate::PlantRecord;
 use crate::desc::{Detail, Growth, SpeciesDesc};
 use crate::library::Library;
@@ -51,10 +52,14 @@ pub(super) fn camera(drawn: &Drawn<'_>) -> Vec<String> {
 pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     let (page, desc) = (drawn.page, drawn.desc);
-    for k in drawn.sown.clone() {
+    let crops = drawn.sown.clone().map(|k| {
         let crop = &desc.crops[k];
-        let rows = Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k.to_u64()));
-        let (species, spacing, in_row) = (&crop.species, rows.spacing_m, rows.in_row_m);
+        (&crop.species, Rows::draw(&crop.rows, &drawn.stream(Purpose::Scatter, k.to_u64())))
+    });
+    let models = desc.models.iter().enumerate();
+    let models = models.filter_map(|(k, model)| Some((&model.file, model_spots::rows(drawn, k)?)));
+    for (species, rows) in crops.chain(models) {
+        let (spacing, in_row) = (rows.spacing_m, rows.in_row_m);
         if spacing > WIDE_ROWS_M {
             let words = format!("rows of {species} stand {spacing} m apart; spacing_m is in metres, 0.75 for 75 cm");
             warnings.push(words);

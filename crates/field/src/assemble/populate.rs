@@ -9,6 +9,8 @@ use super::{identity, models, stand};
 use crate::PlantRecord;
 use crate::library::Library;
 use furrow_base::Result;
+use furrow_grow::scatter::Disc;
+use models::ModelGround;
 
 /// Plants and models as scene parts, and the records of those that are plants.
 pub(super) struct PlantsAndModels {
@@ -16,17 +18,17 @@ pub(super) struct PlantsAndModels {
     pub(super) plants: Vec<PlantRecord>,
 }
 
-/// Grows the plants, and places them and the models on the ground.
+/// Grows the plants, and places them and the models on the ground. Sown models do not start in the discs `stones`.
 pub(super) fn populate(
     drawn: &Drawn<'_>,
     library: &mut Library,
     seedlings: &[Seedling],
     floor: Option<Floor<'_>>,
-    sight: &VisibleGround,
+    (sight, stones): (&VisibleGround, &[Disc]),
 ) -> Result<PlantsAndModels> {
     let mut parts = Contents::default();
     let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, sight.shown(drawn))?;
-    plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), floor)?);
+    plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), &ModelGround { floor, sight, stones })?);
     identity::settle(&mut plants);
     if floor.is_some() {
         drawn.options.progress.enter(Stage::Cover);

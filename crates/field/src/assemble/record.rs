@@ -37,9 +37,9 @@ pub struct Conditions {
     pub lighting: Vec<Lighting>,
     /// Ground; `None` if the scene file has none.
     pub soil: Option<SoilRecord>,
-    /// Sown crops, in the order of the scene file.
+    /// Sown crops and models in rows, in the order of the scene file.
     pub crops: Vec<CropRecord>,
-    /// Weeds, in the order of the scene file.
+    /// Weeds and models sown by density, in the order of the scene file.
     pub weeds: Vec<WeedRecord>,
     /// Index into the scene file's `Either` lists of growths that applies to all plants.
     pub season: Season,
@@ -51,7 +51,7 @@ pub struct Conditions {
 /// One crop of a field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CropRecord {
-    /// Scientific name.
+    /// English name of the species; of a model its name, or else its file name without folder and extension.
     pub species: String,
     /// Seed rows.
     pub rows: RowsRecord,
@@ -60,7 +60,7 @@ pub struct CropRecord {
 /// One weed of a field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeedRecord {
-    /// Scientific name.
+    /// English name of the species; of a model its name, or else its file name without folder and extension.
     pub species: String,
     /// Density and clustering.
     pub spread: WeedsRecord,

@@ -1,5 +1,6 @@
 //! Cameras of a field, and the images that they take on a drive.
 
+use super::seed_rows;
 use crate::desc::FieldDesc;
 use crate::drive::{self, Capture, DriveInputs, FIRST, PathDesc};
 use crate::library::Library;
@@ -7,7 +8,6 @@ use furrow_base::math::{RoundTo, ToInt, Vec3};
 use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
-use furrow_grow::scatter::Rows;
 use furrow_optics::sensor::Camera;
 
 /// Random stream address of the drive; those of additional cameras follow it.
@@ -105,10 +105,8 @@ pub(super) fn captures(
         let help = format!("at most {MOST_CAPTURES} images; drive through several fields");
         return Err(page.blame(&[Step::Field("drive"), Step::Field("frames")], Error::input(words).help(help)));
     }
-    let mut around = DriveInputs::default();
-    if let Some(k) = sown.into_iter().next() {
-        around.rows = Some(Rows::draw(&desc.crops[k].rows, &stream(Purpose::Scatter, k.to_u64())).azimuth);
-    }
+    let rows = seed_rows::first_rows(desc, sown, stream).map(|rows| rows.azimuth);
+    let mut around = DriveInputs { rows, ..DriveInputs::default() };
     if let Some(PathDesc::Poses(file)) = desc.drive.as_ref().map(|drive| &drive.path) {
         around.poses = library.poses(page, file)?;
     }

@@ -25,7 +25,7 @@ use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
 /// Maximum shadow length considered, in plant heights: for a sun 20° above the horizon.
-const SHADOW: f32 = 2.75;
+pub(super) const SHADOW: f32 = 2.75;
 
 /// A placed plant.
 enum PlacedPlant {
