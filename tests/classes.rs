@@ -364,3 +364,46 @@ fn a_robot_in_view_is_ignored() {
     let message = succeed(verb("verify", &data, &["--rerender", "1"])).stderr;
     assert!(String::from_utf8_lossy(&message).contains("; 0 faults"), "{}", String::from_utf8_lossy(&message));
 }
+
+/// Rationale: users train on plant models of their own. Expected: every visible plant of a model with a class of its own is an
+/// instance of that class in COCO and YOLO, with the pixels of its record; an object of the class `Soil` is not.
+#[test]
+fn plants_that_are_models_are_instances_of_their_class() {
+    let (_keep, data) = scratch();
+    let folder = tempfile::tempdir().unwrap();
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/models");
+    for file in ["seedling.glb", "peg.obj", "peg.mtl"] {
+        fs::copy(models.join(file), folder.path().join(file)).unwrap();
+    }
+    let page = folder.path().join("page.ron");
+    let text = "Field(seed: 7, camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 45), \
+                pose: Nadir(height_m: 0.6)), lights: [Constant(radiance: (1, 1, 1, 1))], models: [\
+                (file: \"seedling.glb\", name: \"my beet\", class: Crop, rows: (spacing_m: 0.2, in_row_m: 0.15)), \
+                (file: \"seedling.glb\", class: Weed, spread: (per_m2: 40, k: 50), scale: 0.6), \
+                (file: \"peg.obj\", name: \"peg\", class: Soil, up: Z, scale: 0.002)])";
+    fs::write(&page, text).unwrap();
+    let mut command = trace(&["dataset", "--scene", path(&page), "--quiet", "--out", path(&data), "--count", "3"]);
+    command.args(["--width", "96", "--spp", "1", "--split", "1,1,1", "--format", "coco,yolo"]);
+    command.args(["--classes", "soil; beet=model:my beet; weed; peg=model:peg"]);
+    succeed(command);
+    let (set, samples) = samples(&data);
+    let name = |plant: &Plant| set.recipe.species[usize::from(plant.kind) - 1].name.clone();
+    let visible: usize = samples.iter().map(|s| s.record.seen().filter(|p| name(p) == "my beet").count()).sum();
+    assert!(visible > 3, "{visible} plants");
+    let categories = list(&data.join("coco/annotations/instances_train.json"), "categories");
+    assert_eq!(categories.iter().map(|c| c["name"].as_str().unwrap()).collect::<Vec<_>>(), ["beet", "weed"]);
+    let mut wanted: Vec<(u64, u64, u64)> = samples
+        .iter()
+        .flat_map(|s| s.record.seen().map(move |p| (s.record.index, p)))
+        .map(|(k, p)| (k, if name(p) == "my beet" { 1 } else { 2 }, u64::from(p.seen.pixels)))
+        .collect();
+    wanted.sort_unstable();
+    assert_eq!(instances(&data), wanted);
+    for sample in &samples {
+        let (file, split) = (&sample.record.name, sample.record.split.name());
+        let rows = fs::read_to_string(data.join(format!("yolo/labels/{split}/{file}.txt"))).unwrap();
+        let of = |class: &str| rows.lines().filter(|row| row.starts_with(class)).count();
+        let beets = sample.record.seen().filter(|p| name(p) == "my beet").count();
+        assert_eq!((of("0 "), of("1 ")), (beets, sample.record.seen().count() - beets), "{rows}");
+    }
+}

@@ -8,6 +8,7 @@ use crate::model::sample::Sample;
 use crate::read::set::Set;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
+use furrow_field::record::SpeciesRecord;
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -16,6 +17,7 @@ pub struct Labels<'a> {
     labelling: &'a Labelling,
     classes: Cow<'a, Classes>,
     map: Map,
+    species: &'a [SpeciesRecord],
 }
 
 impl<'a> Labels<'a> {
@@ -24,7 +26,7 @@ impl<'a> Labels<'a> {
         let labelling = &recipe.labelling;
         let classes = labelling.classes.as_ref().map_or_else(|| Cow::Owned(Classes::default()), Cow::Borrowed);
         classes.check().map_err(|what| Error::damaged(format!("the classes of this dataset are invalid: {what}")))?;
-        Ok(Self { labelling, map: classes.of(&recipe.species, recipe.models())?, classes })
+        Ok(Self { labelling, map: classes.of(&recipe.species, recipe.models())?, classes, species: &recipe.species })
     }
 
     /// Returns the classes by number.
@@ -39,7 +41,7 @@ impl<'a> Labels<'a> {
 
     /// Returns the classes that plants can have, in order.
     pub fn of_plants(&self) -> Vec<u8> {
-        self.classes.of_plants()
+        self.classes.of_plants(self.species)
     }
 
     /// Returns the class of each pixel; [`IGNORE`](crate::model::sample::IGNORE) for none.

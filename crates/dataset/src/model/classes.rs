@@ -10,6 +10,9 @@
 //! | an organ, or an object on the ground | from `parts.png`, such as petiole or stone; overrides both |
 //! | `model:NAME` | a model from disk that the scene file names, also from `parts.png`; overrides `model`, all models |
 //!
+//! Models that are plants have a row in the table of species, with their name and without an EPPO code. A label of models
+//! claims such plants as wholes too, so that formats list them as instances.
+//!
 //! A pixel that no class claims has no label; neither has one that the class `ignore` claims.
 
 use crate::model::sample::IGNORE;
@@ -171,10 +174,11 @@ impl Classes {
         self.0.iter().flat_map(|class| &class.labels).any(|label| is_part(label))
     }
 
-    /// Returns the classes that plants can have: those with a label other than soil, organs, objects on the ground and
-    /// named models.
-    pub fn of_plants(&self) -> Vec<u8> {
-        let plant = |label: &String| label != SEMANTICS[0] && !is_part(label);
+    /// Returns the classes that plants can have: those with a label other than soil, organs and objects on the ground.
+    /// Labels of models count if `species`, the table of the dataset, contains such models.
+    pub fn of_plants(&self, species: &[SpeciesRecord]) -> Vec<u8> {
+        let model = |label: &str| species.iter().any(|record| is_model(record, label));
+        let plant = |label: &String| label != SEMANTICS[0] && (!is_part(label) || model(label));
         let places = (0..).zip(self.counted()).filter(|(_, class)| class.labels.iter().any(plant));
         places.map(|(place, _)| place).collect()
     }
@@ -217,11 +221,14 @@ impl Classes {
             let own = place(&|label| label.strip_prefix(OF_NAME) == Some(name.as_str()));
             parts[number] = own.or_else(|| place(&|label| label == MODEL));
         }
-        Ok(Map {
-            semantics: SEMANTICS.map(|name| place(&|label| label == name)),
-            species: species.iter().map(of_species).collect(),
-            parts,
-        })
+        let species: Vec<Option<u8>> = species.iter().map(of_species).collect();
+        let of_plant = |(record, own): (&SpeciesRecord, &Option<u8>)| {
+            // As in `parts.png`, its own name precedes the label of all models, and both precede its species.
+            let named = place(&|label| label != MODEL && is_model(record, label));
+            named.or_else(|| place(&|label| is_model(record, label))).or(*own)
+        };
+        let plants = records.iter().zip(&species).map(of_plant).collect();
+        Ok(Map { semantics: SEMANTICS.map(|name| place(&|label| label == name)), species, plants, parts })
     }
 }
 
@@ -234,6 +241,11 @@ fn part(label: &str) -> Option<u8> {
 /// Returns whether only `parts.png` contains a label.
 fn is_part(label: &str) -> bool {
     part(label).is_some() || label.starts_with(OF_NAME)
+}
+
+/// Returns whether a label of models is that of a row in the table of species; species with an EPPO code are no models.
+fn is_model(record: &SpeciesRecord, label: &str) -> bool {
+    record.eppo.is_empty() && (label == MODEL || label.strip_prefix(OF_NAME) == Some(record.name.as_str()))
 }
 
 /// Returns the error for a label that the dataset does not have.
@@ -263,7 +275,10 @@ fn hue(turns: f32) -> [u8; 3] {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Map {
     semantics: [Option<u8>; 3],
+    /// Class of the pixels of each species.
     species: Vec<Option<u8>>,
+    /// Class of the whole plants of each species: that of its pixels, or that of the model that it is.
+    plants: Vec<Option<u8>>,
     parts: Vec<Option<u8>>,
 }
 
@@ -281,9 +296,13 @@ impl Map {
     /// Returns the class of a whole plant from its number in `semantics.png` and the number of its species, 0 for none.
     /// `None` if no class or the class `ignore` claims it.
     pub fn of_plant(&self, semantic: u8, species: u16) -> Option<u8> {
-        let special = usize::from(species).checked_sub(1).and_then(|n| self.species.get(n).copied().flatten());
-        let class = special.or_else(|| self.semantics.get(usize::from(semantic)).copied().flatten());
-        class.filter(|class| *class != IGNORE)
+        self.class(&self.plants, semantic, species).filter(|class| *class != IGNORE)
+    }
+
+    /// Returns the class of a species by one of the lists, or else that of its number in `semantics.png`.
+    fn class(&self, list: &[Option<u8>], semantic: u8, species: u16) -> Option<u8> {
+        let special = usize::from(species).checked_sub(1).and_then(|n| list.get(n).copied().flatten());
+        special.or_else(|| self.semantics.get(usize::from(semantic)).copied().flatten())
     }
 
     /// Returns the class of each pixel from its numbers in `semantics.png`, `species.png` and `parts.png`; the latter
@@ -292,7 +311,7 @@ impl Map {
         let class = |(i, semantic): (usize, &u8)| {
             let part = parts.get(i).and_then(|part| self.parts.get(usize::from(*part)).copied().flatten());
             let species = species.get(i).map_or(0, |n| u16::from(*n));
-            part.or_else(|| self.of_plant(*semantic, species)).unwrap_or(IGNORE)
+            part.or_else(|| self.class(&self.species, *semantic, species)).unwrap_or(IGNORE)
         };
         semantics.iter().enumerate().map(class).collect()
     }
@@ -332,7 +351,7 @@ mod tests {
         }
         let classes = Classes::parse("soil; ignore=thistle,stick; hen=cheal; weed; stone").unwrap();
         assert_eq!(classes.names(), ["soil", "hen", "weed", "stone"]);
-        assert_eq!((classes.of_plants(), classes.needs_parts()), (vec![1, 2], true));
+        assert_eq!((classes.of_plants(&table), classes.needs_parts()), (vec![1, 2], true));
         let map = classes.of(&table, &[]).unwrap();
         let number = |name: &str| part(name).unwrap();
         let (semantics, species, parts) = (
@@ -352,7 +371,7 @@ mod tests {
         let names = ["robot".to_owned(), "box".to_owned()];
         let pixels = |text: &str| {
             let classes = Classes::parse(text).unwrap();
-            assert!(classes.needs_parts() && classes.of_plants() == [1]);
+            assert!(classes.needs_parts() && classes.of_plants(&[]) == [1]);
             let parts = [1, 6, 101, 102];
             classes.of(&[], &names).unwrap().labels(&[0; 4], &[], &parts)
         };
@@ -361,6 +380,27 @@ mod tests {
         let missing = Classes::parse("soil; crop; ignore=model:tractor").unwrap().of(&[], &names).unwrap_err();
         let message = missing.to_string();
         assert!(message.contains("`model:tractor`") && message.contains("model:robot, model:box"), "{message}");
+    }
+
+    /// Rationale: a plant that is a model had a class in masks and none in lists. Expected: whole plants have the class of
+    /// their pixels: that of the model's name, then that of all models, then that of the species.
+    #[test]
+    fn plants_that_are_models_have_the_class_of_the_model() {
+        let record = |name: &str, eppo: &str| SpeciesRecord {
+            name: name.into(),
+            eppo: eppo.into(),
+            class: furrow_render::scene::tag::Class::Crop,
+        };
+        let (table, names) = ([record("beet", ""), record("maize", "ZEAMX"), record("scan", "")], ["beet".to_owned()]);
+        let plants = |text: &str| {
+            let classes = Classes::parse(text).unwrap();
+            let map = classes.of(&table, &names).unwrap();
+            (classes.of_plants(&table), [1, 2, 3].map(|species| map.of_plant(1, species)))
+        };
+        assert_eq!(plants("soil; crop; mine=model:beet"), (vec![1, 2], [Some(2), Some(1), Some(1)]));
+        assert_eq!(plants("soil; crop; all=model; mine=model:beet"), (vec![1, 2, 3], [Some(3), Some(1), Some(2)]));
+        assert_eq!(plants("soil; crop; ignore=model:beet"), (vec![1], [None, Some(1), Some(1)]));
+        assert_eq!(plants("soil; crop=beet; mine=model:beet"), (vec![1, 2], [Some(2), None, None]));
     }
 
     #[test]
