@@ -1,6 +1,10 @@
 //! Calibration of a camera: intrinsics and lens from a file of OpenCV.
 //!
 //! OpenCV puts the first pixel's centre at (0, 0), this program at (0.5, 0.5), so the optical axis moves by half a pixel.
+//!
+//! The matrix of a ROS `camera_info` is that of the whole sensor; images are its region of interest, binned. With the offset o
+//! and the binning b of each axis, focal length f and optical axis c become f / b and (c − o) / b, where c counts from the
+//! corner of the first pixel. Source: ROS, `sensor_msgs/CameraInfo`.
 
 use super::distortion::Distortion;
 use super::file_storage::{self, Entry};
@@ -21,6 +25,14 @@ const SIZE: [[&str; 2]; 2] = [["image_width", "image_Width"], ["image_height", "
 const MOST_PIXELS: f64 = 1e6;
 /// Largest relative difference between the aspect ratios of the calibration and of the image.
 const SAME_SHAPE: f64 = 2e-3;
+
+/// Names of the width and height in a `camera_info` of ROS.
+const ROS_SIZE: [&str; 2] = ["width", "height"];
+/// Names of the binning, and of offset and size of the region of interest, in a `camera_info` of ROS.
+const BINNING: [&str; 2] = ["binning_x", "binning_y"];
+const OFFSET: [&str; 2] = ["x_offset", "y_offset"];
+/// Largest binning.
+const MOST_BINNED: f64 = 64.0;
 
 /// Calibration of a camera, in this program's pixel coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,26 +79,13 @@ impl Calibration {
         let entry = need(&COEFFICIENTS, "distortion coefficients")?;
         let coefficients = entry.matrix()?;
         let line = entry.line;
-        let [width, height] = SIZE.map(|names| find(&names).map(Entry::number).transpose());
-        let size = match (width?, height?) {
-            (Some(width), Some(height)) => Some([width, height]),
-            (None, None) => None,
-            _ => {
-                return Err(Error::input("the file has only one of image_width and image_height")
-                    .help("write both, or none of them"));
-            }
-        };
-        if size.is_some_and(|size| size.iter().any(|side| !(1.0..=MOST_PIXELS).contains(side) || side.fract() != 0.0)) {
-            return Err(Error::input(format!(
-                "the image size in the file is not in whole pixels from 1 to {MOST_PIXELS}"
-            ))
-            .help("write image_width and image_height in pixels"));
-        }
+        let size = size(&all)?;
+        let (focal, centre, size) = part_of_sensor(&all, [fx, fy], [cx + 0.5, cy + 0.5], size)?;
         let fisheye = match find(&["distortion_model"]) {
             Some(entry) => Some(named(entry)?),
             None => find(&["fisheye_model"]).map(flag).transpose()?,
         };
-        Ok(Self { size, focal: [fx, fy], centre: [cx + 0.5, cy + 0.5], coefficients, fisheye, line })
+        Ok(Self { size, focal, centre, coefficients, fisheye, line })
     }
 
     /// Returns focal lengths, optical axis and lens for images of `size` pixels. `fisheye` is the model of a file that
@@ -129,6 +128,72 @@ impl Calibration {
         let words = format!("line {}: {} distortion coefficients, not {expected}", self.line, self.coefficients.len());
         Error::input(words).help("write all coefficients that cv2.calibrateCamera or cv2.fisheye.calibrate returns")
     }
+}
+
+/// Returns the image size in a file, pixels; `None` if it has none.
+fn size(all: &[Entry]) -> Result<Option<[f64; 2]>> {
+    let find = |names: &[&str]| all.iter().find(|entry| names.contains(&entry.key.as_str()));
+    // A width in another file may be that of a chessboard.
+    let of_ros = find(&["distortion_model"]).is_some() && find(&SIZE.concat()).is_none();
+    let names = if of_ros { ROS_SIZE.map(|name| vec![name]) } else { SIZE.map(|names| names.to_vec()) };
+    let [width, height] = names.map(|names| find(&names).map(Entry::number).transpose());
+    let size = match (width?, height?) {
+        (Some(width), Some(height)) => [width, height],
+        (None, None) => return Ok(None),
+        _ => {
+            return Err(Error::input("the file has only one of image_width and image_height")
+                .help("write both, or none of them"));
+        }
+    };
+    if size.iter().any(|side| !(1.0..=MOST_PIXELS).contains(side) || side.fract() != 0.0) {
+        let words = format!("the image size in the file is not in whole pixels from 1 to {MOST_PIXELS}");
+        return Err(Error::input(words).help("write image_width and image_height in pixels"));
+    }
+    Ok(Some(size))
+}
+
+/// Focal lengths, optical axis and image size, pixels.
+type Pinhole = ([f64; 2], [f64; 2], Option<[f64; 2]>);
+
+/// Returns the pinhole of the images that ROS describes as a binned region of the sensor; unchanged if the file has neither.
+fn part_of_sensor(all: &[Entry], focal: [f64; 2], centre: [f64; 2], size: Option<[f64; 2]>) -> Result<Pinhole> {
+    let find = |name: &str| all.iter().find(|entry| entry.key == name);
+    let mut binning = [1.0; 2];
+    for (binning, name) in binning.iter_mut().zip(BINNING) {
+        let Some(entry) = find(name) else { continue };
+        let value = entry.number()?;
+        if !(0.0..=MOST_BINNED).contains(&value) || value.fract() != 0.0 {
+            let words = format!("is not a whole number from 0 to {MOST_BINNED}");
+            return Err(entry.fault(words).help("0 and 1 mean no binning"));
+        }
+        *binning = value.max(1.0);
+    }
+    let (mut offset, mut whole) = ([0.0; 2], size);
+    if let Some(roi) = find("roi") {
+        let read = |names: [&str; 2]| -> Result<[f64; 2]> {
+            Ok([roi.named(names[0])?.unwrap_or(0.0), roi.named(names[1])?.unwrap_or(0.0)])
+        };
+        let side = read(ROS_SIZE)?;
+        offset = read(OFFSET)?;
+        // A size of 0 means the whole sensor.
+        if side != [0.0; 2] {
+            whole = Some(side);
+        }
+        let ends = [0, 1].map(|axis| offset[axis] + whole.map_or(0.0, |whole| whole[axis]));
+        let fits = size.is_none_or(|size| [0, 1].iter().all(|axis| ends[*axis] <= size[*axis]));
+        let whole_numbers = offset.iter().chain(&side).all(|n| *n >= 0.0 && *n <= MOST_PIXELS && n.fract() == 0.0);
+        if !fits || !whole_numbers || side.contains(&0.0) != (side == [0.0; 2]) {
+            return Err(roi
+                .fault("is not a region of the image")
+                .help("write x_offset, y_offset, width and height in pixels; all are 0 for the whole image"));
+        }
+    }
+    let axes = [0, 1];
+    Ok((
+        axes.map(|axis| focal[axis] / binning[axis]),
+        axes.map(|axis| (centre[axis] - offset[axis]) / binning[axis]),
+        whole.map(|whole| axes.map(|axis| (whole[axis] / binning[axis]).floor().max(1.0))),
+    ))
 }
 
 /// Returns a flag that is written as 0 or 1.
@@ -319,6 +384,45 @@ mod tests {
         assert_eq!(named.fisheye, Some(false));
         let (focal, centre, _) = expected.lens((320, 240), false).unwrap();
         assert_eq!((focal, centre), ([250.0, 255.0], [161.5, 119.375]));
+    }
+
+    /// Rationale: cameras of robots bin and crop, and ROS files have the matrix of the whole sensor. Expected: the intrinsics of the
+    /// published image, by arithmetic; zeros change nothing. Source: `sensor_msgs/CameraInfo`.
+    #[test]
+    fn binning_and_regions_of_ros_are_applied() {
+        let ros = |more: &str| {
+            format!("{}distortion_model: plumb_bob\n{more}", yaml(&FIVE, "").replace(" !!opencv-matrix", ""))
+        };
+        let lens = |more: &str, size| {
+            let (focal, centre, _) = Calibration::read(&ros(more)).unwrap().lens(size, false).unwrap();
+            (focal, centre)
+        };
+        let plain = lens("", (640, 480));
+        assert_eq!(plain, ([500.0, 510.0], [323.0, 238.75]));
+        let none = "binning_x: 0\nbinning_y: 1\nroi:\n  x_offset: 0\n  y_offset: 0\n  height: 0\n  width: 0\n  do_rectify: False\n";
+        assert_eq!(lens(none, (640, 480)), plain);
+        let binned = "binning_x: 2\nbinning_y: 2\n";
+        assert_eq!(lens(binned, (320, 240)), ([250.0, 255.0], [161.5, 119.375]));
+        let region = "roi:\n  x_offset: 40\n  y_offset: 20\n  height: 240\n  width: 320\n";
+        assert_eq!(lens(region, (320, 240)), ([500.0, 510.0], [283.0, 218.75]));
+        let inline = "roi: {x_offset: 40, y_offset: 20, height: 240, width: 320, do_rectify: false}\n";
+        assert_eq!(lens(inline, (320, 240)), lens(region, (320, 240)));
+        assert_eq!(lens(&format!("{binned}{region}"), (160, 120)), ([250.0, 255.0], [141.5, 109.375]));
+        // A message as `rostopic echo` prints it names the size width and height.
+        let message = ros(region).replace("image_width", "width").replace("image_height", "height");
+        assert_eq!(Calibration::read(&message).unwrap(), Calibration::read(&ros(region)).unwrap());
+        for (more, why) in [
+            ("binning_x: 1.5\n", "line 20: binning_x is not a whole number from 0 to 64"),
+            (
+                "roi:\n  x_offset: 600\n  y_offset: 0\n  height: 240\n  width: 320\n",
+                "line 20: roi is not a region of the image",
+            ),
+            ("roi:\n  x_offset: 40\n", "line 20: roi is not a region of the image"),
+            ("roi:\n  x_offset: left\n", "line 20: roi has a x_offset that is not a number"),
+        ] {
+            let error = Calibration::read(&ros(more)).unwrap_err().to_string();
+            assert!(error.contains(why) && error.contains("help: "), "{why}: {error}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Reads numbers and matrices from files in the format of OpenCV's `FileStorage`, as YAML or XML.
 //!
-//! The reader takes the keys of the first level: numbers, words and matrices with `rows`, `cols` and `data`. Other
-//! values are passed over. YAML without the tag `!!opencv-matrix`, as ROS writes it, is read alike.
+//! The reader takes the keys of the first level: numbers, words, matrices with `rows`, `cols` and `data`, and numbers by
+//! name, as in ROS's `roi`. Other values are passed over. YAML without the tag `!!opencv-matrix`, as ROS writes it, is read alike.
 
 use furrow_base::{Error, Result};
 
@@ -24,6 +24,8 @@ pub(super) struct Entry {
     data: Vec<String>,
     /// Whether a matrix has more data than are kept.
     long: bool,
+    /// Other values by name, in lines below the key.
+    named: Vec<(String, String)>,
 }
 
 impl Entry {
@@ -69,12 +71,26 @@ impl Entry {
         Ok(numbers)
     }
 
-    /// Sets a part of a matrix, or passes it over.
+    /// Returns the number with this name below the key, in lines of their own or as `{name: number, …}`; `None` if it has none.
+    pub(super) fn named(&self, name: &str) -> Result<Option<f64>> {
+        let inline = self.text.trim_matches(['{', '}']).split(',').filter_map(|pair| pair.split_once(':'));
+        let own = self.named.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+        let Some((_, value)) = own.chain(inline).find(|(key, _)| key.trim().trim_matches('"') == name) else {
+            return Ok(None);
+        };
+        let value = number(value.trim());
+        value
+            .map(Some)
+            .ok_or_else(|| self.fault(format_args!("has a {name} that is not a number")).help("write one number"))
+    }
+
+    /// Sets a part of a matrix or a value by name.
     fn set(&mut self, part: &str, text: &str) {
         match part {
             "rows" => self.rows = Some(text.to_owned()),
             "cols" => self.cols = Some(text.to_owned()),
             "data" => self.add(text),
+            _ if self.named.len() < MOST => self.named.push((part.to_owned(), text.to_owned())),
             _ => {}
         }
     }
