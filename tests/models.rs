@@ -435,7 +435,8 @@ fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
 /// Builds a field with `soil` and `models`, seen from 0.8 m.
 fn sown(folder: &Path, models: &str) -> furrow_base::Result<Field> {
     let camera = "Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 60), pose: Nadir(height_m: 0.8))";
-    let soil = "layers: [], colors: [Loess], stones: [], litter: (bits_per_m2: 0, straw_per_m2: 0, sticks_per_m2: 0)";
+    let litter = "(straw_cover: 0, sticks_per_m2: 0, bits_per_m2: 0)";
+    let soil = format!("clods: (over_5mm_per_m2: 300, min_mm: 6), crumbs: (amount: 0), stones: [], litter: {litter}");
     let page = folder.join("sown.ron");
     let text = format!(
         "Field(seed: 3, camera: {camera}, lights: [Constant(radiance: (1, 1, 1, 1))], soil: ({soil}), models: [{models}])"
@@ -468,9 +469,14 @@ fn models_are_sown_in_rows_and_by_density() {
         let across = plant.position.truncate().dot(vec2(cos, -sin)) / 0.25;
         assert!((across - across.round()).abs() < 1e-3, "{} is beside its row", plant.position);
         assert!((0.02..0.04).contains(&(plant.radius / 2f32.sqrt())), "{}", plant.radius);
-        let next = plants.iter().filter(|p| p.number != plant.number).map(|p| p.position.distance(plant.position));
-        assert!((next.fold(f32::MAX, f32::min) - 0.1).abs() < 0.02);
     }
+    let has_next = |plant: &&furrow_field::PlantRecord| {
+        let others = plants.iter().filter(|other| other.number != plant.number);
+        let nearest = others.map(|other| other.position.distance(plant.position)).fold(f32::MAX, f32::min);
+        (nearest - 0.1).abs() < 0.02
+    };
+    // A plant in a corner of the view may be alone in its row.
+    assert!(plants.iter().filter(has_next).count() * 10 >= plants.len() * 9);
     let numbers_of = |plants: &[furrow_field::PlantRecord]| {
         let both: std::collections::BTreeSet<(u32, u32)> = plants.iter().map(|p| (p.number, p.id)).collect();
         both.len()
