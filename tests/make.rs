@@ -35,7 +35,9 @@ fn make(crop: &str, out: &Path, more: &[&str]) -> Command {
     let scene = out.join("scene.ron");
     if !scene.exists() {
         std::fs::create_dir_all(out).expect("a folder");
-        let text = small_text().replace("\"scenes/", &format!("\"{}/scenes/", env!("CARGO_MANIFEST_DIR")));
+        // A crop among the weeds, as a scene file of this command has it.
+        let text = small_text().replace("chenopodium.ron", "rape.ron");
+        let text = text.replace("\"scenes/", &format!("\"{}/scenes/", env!("CARGO_MANIFEST_DIR")));
         std::fs::write(scene, text.replace("\"textures/", &format!("\"{}/textures/", env!("CARGO_MANIFEST_DIR"))))
             .expect("a scene file");
     }
@@ -70,6 +72,7 @@ fn one_command_makes_a_network_and_a_killed_one_ends_with_the_same() {
     for words in ["3 images of 64 × 48 pixels", "4 training steps", "core minutes", "4 steps in"] {
         assert!(told.contains(words), "{words}: {told}");
     }
+    assert!(!told.contains("is labelled weed"), "{told}");
     for file in ["scene.ron", "report.html", "eval/rendered/report.html"] {
         assert!(whole.join(file).is_file(), "{file}");
     }

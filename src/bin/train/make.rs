@@ -266,7 +266,12 @@ impl<'a> Make<'a> {
         let stop = self.signals.catch();
         let callbacks = Callbacks {
             begin: &|total| bar.set_length(total.to_u64()),
-            warn: &|words| bar.suspend(|| self.tell(&format!("warning: {words}"))),
+            warn: &|words| {
+                // The scene file lists relatives of the crop as weeds on purpose.
+                if !furrow_field::assemble::is_about_role(words) {
+                    bar.suspend(|| self.tell(&format!("warning: {words}")));
+                }
+            },
             done: &|_| bar.inc(1),
             soon: stop,
             now: stop,

@@ -60,6 +60,7 @@ use furrow_render::scene::Scene;
 use illumination::LightAddress;
 pub use lighting::Lighting;
 pub use options::{Options, Scanner};
+pub use plausibility::is_about_role;
 use populate::PlantsAndModels;
 pub use preview::Preview;
 pub use progress::BuildProgress;

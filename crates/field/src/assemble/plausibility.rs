@@ -20,6 +20,15 @@ const WIDE_IN_ROW_M: f32 = 1.5;
 /// Camera height above which a warning is given, metres: robots carry cameras at 0.5 to 2 m, masts at 3 m.
 const HIGH_M: f32 = 5.0;
 
+/// Words of the warning about a species in a list of another class than that of its file.
+const ROLE: &str = "the role in its species file";
+
+/// Returns `true` if a warning is about a species in a list of another class than that of its file. Programs that write scene files
+/// with such lists on purpose leave it out.
+pub fn is_about_role(warning: &str) -> bool {
+    warning.contains(ROLE)
+}
+
 /// Returns warnings about the camera and the sensor.
 pub(super) fn camera(drawn: &Drawn<'_>) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -76,7 +85,7 @@ pub(super) fn plants(drawn: &Drawn<'_>, library: &mut Library) -> Result<Vec<Str
         let (own, list) = (species.desc.role.class(), if class == Class::Crop { "crops" } else { "weeds" });
         let (name, listed, own_name) = (&species.desc.name, class.name(), own.name());
         let words = format!(
-            "{name} is labelled {listed} because `{list}` lists it; the role in its species file, {own_name}, is that of single `plants`"
+            "{name} is labelled {listed} because `{list}` lists it; {ROLE}, {own_name}, is that of single `plants`"
         );
         if own != class && !warnings.contains(&words) {
             warnings.push(words);
