@@ -133,3 +133,21 @@ fn packs_streams_and_drives_know_the_lights() {
     let words = fail(dark, 2);
     assert!(words.contains("--relight renders the same labels under several lights"), "{words}");
 }
+
+/// Rationale: ten images of ten lights are one field, so a validation set that was asked for is empty. Expected: one warning that
+/// names the splits without images; none if the split asks for none of them.
+#[test]
+fn splits_that_get_no_field_are_named() {
+    for (split, names) in
+        [("8,1,1", Some("val and test are without images")), ("1,1,0", Some("val is")), ("1,0,0", None)]
+    {
+        let (_keep, data) = scratch();
+        let mut command = trace(&["dataset", "plan", "--scene", SMALL, "--out", path(&data), "--count", "3"]);
+        command.args(["--width", "48", "--spp", "1", "--relight", "3", "--split", split]);
+        let words = succeed(command).stderr;
+        let words = String::from_utf8_lossy(&words);
+        let warnings: Vec<&str> = words.lines().filter(|line| line.contains("1 field of 3 lights each")).collect();
+        assert_eq!(warnings.len(), usize::from(names.is_some()), "{split}: {words}");
+        assert!(names.is_none_or(|names| warnings[0].contains(names)), "{split}: {words}");
+    }
+}

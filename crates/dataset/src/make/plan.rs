@@ -12,7 +12,7 @@ use crate::model::image_format::ImageFormat;
 use crate::model::labelling::Labelling;
 use crate::model::optional_maps::{self, OmittableMap, OptionalMap};
 use crate::model::recipe::{FILE, ImageOrigin, Recipe, Rendering};
-use crate::model::split::Shares;
+use crate::model::split::{Shares, Split};
 use crate::read::checksum_record;
 use crate::read::links;
 use crate::read::set::Set;
@@ -27,6 +27,7 @@ use furrow_field::assemble::BuildProgress;
 use furrow_job::{Renderer, SceneFile};
 use furrow_optics::sensor::Camera;
 use furrow_render::settings::{Engine, RenderOptions};
+use furrow_report::count;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -213,6 +214,7 @@ pub(crate) fn draft(order: &Order, stop: &Arc<AtomicBool>) -> Result<Draft> {
     pack::check(&recipe)?;
     let mut all_warnings = field.warnings.clone();
     all_warnings.extend(warnings(&recipe)?);
+    all_warnings.extend(without_fields(&recipe));
     all_warnings.extend(rolling(&recipe, camera)?);
     all_warnings.extend(distorted(&recipe, field.captures.iter().map(|capture| &capture.camera))?);
     let scene_sha256 = field.hash.clone();
@@ -292,6 +294,24 @@ fn hash_of_copies(order: &Order, files: &[File], scene: &str, stop: &Arc<AtomicB
         .in_file(&order.scene)
         .help("name it relative to the file that needs it")),
     }
+}
+
+/// Returns a warning if several lights leave so few fields that a split has none.
+fn without_fields(recipe: &Recipe) -> Option<String> {
+    let (fields, lights) = (recipe.count.div_ceil(recipe.captures()), recipe.lights());
+    let Shares([train, val, test]) = recipe.split;
+    let period = u64::from(train) + u64::from(val) + u64::from(test);
+    let has = |fields: u64, split| (0..fields.min(period)).any(|field| recipe.split.of(field) == split);
+    let empty = Split::ALL.into_iter().filter(|split| has(period, *split) && !has(fields, *split));
+    let names: Vec<&str> = empty.map(Split::name).collect();
+    (lights > 1 && !names.is_empty()).then(|| {
+        format!(
+            "{} of {lights} lights each: too few fields for the split {train},{val},{test}, so {} without images; \
+             a larger --count makes more fields",
+            count(fields, "field", "fields"),
+            if let [one] = names[..] { format!("{one} is") } else { format!("{} are", names.join(" and ")) }
+        )
+    })
 }
 
 /// Returns a warning if formats with one pose per image are written for a camera with a rolling shutter.
