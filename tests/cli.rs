@@ -285,7 +285,9 @@ fn a_catalogue_shows_species_and_keeps_what_would_come_out_the_same() {
     assert!(!page.contains("://"), "the page loads external resources");
     let sheet = || std::fs::read(folder.path().join("out/catalogue/echinochloa.png")).unwrap();
     let before = sheet();
-    assert!(text(&catalogue("echinochloa").stderr).contains("kept"));
+    for name in ["echinochloa", "ECHCG", "Echinochloa crus-galli", "Hühnerhirse"] {
+        assert!(text(&catalogue(name).stderr).contains("kept"), "{name}");
+    }
     assert!(sheet() == before);
     let missing = catalogue("echinocloa");
     assert_eq!(missing.status.code(), Some(2));

@@ -7,6 +7,7 @@ use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// Fewest letters of a word of a name in another language that finds a species: `de` and `des` say nothing.
 const SHORTEST_WORD: usize = 4;
@@ -30,7 +31,12 @@ impl Shipped {
     pub fn names(&self) -> Vec<String> {
         let SpeciesDesc { name, scientific, eppo, .. } = &self.desc;
         let own = [self.stem(), eppo.clone(), name.clone(), scientific.clone()];
-        own.into_iter().chain(aliases::of(&self.stem()).iter().map(|name| (*name).to_owned())).collect()
+        own.into_iter().chain(self.other_names().iter().map(|name| (*name).to_owned())).collect()
+    }
+
+    /// Returns the names that the species file does not have: in other languages, older scientific ones, other EPPO codes.
+    pub fn other_names(&self) -> &'static [&'static str] {
+        aliases::of(&self.stem())
     }
 
     /// Returns `true` if this is one of the names, regardless of case, signs and accents.
@@ -93,6 +99,17 @@ pub fn species(name: &str) -> Result<Option<PathBuf>> {
             Err(unknown(&all, wanted))
         }
         several => Err(ambiguous(several, wanted)),
+    }
+}
+
+/// Returns the English name and the EPPO code of the shipped species that a scene file finds by this name; `None` if none or
+/// several have it.
+pub fn identity(name: &str) -> Option<[&'static str; 2]> {
+    static ALL: OnceLock<Vec<Shipped>> = OnceLock::new();
+    let all = ALL.get_or_init(|| all_species().map(|(all, _)| all).unwrap_or_default());
+    match called(all, name).as_slice() {
+        [one] => Some([&one.desc.name, &one.desc.eppo]),
+        _ => None,
     }
 }
 

@@ -45,12 +45,12 @@ impl ExpectedPlants {
     /// Returns the distribution as a sentence.
     pub fn words(&self) -> String {
         let Self { median, low, high, fields } = *self;
-        let about = format!("about {} plants in view per image", number(median));
-        let range = format!("{} to {}", number(low), number(high));
+        let about = format!("an image shows about {} plants", number(median));
+        let range = format!("between {} and {} plants", number(low), number(high));
         match fields {
             1 => about,
-            2..MANY => format!("{about}, {range} in the {fields} fields"),
-            _ => format!("{about}, {range} in 90 % of the fields"),
+            2..MANY => format!("{about} (median of {fields} fields, which have {range})"),
+            _ => format!("{about} (median; 90 % of the fields have {range})"),
         }
     }
 
@@ -96,11 +96,14 @@ mod tests {
         assert!(
             wide.warning()
                 .unwrap()
-                .starts_with("about 49.5 plants in view per image, 5 to 94 in 90 % of the fields, a factor of 18.8")
+                .starts_with("an image shows about 49.5 plants (median; 90 % of the fields have between 5 and 94 plants), a factor of 18.8")
         );
         let few = ExpectedPlants::of(vec![19.5, 11.1]).unwrap();
-        assert_eq!(few.words(), "about 15.3 plants in view per image, 11.1 to 19.5 in the 2 fields");
-        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "about 7 plants in view per image");
+        assert_eq!(
+            few.words(),
+            "an image shows about 15.3 plants (median of 2 fields, which have between 11.1 and 19.5 plants)"
+        );
+        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "an image shows about 7 plants");
         // Fields with less than one plant count as one, so the ratio stays finite.
         assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
         assert_eq!(ExpectedPlants::of(Vec::new()), None);

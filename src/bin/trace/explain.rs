@@ -23,6 +23,9 @@ pub(crate) struct Args {
     search: Option<String>,
 }
 
+/// Number of entries that an error about an unknown path lists.
+const FIRST: usize = 3;
+
 /// Prints the explanation.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let references = [scene(), species(), texture(), distribution()];
@@ -42,9 +45,12 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
 /// Adds to the error about a word that is not a path the entries that the word finds.
 fn advised(error: Error, word: &str, references: &[Reference]) -> Result<Error> {
     let found = search(word, references, &shipped_files()?);
-    let Some((first, _)) = found.first() else { return Ok(error) };
+    if found.is_empty() {
+        return Ok(error);
+    }
     let entries = count(found.len().to_u64(), "entry", "entries");
-    Ok(error.help(format!("`trace explain --search {word}` finds {entries}, first: {first}")))
+    let first: Vec<&str> = found.iter().take(FIRST).map(|(name, _)| name.as_str()).collect();
+    Ok(error.help(format!("`trace explain --search {word}` finds {entries}, first: {}", first.join(", "))))
 }
 
 /// Returns the shipped scene files with their first comments, the species with all their names, and the soil textures.

@@ -87,8 +87,8 @@ pub(crate) struct FieldArgs {
     /// growth stages written in it.
     #[arg(long, value_name = "DAY", value_parser = clap::value_parser!(u32).range(0..=1000))]
     day: Option<u32>,
-    /// Number of the light: 0 is the field's own. Each other number draws lights, exposure and sensor anew from the scene
-    /// file; plants, ground and labels stay the same.
+    /// Number of the light. 0 is the field's own; with 1, 2 and so on, lights, exposure and sensor are sampled again from the
+    /// scene file, differently for each number. Plants, ground and labels stay the same.
     #[arg(long, value_name = "K", default_value_t = 0)]
     light: u64,
     /// Frame of a drive, from 0.

@@ -11,7 +11,7 @@ use furrow_grow::soil::SoilColor;
 use furrow_optics::sensor::{AdcDesc, CameraDesc, MosaicDesc, SensorDesc};
 use std::path::PathBuf;
 
-/// Lists the species: file, scientific and English name, EPPO code, role, growth stages.
+/// Lists the species: file, scientific and English name, EPPO code, role, growth stages, all other names that find it.
 pub(crate) fn species() -> Result<Vec<PathBuf>> {
     let mut rows = Vec::new();
     let (all, faults) = all_species()?;
@@ -23,7 +23,16 @@ pub(crate) fn species() -> Result<Vec<PathBuf>> {
         let codes = || desc.plant.stages.iter().map(|stage| stage.bbch).chain(desc.plant.cover_days.keys().copied());
         let role = if desc.role == Role::Crop { "crop" } else { "weed" };
         let stages = format!("BBCH {} to {}", codes().min().unwrap_or(0), codes().max().unwrap_or(0));
-        rows.push([species.stem(), desc.scientific.clone(), desc.name.clone(), desc.eppo.clone(), role.into(), stages]);
+        let others = species.other_names().join(", ");
+        rows.push([
+            species.stem(),
+            desc.scientific.clone(),
+            desc.name.clone(),
+            desc.eppo.clone(),
+            role.into(),
+            stages,
+            others,
+        ]);
     }
     cli::print_rows(&rows)?;
     Ok(Vec::new())

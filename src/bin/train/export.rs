@@ -25,7 +25,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Crop that the exported network is for, by any name of its species; may be given several times. The network must take the crop as
-    /// an input. Without it, or with auto, the file has crops of any kind.
+    /// an input. Without it, or with auto, the exported network labels every crop species as crop.
     #[arg(long = "crop", value_name = "NAME")]
     crops: Vec<String>,
 }

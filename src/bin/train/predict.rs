@@ -35,8 +35,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1024))]
     batch: u16,
     /// Crop that is sown in the images, by any name of its species; may be given several times. A network that takes the crop as an input
-    /// then labels this species as crop and all other plants as weeds; without it, or with auto, it has crops of any kind. A network
-    /// that was trained for other crops is refused; for a network that knows no crop, a warning is printed.
+    /// then labels this species as crop and all other plants as weeds; without it, or with auto, it labels every crop species as crop.
+    /// A network that was trained for other crops is refused; for a network that knows no crop, a warning is printed.
     #[arg(long = "crop", value_name = "NAME")]
     crops: Vec<String>,
     #[command(flatten)]

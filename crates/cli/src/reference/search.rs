@@ -3,7 +3,7 @@
 use super::walk::{Reference, joined};
 
 /// Synonyms: what people type, and the words that names and descriptions have for it.
-const SYNONYMS: [(&str, &[&str]); 22] = [
+const SYNONYMS: [(&str, &[&str]); 29] = [
     ("angle", &["pitch_deg", "roll_deg", "yaw_deg", "elevation_deg"]),
     ("blur", &["aperture", "motion", "filter"]),
     ("bug", &["bites", "holes"]),
@@ -11,20 +11,27 @@ const SYNONYMS: [(&str, &[&str]); 22] = [
     ("density", &["per_m2"]),
     ("disease", &["chlorosis", "blotches", "scorched"]),
     ("distance", &["spacing_m", "height_m"]),
+    ("drill", &["tools"]),
     ("exposure", &["auto_exposure", "gain"]),
     ("fov", &["angle of view", "focal_mm", "horizontal_deg"]),
+    ("harrow", &["tools", "rms_mm"]),
     ("hdri", &["environmentmap"]),
     ("humidity", &["moisture", "wet"]),
     ("infrared", &["nir"]),
     ("insect", &["bites", "holes"]),
     ("pebble", &["stones"]),
+    ("plough", &["tools", "rms_mm"]),
+    ("plow", &["tools", "rms_mm"]),
     ("resolution", &["size", "pixels"]),
     ("robot", &["models", "drive"]),
+    ("roll", &["tools"]),
     ("rotation", &["yaw_deg", "turn_deg"]),
     ("shadow", &["sun", "models"]),
     ("speed", &["speed_m_s", "motion"]),
     ("tilt", &["pitch_deg", "roll_deg", "lean_deg", "slant"]),
+    ("till", &["tools", "rms_mm"]),
     ("time", &["utc", "days", "age"]),
+    ("tine", &["tools"]),
     ("water", &["moisture", "wet"]),
 ];
 
@@ -90,6 +97,13 @@ mod tests {
             ("tilt", "camera.JaiAd130.pitch_deg"),
             ("insects", "crops.condition.bites"),
             ("hairs", "species.materials.hairs"),
+            ("rolled", "soil.relief.tools"),
+            ("roller", "soil.relief.tools"),
+            ("tine", "soil.relief.tools"),
+            ("plough", "soil.relief.tools"),
+            ("ploughed", "soil.relief.rms_mm"),
+            ("harrow", "soil.relief.tools"),
+            ("drill", "soil.relief.tools"),
         ] {
             let found = search(word, &of, &others);
             assert!(found.iter().any(|(name, _)| name == path), "{word}: {found:?}");

@@ -6,7 +6,7 @@
 //! | label | meaning |
 //! |---|---|
 //! | soil, crop, weed | a class of `semantics.png` |
-//! | a species | by name or EPPO code, from the dataset's table; overrides its class in `semantics.png` |
+//! | a species | of the dataset's table, by any name that scene files accept; overrides its class in `semantics.png` |
 //! | an organ, or an object on the ground | from `parts.png`, such as petiole or stone; overrides both |
 //! | `model:NAME` | a model from disk that the scene file names, also from `parts.png`; overrides `model`, all models |
 //!
@@ -20,8 +20,9 @@ use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_field::PartKind;
 use furrow_field::record::SpeciesRecord;
+use furrow_field::shipped;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 /// Labels of `semantics.png` by number.
@@ -188,17 +189,25 @@ impl Classes {
     pub fn of(&self, species: &[SpeciesRecord], models: &[String]) -> Result<Map> {
         let records = species;
         let species: Vec<[&str; 2]> = species.iter().map(|s| [s.name.as_str(), s.eppo.as_str()]).collect();
-        let known = |label: &str| {
-            let is = |other: &&str| other.eq_ignore_ascii_case(label);
+        let special = |label: &str| {
             let named = label.strip_prefix(OF_NAME).is_some_and(|name| models.iter().any(|model| model == name));
-            SEMANTICS.contains(&label) || part(label).is_some() || named || species.iter().flatten().any(is)
+            SEMANTICS.contains(&label) || part(label).is_some() || named
         };
+        // A label that is neither a name nor a code of the table may be another name of one of its species.
+        let own = |label: &str| species.iter().flatten().any(|name| name.eq_ignore_ascii_case(label));
+        let labels = self.0.iter().flat_map(|class| &class.labels).filter(|label| !special(label) && !own(label));
+        let others: BTreeMap<&str, [&str; 2]> =
+            labels.filter_map(|label| Some((label.as_str(), shipped::identity(label)?))).collect();
+        let names_it = |names: &[&str; 2], label: &str| {
+            let is = |label: &str| !label.is_empty() && names.iter().any(|name| name.eq_ignore_ascii_case(label));
+            is(label) || others.get(label).is_some_and(|other| other.iter().any(|name| is(name)))
+        };
+        let known = |label: &str| special(label) || species.iter().any(|names| names_it(names, label));
         if let Some(label) = self.0.iter().flat_map(|class| &class.labels).find(|label| !known(label)) {
             return Err(unknown(label, records, models));
         }
         for names in &species {
-            let is = |label: &&String| names.iter().any(|name| name.eq_ignore_ascii_case(label));
-            let claims = |class: &&Class| class.labels.iter().any(|label| is(&label));
+            let claims = |class: &&Class| class.labels.iter().any(|label| names_it(names, label));
             let claiming: Vec<&str> = self.0.iter().filter(claims).map(|class| class.name.as_str()).collect();
             if let [first, second, ..] = claiming[..] {
                 let words = format!("the species {} ({}) belongs to `{first}` and to `{second}`", names[0], names[1]);
@@ -209,7 +218,7 @@ impl Classes {
             let place = self.0.iter().position(|class| class.labels.iter().any(|label| claims(label)))?;
             Some(if place < self.len() { place.to_u8() } else { IGNORE })
         };
-        let of_species = |names: &[&str; 2]| place(&|label| names.iter().any(|name| name.eq_ignore_ascii_case(label)));
+        let of_species = |names: &[&str; 2]| place(&|label| names_it(names, label));
         let mut parts = Vec::new();
         for (number, name, ..) in PartKind::NUMBERED.iter().filter(|(_, name, ..)| part(name).is_some()) {
             parts.resize(parts.len().max(usize::from(*number) + 1), None);
@@ -362,6 +371,12 @@ mod tests {
         assert_eq!(map.labels(&semantics, &species, &parts), [0, 3, IGNORE, 1, IGNORE, 2, IGNORE]);
         assert_eq!([(2, 1), (2, 2), (2, 0), (1, 0)].map(|(c, s)| map.of_plant(c, s)), [Some(1), None, Some(2), None]);
         assert!(Classes::parse("soil; a=HORSE; weed").unwrap().of(&table, &[]).is_err());
+        // Any name that a scene file accepts is a label; a species that the dataset lacks is refused.
+        let other = Classes::parse("soil; lambsquarters; Weißer Gänsefuß; weed").unwrap();
+        assert!(other.of(&table, &[]).unwrap_err().to_string().contains("belongs to `lambsquarters` and to"));
+        let other = Classes::parse("soil; lambsquarters; weed").unwrap().of(&table, &[]).unwrap();
+        assert_eq!([(2, 1), (2, 2)].map(|(c, s)| other.of_plant(c, s)), [Some(1), Some(2)]);
+        assert!(Classes::parse("soil; maize; weed").unwrap().of(&table, &[]).is_err());
     }
 
     /// Expected: a named model has the class of its name, any other model that of `model`; without either it is soil,

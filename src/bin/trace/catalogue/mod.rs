@@ -40,7 +40,7 @@ pub(crate) struct Args {
     /// Folder for the sheets and for catalogue.html.
     #[arg(long, value_name = "DIR", default_value = "out/catalogue")]
     out: PathBuf,
-    /// Only these species, by the names of their files: sugar_beet,galium.
+    /// Only these species, by any name that scene files accept: "sugar beet,cleavers", BEAVX, Klettenlabkraut.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     species: Vec<String>,
     /// Folder of the species files. Default: scenes/species, or the shipped species if there is no such folder.
@@ -61,6 +61,24 @@ pub(crate) struct Args {
     /// Print nothing but errors and the paths of the files.
     #[arg(long)]
     quiet: bool,
+}
+
+/// Returns the file of a species in a folder, by the name of the file or by any name that finds a shipped species.
+fn page_of(folder: &Path, name: &str) -> Result<PathBuf> {
+    let own = folder.join(name).with_extension("ron");
+    if own.exists() {
+        return Ok(own);
+    }
+    let found = furrow_field::shipped::species(name);
+    let named = found.as_ref().ok().and_then(|file| file.as_ref()?.file_name().map(|file| folder.join(file)));
+    if let Some(file) = named.filter(|file| file.exists()) {
+        return Ok(file);
+    }
+    // The error about the file names the nearest file, that about the name the nearest name.
+    cli::check_species(&own).map_err(|error| {
+        if error.advice().is_some_and(|help| help.contains("mean")) { error } else { found.err().unwrap_or(error) }
+    })?;
+    Ok(own)
 }
 
 /// Renders the sheets that are missing or would differ, then writes the page. Returns their paths.
@@ -85,9 +103,7 @@ impl Args {
     fn pages(&self) -> Result<Vec<PathBuf>> {
         let folder = self.folder()?;
         if !self.species.is_empty() {
-            let pages: Vec<PathBuf> = self.species.iter().map(|s| folder.join(s).with_extension("ron")).collect();
-            pages.iter().try_for_each(|page| cli::check_species(page))?;
-            return Ok(pages);
+            return self.species.iter().map(|name| page_of(&folder, name.trim())).collect();
         }
         let entries = std::fs::read_dir(&folder).map_err(Error::reading(&folder))?;
         let mut pages: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();

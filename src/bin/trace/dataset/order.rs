@@ -105,7 +105,7 @@ const MOST_RELIT: u64 = 1000;
 #[derive(clap::Args)]
 pub(crate) struct LabelArgs {
     /// Classes of the formats, such as `soil; beet=BEAVX; fat hen=CHEAL; weed; ignore=stone`: names with their labels.
-    /// A label is soil, crop, weed, a species by name or EPPO code, an organ, or an object on the ground; the most
+    /// A label is soil, crop, weed, a species by any of its names, an organ, or an object on the ground; the most
     /// specific one decides. Pixels without a class, and those of the class ignore, have no label.
     #[arg(long, value_name = "CLASSES", value_parser = Classes::parse)]
     classes: Option<Classes>,
