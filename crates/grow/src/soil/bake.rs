@@ -29,6 +29,9 @@ const GRAINS_MM: (f32, f32) = (0.6, 4.0);
 const GRAINS_COVER: f32 = 1.2;
 /// Variation of their colour relative to that of crumbs on the ground: the soil of one clod is mixed.
 const GRAINS_TINT: f32 = 0.35;
+/// Fractions of this relief and of this variation of colour that are gone if fine earth fills all pores.
+const FILLED_PORES: f32 = 0.75;
+const FILLED_TINT: f32 = 0.5;
 /// Moisture of the soil that clods consist of, in standard deviations from the mean: they come from below the surface, where
 /// no lime is deposited.
 const CLODS_MOIST: f32 = 1.0;
@@ -130,7 +133,7 @@ impl Ground {
         let look = self.appearance();
         let crumbs = self.crumbs(raster, laid);
         let hues = self.crumb_hues();
-        let mut detail = self.small_relief(crumbs.height, raster);
+        let mut detail = crumbs.height;
         let rows = (
             detail.par_chunks_mut(width),
             baked.albedo.par_chunks_mut(width),
@@ -180,7 +183,8 @@ impl Ground {
             0 => Spectrum::ONE,
             t => hues[usize::from(crumbs.hue[k])] * (f32::from(t) / 128.0),
         };
-        let mixed = |k: usize| grain(k).map(|factor| factor.powf(GRAINS_TINT));
+        let varied = GRAINS_TINT * (1.0 - FILLED_TINT * self.law.filled);
+        let mixed = |k: usize| grain(k).map(|factor| factor.powf(varied));
         let mixed: Vec<Spectrum> = (0..side * side).into_par_iter().map(mixed).collect();
         // Mixing keeps the mean colour.
         let plain = (0..side * side).fold(Spectrum::ZERO, |sum, k| sum + grain(k));
@@ -224,9 +228,12 @@ impl Ground {
         let mut crumbs = Crumbs::draw(raster, &self.law, [grains, none], [none; 2], &stream, |_| 1.0);
         let noise = Perlin::new(stream.child(Purpose::Texture, 0).seed32());
         let octaves = (ROUGH_M / (FINEST_TEXELS * raster.step)).log2().clamp(0.0, 6.0).trunc_to::<u32>();
+        let left = 1.0 - FILLED_PORES * self.law.filled;
         crumbs.height.par_iter_mut().enumerate().for_each(|(k, height)| {
             let q = vec2((k % raster.width).to_f32(), (k / raster.width).to_f32()) * (raster.step / ROUGH_M);
-            *height += ROUGH_HEIGHT_M * noise.fbm2(f64::from(q.x) + 0.3, f64::from(q.y) + 0.7, octaves, 0.6).to_f32();
+            *height = left
+                * (*height
+                    + ROUGH_HEIGHT_M * noise.fbm2(f64::from(q.x) + 0.3, f64::from(q.y) + 0.7, octaves, 0.6).to_f32());
         });
         crumbs
     }

@@ -46,9 +46,19 @@ const FLARE: f32 = 0.2;
 
 /// Length of the clods of which 37 % are gone from a fully slaked surface, mm: e^(−L / 7 mm).
 const SLAKED_MM: f32 = 7.0;
+/// Fractions of the roughness below which a pressed clod is one and two levels moister.
+const PRESSED_LEFT: [f32; 2] = [0.5, 0.2];
 /// Buried fraction of the height of a clod that is pressed flat, and fraction of the way to it by soil that rain has washed in.
 const FLUSH: f32 = 0.88;
 const SILTED: f32 = 0.4;
+
+/// Effect of fine earth that fills all joints and pores: fraction of the way to [`FLUSH`] by which the buried fraction
+/// grows, height of the earth against a clod relative to its visible height, horizontal over vertical extent of that
+/// earth's slope (the cotangent of its angle of repose, 35°), and fraction of the bodies' roughness that is gone.
+const FILLED_SINK: f32 = 0.35;
+const HEAPED: f32 = 0.6;
+const REPOSE: f32 = 1.4;
+const SMOOTHED: f32 = 0.4;
 
 /// Grid spacing for which the levels of detail are designed, metres: about four pixels of 0.25 mm.
 const FINE_M: f32 = 0.0009;
@@ -104,6 +114,8 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
     let stream = ground.stream.child(Purpose::Debris, 101);
     let own = stream.child(Purpose::Page, 0);
     let scale = (FINE_M / ground.step()).min(1.0);
+    let filled = ground.law.filled;
+    let cut = ShapeParameters { rough: CUT.rough * (1.0 - SMOOTHED * filled), ..CUT };
     let mut shapes: Vec<Vec<Option<Shape>>> = vec![vec![None; SHAPES]; LEVELS];
     let mut groups: Vec<Mesh> = vec![Mesh::default(); MOISTURE_LEVELS * HUES * TONES];
     for clod in candidates(ground, &stream) {
@@ -114,7 +126,7 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         let level = level(clod.mm, scale);
         let k = s.index(SHAPES);
         let shape = shapes[level][k]
-            .get_or_insert_with(|| Shape::new(level, CUT, &mut stream.child(Purpose::Texture, k.to_u64())));
+            .get_or_insert_with(|| Shape::new(level, cut, &mut stream.child(Purpose::Texture, k.to_u64())));
         let half = 0.5e-3 * clod.mm;
         let mut vary = |mean: f32| (mean * (1.0 + 0.2 * s.normal().to_f32())).clamp(0.5 * mean, 1.0);
         let axes = vec3(1.0, vary(AXES.0), vary(AXES.1)) * half;
@@ -125,7 +137,8 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         }
         let tint = ground.law.tint_sigma * s.normal().to_f32() + loose_gain(sink);
         let sink = flush(sink * (1.0 - ground.law.loose), ground.slaked, ground.shape.left(clod.at));
-        let sunk = usize::from(sink > MOIST_SUNK);
+        let sunk = usize::from(sink > MOIST_SUNK) + pressed(ground.shape.left(clod.at));
+        let sink = sink + FILLED_SINK * filled * (FLUSH - sink).max(0.0);
         let stays = s.uniform32();
         let damp = s.uniform32() < ground.law.damp;
         let from = vec2(s.uniform32(), s.uniform32());
@@ -150,10 +163,12 @@ pub fn clods(ground: &Ground, pile: &mut Pile, canopy: &Canopy, seen: &InView) -
         if seen.holds(at, half) {
             let mut body = Placed::new(shape, &pose, centre);
             let graded = clod.mm > GRADED_MM;
-            if graded {
-                weld(&mut body, centre, (pose.low, pose.high), 1.0 - ground.law.loose, |p| pile.at(p));
-            }
             let (slack, top) = (0.06 * height, centre.z + pose.high - support);
+            if graded || filled > 0.0 {
+                let welded = if graded { 1.0 - ground.law.loose } else { 0.0 };
+                let joint = Joint { welded, heap: HEAPED * filled * top.max(0.0) };
+                joint.make(&mut body, centre, (pose.low, pose.high), |p| pile.at(p));
+            }
             let hidden = |corners: [Vec3; 3], up: f32| {
                 if up < 0.0 {
                     corners.iter().all(|c| c.z < pile.at(c.truncate()) + slack)
@@ -194,6 +209,12 @@ fn flush(sink: f32, slaked: f32, left: f32) -> f32 {
     washed + (1.0 - left) * (FLUSH - washed).max(0.0)
 }
 
+/// Returns the number of levels by which a clod is moister that tools and wheels have pressed into the moist ground. They
+/// have left a fraction `left` of the roughness.
+fn pressed(left: f32) -> usize {
+    PRESSED_LEFT.iter().filter(|most| left < **most).count()
+}
+
 /// Returns the level of moisture of a dry clod, from u in 0..1.
 fn kept(u: f32) -> usize {
     HALF_DRY.iter().filter(|share| u < **share).count()
@@ -221,20 +242,36 @@ fn hues(sigma: f32, pigments: &Pigments, stream: &mut Stream) -> [Spectrum; HUES
     })
 }
 
-/// Joins a body to the ground below it: between its equator and the ground it does not taper but widens towards the
-/// ground, as where rain has washed soil against it. `reach` is its lowest and highest point relative to `centre`,
-/// `amount` the strength (0 for loose bodies, 1 for welded ones), `height` that of the surface below.
-fn weld(body: &mut Placed, centre: Vec3, reach: (f32, f32), amount: f32, height: impl Fn(Vec2) -> f32) {
-    let (equator, half) = (centre.z + 0.5 * (reach.0 + reach.1), 0.5 * (reach.1 - reach.0));
-    body.raised = Vec::with_capacity(body.positions.len());
-    for p in &mut body.positions {
-        let near = 1.0 - ((p.z - height(p.truncate())) / (FILLET * half)).clamp(0.0, 1.0);
-        // Profile of an ellipsoid below its equator.
-        let below = ((equator - p.z) / half).clamp(0.0, 0.85);
-        let upright = 1.0 / (1.0 - below * below).sqrt();
-        let wider = 1.0 + amount * (upright * (1.0 + FLARE * near * near) - 1.0);
-        *p = centre + ((*p - centre).truncate() * wider).extend(p.z - centre.z);
-        body.raised.push(amount * near * near);
+/// Joint of a body with the surface below it.
+#[derive(Clone, Copy, Debug)]
+struct Joint {
+    /// Strength of the welding: 0 for loose bodies, 1 for welded ones.
+    welded: f32,
+    /// Height of the fine earth that lies against the body, metres.
+    heap: f32,
+}
+
+impl Joint {
+    /// Joins a body to the surface below it. Between its equator and the surface a welded body does not taper but widens
+    /// towards the surface, as where rain has washed soil against it. Up to [`Self::heap`] above the surface it widens
+    /// further, at the angle of repose of the fine earth. `reach` is its lowest and highest point relative to `centre`,
+    /// `height` the height of the surface.
+    fn make(self, body: &mut Placed, centre: Vec3, reach: (f32, f32), height: impl Fn(Vec2) -> f32) {
+        let (equator, half) = (centre.z + 0.5 * (reach.0 + reach.1), 0.5 * (reach.1 - reach.0));
+        body.raised = Vec::with_capacity(body.positions.len());
+        for p in &mut body.positions {
+            let above = p.z - height(p.truncate());
+            let near = 1.0 - (above / (FILLET * half)).clamp(0.0, 1.0);
+            // Profile of an ellipsoid below its equator.
+            let below = ((equator - p.z) / half).clamp(0.0, 0.85);
+            let upright = 1.0 / (1.0 - below * below).sqrt();
+            let wider = 1.0 + self.welded * (upright * (1.0 + FLARE * near * near) - 1.0);
+            let aside = (*p - centre).truncate();
+            let buried = (self.heap - above).clamp(0.0, self.heap);
+            *p = centre + (aside * wider + aside.normalize_or_zero() * (REPOSE * buried)).extend(p.z - centre.z);
+            let slope = if self.heap > 0.0 { REPOSE * (buried / self.heap).sqrt() } else { 0.0 };
+            body.raised.push((self.welded * near * near).max(slope));
+        }
     }
 }
 

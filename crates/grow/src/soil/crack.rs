@@ -45,8 +45,15 @@ const PATCH_SD: f32 = 0.33;
 const BORDER: f32 = 0.15;
 /// Distance from a crack at which a rim's height falls to 1/e, plates.
 const RIM: f32 = 0.07;
-/// Sloping part of a crack's wall, half-widths.
-const WALL: f32 = 0.4;
+/// Distances from the middle of a crack where its floor ends and where its crumbled shoulder ends, half-widths; the depth
+/// at half a width is half.
+const WALL: (f32, f32) = (0.3, 1.6);
+/// Ragged edges: wavelength in metres, and amplitude relative to the half-width.
+const RAGGED: [(f32, f32); 2] = [(0.009, 0.35), (0.004, 0.3)];
+/// Crumbs that have fallen into cracks: largest fraction of the depth that they fill, wavelengths in metres along which it
+/// varies, and their shares.
+const RUBBLE: f32 = 0.6;
+const RUBBLE_M: [(f32, f32); 2] = [(0.05, 0.6), (0.007, 0.4)];
 /// Width of the narrowest crack that a raster resolves, samples: narrower ones are shown wider and less deep.
 const NARROWEST: f32 = 1.5;
 /// Approximate number of bands of a raster that are computed in parallel.
@@ -247,7 +254,7 @@ impl Cracks {
     fn cut(&self, piece: &Piece, raster: Raster, first: usize, heights: &mut [f32]) {
         let rim = RIM * self.plate;
         let widest = piece.width[0].max(piece.width[1]).max(NARROWEST * raster.step);
-        let reach = 0.5 * widest + if self.curl > 0.0 { 3.0 * rim } else { 0.0 };
+        let reach = (0.5 * WALL.1 + 0.3) * widest + if self.curl > 0.0 { 3.0 * rim } else { 0.0 };
         let [a, b] = piece.ends.map(|end| end - raster.origin);
         let rows = (first.to_f32(), (first + heights.len() / raster.width).to_f32() - 1.0);
         let lo = ((a.min(b) - reach) / raster.step).ceil().max(vec2(0.0, rows.0));
@@ -258,7 +265,12 @@ impl Cracks {
                 let d = vec2(x.to_f32(), y.to_f32()) * raster.step - a;
                 let t = (d.dot(along) / length).clamp(0.0, 1.0);
                 let [width, strength] = [piece.width, piece.strength].map(|ends| lerp(ends[0], ends[1], t));
-                let new = self.profile(d.distance(along * t), width, raster.step) * strength;
+                let distance = d.distance(along * t);
+                // Noise only where it matters: within the crack and its shoulders.
+                let near = distance < (0.5 * WALL.1 + 0.3) * width.max(NARROWEST * raster.step);
+                let (ragged, rubble) = if near { self.crumbled(d + a + raster.origin) } else { (1.0, 0.0) };
+                let new = self.profile(distance * ragged, width, raster.step) * strength;
+                let new = if new < 0.0 { new * (1.0 - rubble) } else { new };
                 let old = &mut heights[(y.to_usize() - first) * raster.width + x.to_usize()];
                 // The deepest crack counts; outside of cracks, the highest rim.
                 *old = match (new < 0.0, *old < 0.0) {
@@ -270,15 +282,28 @@ impl Cracks {
         }
     }
 
+    /// Returns the factor on the distance from a crack's middle that makes its edges ragged, and the fraction of its depth
+    /// that crumbs fill.
+    fn crumbled(&self, p: Vec2) -> (f32, f32) {
+        let noise = |wavelength: f32, shift: f32| {
+            let q = p / wavelength + shift;
+            self.noise.at2(f64::from(q.x), f64::from(q.y)).to_f32()
+        };
+        let ragged: f32 = RAGGED.iter().map(|(wavelength, amplitude)| amplitude * noise(*wavelength, 5.3)).sum();
+        let filled: f32 =
+            RUBBLE_M.iter().map(|(wavelength, share)| share * (0.5 + 1.2 * noise(*wavelength, 47.9))).sum();
+        (1.0 + ragged, RUBBLE * filled.clamp(0.0, 1.0))
+    }
+
     /// Returns the height at a distance from the middle of a crack of a width, for samples `step` apart.
     fn profile(&self, distance: f32, width: f32, step: f32) -> f32 {
         let shown = width.max(NARROWEST * step);
         let depth = self.depth * (width / self.width.max(f32::MIN_POSITIVE)).powf(SHALLOWER) * (width / shown);
-        let inside = 0.5 * shown - distance;
-        if inside > 0.0 {
-            -depth * (inside / (0.5 * WALL * shown)).min(1.0)
+        let from_middle = distance / (0.5 * shown);
+        if from_middle < WALL.1 {
+            -depth * (1.0 - smoothstep(WALL.0, WALL.1, from_middle))
         } else {
-            self.curl * (inside / (RIM * self.plate)).exp()
+            self.curl * ((0.5 * WALL.1 * shown - distance) / (RIM * self.plate)).exp()
         }
     }
 }

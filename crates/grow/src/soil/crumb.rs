@@ -68,6 +68,8 @@ pub(super) struct SizeDistribution {
     pub(super) damp: f32,
     /// Looseness of the clods: 0 for normal sinking, 1 for none.
     pub(super) loose: f32,
+    /// Fraction of joints and pores that fine earth fills.
+    pub(super) filled: f32,
 }
 
 /// Part of the aggregates of a ground.
@@ -142,6 +144,7 @@ impl SizeDistribution {
             dryness: desc.dryness.draw32(&mut child(5)),
             damp: desc.damp.draw32(&mut child(6)),
             loose: desc.loose.draw32(&mut child(7)),
+            filled: desc.filled.draw32(&mut child(8)),
         }
     }
 

@@ -325,6 +325,10 @@ pub struct ClodsDesc {
     /// Looseness of the clods: at 0 they are sunk by 3 to 70 % of their height, 31 % on average, as after harrow and
     /// rain; at 1 they lie on top.
     pub loose: Vary<Fraction>,
+    /// Fraction of the joints between clods, and of the pores and roughness of their surfaces, that fine earth fills: 0
+    /// just after a harrow, 0.3–0.7 after a roller, rain or wind. Filled clods are sunk deeper, and fine earth slopes
+    /// away from their sides.
+    pub filled: Vary<Fraction>,
 }
 
 impl Default for ClodsDesc {
@@ -342,6 +346,7 @@ impl Default for ClodsDesc {
             dryness: Vary::uniform(0.3, 0.9),
             damp: Vary::uniform(0.05, 0.25),
             loose: Vary::uniform(0.0, 0.5),
+            filled: Vary::fixed(0.0),
         }
     }
 }

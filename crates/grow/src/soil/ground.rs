@@ -29,6 +29,12 @@ const FBM4_SD: f32 = 0.245;
 /// Fraction of its moisture that ground under a complete cover of dry fine aggregates has lost relative to bare ground.
 const MULCH: f32 = 1.2;
 
+/// Fraction of the clods and crumbs that are visible where a tool or wheel has pressed the ground flat.
+const PRESSED_VISIBLE: f32 = 0.33;
+
+/// Fraction of the height of crumbs that is gone if fine earth fills all joints.
+const FILLED_CRUMBS: f32 = 0.5;
+
 /// Fractions of the layers' heights and of the crumbs that a fully slaked surface has lost.
 const SLAKED_RELIEF: f32 = 0.7;
 const SLAKED_CRUMBS: f32 = 0.92;
@@ -213,8 +219,8 @@ impl Ground {
             // Elongated cells would turn fine heights into furrows.
             let fade = (2.0 * ground.step / cell).min(1.0);
             let height = ground.shape.height(p, cell) + detail * fade * fade;
-            // Half of the clods that are pressed flat are still visible.
-            let left = 0.5 + 0.5 * ground.shape.left(p);
+            // A third of the clods that are pressed flat are still visible; the others are crushed.
+            let left = PRESSED_VISIBLE + (1.0 - PRESSED_VISIBLE) * ground.shape.left(p);
             (height, fine.map(|_| (noise, detail, ground.blend.clods(weights) * left)))
         };
         let (columns, rows) = (self.grid.columns(), self.grid.rows());
@@ -232,38 +238,37 @@ impl Ground {
         }
     }
 
-    /// Adds crumbs and cracks to the heights of the fine grid.
+    /// Adds crumbs and cracks to the heights of the fine grid. The baked maps have the crumbs at higher resolution. Cracks
+    /// are in the mesh alone: they are deep, so that the paths of light must find their walls.
     fn scatter_debris(&mut self) {
-        let small = self.small_relief(self.crumbs(self.raster(), 1.0).height, self.raster());
+        let raster = self.raster();
+        let crumbs = self.crumbs(raster, 1.0).height;
+        let cracks = self.cracks.as_ref().map(|cracks| cracks.heights(raster));
         let columns = self.grid.columns();
-        for (k, h) in small.iter().enumerate() {
+        for (k, crumb) in crumbs.iter().enumerate() {
             let (i, j) = (k % self.fine_columns(), k / self.fine_columns());
             // The outermost vertices are shared with the coarse ground, which has no crumbs.
             let inner = i > 0 && j > 0 && i < self.grid.x.steps && j < self.grid.y.steps;
             if inner {
-                self.heights[(j + self.grid.y.first) * columns + i + self.grid.x.first] += h;
-                self.fine.detail[k] += h;
+                let crack = cracks.as_ref().map_or(0.0, |cracks| cracks[k]);
+                self.heights[(j + self.grid.y.first) * columns + i + self.grid.x.first] += crumb + crack;
+                self.fine.detail[k] += crumb;
             }
         }
-    }
-
-    /// Returns the heights of crumbs with those of cracks, at the samples of a raster.
-    pub(super) fn small_relief(&self, mut crumbs: Vec<f32>, raster: Raster) -> Vec<f32> {
-        if let Some(cracks) = &self.cracks {
-            crumbs.iter_mut().zip(cracks.heights(raster)).for_each(|(height, crack)| *height += crack);
-        }
-        crumbs
     }
 
     /// Rasterizes the crumbs on any raster. `laid` is the fraction of the unresolved clods that is included.
     pub(super) fn crumbs(&self, raster: Raster, laid: f32) -> Crumbs {
         let stream = self.stream.child(Purpose::Debris, 100);
-        let Sizes { drawn, unseen, .. } = self.sizes;
+        let Sizes { drawn: larger, unseen, .. } = self.sizes;
         let crumbs = |mm| SizeRange { mm, amount: self.crumbs_amount, dry: 1.0 };
         let clods = |mm, amount| SizeRange { mm, amount, dry: CLODS_DRY };
-        let seen = [crumbs(self.sizes.crumbs), clods(drawn, 1.0)];
+        let seen = [crumbs(self.sizes.crumbs), clods(larger, 1.0)];
         let unseen = [crumbs(unseen[0]), clods(unseen[1], laid)];
-        Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p))
+        let mut drawn = Crumbs::draw(raster, &self.law, seen, unseen, &stream, |p| self.share(p));
+        let left = 1.0 - FILLED_CRUMBS * self.law.filled;
+        drawn.height.iter_mut().for_each(|height| *height *= left);
+        drawn
     }
 
     /// Returns moisture and colour.
@@ -338,6 +343,7 @@ impl Ground {
                 dryness: self.law.dryness,
                 damp: self.law.damp,
                 loose: self.law.loose,
+                filled: self.law.filled,
             },
             stones_cover: stone_cover::covers(&desc.stones, debris),
             litter: LitterRecord::draw(&desc.litter, litter),

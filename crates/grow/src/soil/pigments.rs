@@ -58,7 +58,7 @@ pub struct PigmentsDesc {
 impl Default for PigmentsDesc {
     fn default() -> Self {
         Self {
-            iron: Vary::uniform(0.35, 0.7),
+            iron: Vary::uniform(0.1, 0.35),
             humus: Vary::uniform(0.08, 0.2),
             lime: Vary::uniform(0.0, 0.12),
             algae: Vary::fixed(0.0),

@@ -154,6 +154,9 @@ pub struct ClodsRecord {
     pub damp: f32,
     /// Looseness of the clods: 0 for normal sinking, 1 for none.
     pub loose: f32,
+    /// Fraction of joints and pores that fine earth fills.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub filled: f32,
 }
 
 /// Litter of one ground.

@@ -618,3 +618,85 @@ fn the_soil_within_a_clod_is_mixed() {
     let [within, among] = [spread(&ground.fabrics(&maps, 5e-4)[0]), spread(&ground.bake(&maps, 5e-4))];
     assert!(within < 0.5 * among, "{within} {among}");
 }
+
+/// Rationale: fine earth that has filled joints and pores makes clods lower, smoother and wider at the ground. Expected:
+/// filled clods rise less above the ground; their widest part is near it even if they are loose; their material has less
+/// than half of the slopes, and the same mean reflectance within 2 %.
+#[test]
+fn fine_earth_fills_joints_and_pores() {
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let state = |filled: f64| {
+        let mut page = page();
+        page.layers.truncate(1);
+        page.clods.filled = Vary::fixed(filled);
+        (page.clods.over_5mm_per_m2, page.clods.exponent) = (Vary::fixed(500.0), Vary::fixed(1.0));
+        (page.clods.min_mm, page.clods.loose) = (Num::new(14.0), Vary::fixed(1.0));
+        (page.crumbs.amount, page.relief.rms_mm) = (Vary::fixed(0.0), Vary::fixed(0.0));
+        let ground = Ground::new(&page, &[], &maps, &site(0.3), &stream()).unwrap();
+        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
+        let (mut heights, mut low, mut middle) = (0.0, 0.0, 0.0);
+        for (_, body) in whole_clods(&groups).into_iter().filter(|(_, body)| body.len() > 100) {
+            let centre = body.iter().sum::<Vec3>().truncate() / body.len().to_f32();
+            let above = |p: &Vec3| p.z - ground.height(p.x, p.y);
+            let top = body.iter().map(above).fold(0.0, f32::max);
+            let wide = |from: f32, to: f32| {
+                let inside = body.iter().filter(|p| (from..to).contains(&(above(p) / top)));
+                inside.map(|p| p.truncate().distance(centre)).fold(0.0, f32::max)
+            };
+            heights += top;
+            low += wide(-0.1, 0.12);
+            middle += wide(0.6, 0.7);
+        }
+        let [first, ..] = ground.fabrics(&maps, 2.5e-4);
+        let n = first.albedo.len().to_f32();
+        let slope = |k: usize| Vec2::from(first.slope[k].map(f32::from)) / GroundMaps::SLOPE_STEPS;
+        let lit = |k: usize| {
+            let open = f32::from(first.ao[k]) / 255.0;
+            GroundMaps::decode(first.albedo[k]).0.y * open / (1.0 + slope(k).length_squared()).sqrt()
+        };
+        let mean = |of: &dyn Fn(usize) -> f32| (0..first.albedo.len()).map(of).sum::<f32>() / n;
+        (heights, low / middle, mean(&|k| slope(k).length_squared()).sqrt(), mean(&lit))
+    };
+    let (bare, full) = (state(0.0), state(1.0));
+    assert!(bare.0 > 0.1 && full.0 < 0.9 * bare.0, "{bare:?} {full:?}");
+    assert!(full.1 > 1.15 * bare.1, "{bare:?} {full:?}");
+    assert!(full.2 < 0.5 * bare.2, "{bare:?} {full:?}");
+    assert!((full.3 / bare.3 - 1.0).abs() < 0.02, "{bare:?} {full:?}");
+}
+
+/// Rationale: a baked pit darkens without anything that casts a shadow, and a crack is deeper than any pit. Expected: cracks
+/// lower the mesh by millimetres and leave openness and slopes of the baked maps as they are.
+#[test]
+fn cracks_are_in_the_mesh_and_not_in_the_maps() {
+    let maps = [Plain { albedo: [0.2, 0.15, 0.1], height: 0.5 }];
+    let made = |cracks: &str| {
+        let mut page = page();
+        page.layers.truncate(1);
+        page.cracks = ron::from_str(cracks).unwrap();
+        let ground = Ground::new(&page, &[], &maps, &site(0.1), &stream()).unwrap();
+        let baked = ground.bake(&maps, 2.5e-4);
+        (ground, baked)
+    };
+    let (whole, plain) = made("()");
+    let (cracked, baked) = made("(cover: 1, plate_mm: 50, width_mm: 4, depth_mm: 15)");
+    let deepest = whole.heights.iter().zip(&cracked.heights).map(|(a, b)| a - b).fold(0.0, f32::max);
+    assert!(deepest > 0.005, "{deepest}");
+    assert!(plain.ao == baked.ao && plain.slope == baked.slope);
+}
+
+/// Expected: a smooth roller crushes most clods and presses the others into the moist ground, so that the ground has less
+/// than half as many and none are dry.
+#[test]
+fn a_roller_crushes_clods_and_presses_the_others_into_the_moist_ground() {
+    let rolled = |pressed: f64| {
+        let mut page = page();
+        page.relief.tools = vec![ron::from_str(&format!("(depth_mm: 0, pressed: {pressed})")).unwrap()];
+        page.clods.over_5mm_per_m2 = Vary::fixed(3000.0);
+        let ground = ground(&page, 0.15);
+        let groups = clods(&ground, &mut Pile::new(&ground), &Canopy::none(&ground), &InView::ALL);
+        (whole_clods(&groups).len(), groups.iter().map(|group| group.moisture).min())
+    };
+    let (tilled, flat) = (rolled(0.0), rolled(0.9));
+    assert!(2 * flat.0 < tilled.0, "{tilled:?} {flat:?}");
+    assert!(tilled.1 == Some(0) && flat.1 >= Some(2), "{tilled:?} {flat:?}");
+}

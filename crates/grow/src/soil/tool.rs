@@ -39,11 +39,19 @@ impl Default for ToolDesc {
 /// Exponent of the grooves' profile: above 1, grooves are narrower than ridges. `MEAN` is the mean of the profile.
 const NARROW: f32 = 1.5;
 const MEAN: f32 = 0.424;
-/// Wavelengths of the wandering and of the variation of the depth along a groove, metres.
-const WANDER_M: f32 = 0.12;
-const VARIES_M: f32 = 0.2;
-/// Relative variation of the depth.
-const VARIES: f32 = 0.9;
+/// Wavelengths of the wandering and of the variation of the depth along a groove, metres: clods turn a tine aside, and soil
+/// slides back into a groove.
+const WANDER_M: [f32; 2] = [0.12, 0.035];
+const VARIES_M: [f32; 2] = [0.2, 0.06];
+/// Variation of the depth relative to the mean: along a groove, at each wavelength, and between grooves, as tines are not
+/// equally worn.
+const VARIES: [f32; 2] = [0.8, 0.5];
+const UNEQUAL: f32 = 0.5;
+/// Largest depth relative to the mean.
+const DEEPEST: f32 = 1.8;
+/// Wandering at the shorter wavelength relative to that at the longer one, and displacement of the tines, spacings.
+const WANDER_SHORT: f32 = 0.3;
+const DISPLACED: f32 = 0.15;
 
 /// Standard deviation of one octave of [`Perlin::at2`].
 const PERLIN_SD: f32 = 0.43;
@@ -91,12 +99,18 @@ impl Tool {
             return 0.0;
         }
         let noise = |p: Vec2, shift: f64| self.noise.at2(f64::from(p.x) + shift, f64::from(p.y) - shift).to_f32();
-        let aside = p.dot(self.across) + self.wander / PERLIN_SD * noise(p / WANDER_M, 0.37);
+        let wander = noise(p / WANDER_M[0], 0.37) + WANDER_SHORT * noise(p / WANDER_M[1], 71.9);
+        let aside = p.dot(self.across) + self.wander / PERLIN_SD * wander;
         let along = p.dot(self.across.perp());
-        let turn = aside / self.spacing + self.phase;
+        let even = aside / self.spacing + self.phase;
+        let turn = even + DISPLACED * noise(vec2(0.9 * even, 0.0), 23.7);
         let groove = (0.5 + 0.5 * (std::f32::consts::TAU * turn).cos()).powf(NARROW);
-        let depth = 1.0 + VARIES * noise(vec2(turn.round() * 3.7, along / VARIES_M), 11.3);
-        self.depth * resolved * depth * (MEAN - groove)
+        let own = turn.round() * 3.7;
+        let varied: f32 =
+            VARIES_M.iter().zip(VARIES).map(|(wavelength, by)| by * noise(vec2(own, along / wavelength), 11.3)).sum();
+        let depth = (1.0 + varied + UNEQUAL * noise(vec2(own, 0.0), 37.1)).clamp(0.0, DEEPEST);
+        // The ridges between grooves are equally high, so that grooves of different depths meet without a step.
+        self.depth * resolved * (MEAN - depth * groove)
     }
 
     /// Returns the largest usual depth below and height above the ground, metres.
@@ -137,6 +151,19 @@ mod tests {
         let range = across.iter().fold(0f32, |m, h| m.max(*h)) - across.iter().fold(0f32, |m, h| m.min(*h));
         assert!(mean.abs() < 5e-4 && (0.008..0.02).contains(&range), "{mean} {range}");
         assert_eq!(tool.height(vec2(0.1, 0.2), 0.03), 0.0);
+    }
+
+    /// Expected: neighbouring grooves differ in depth by a quarter of the mean on average; over steps of 0.5 mm the height
+    /// changes by less than a millimetre, also on the ridges between grooves.
+    #[test]
+    fn grooves_differ_and_meet_without_a_step() {
+        let tool = tool("(spacing_mm: 50, depth_mm: 10, angle_deg: 0, wander_mm: 0)");
+        let across: Vec<f32> = (0..10_000).map(|k| tool.height(vec2(5e-4 * k.to_f32(), 0.3), 5e-4)).collect();
+        let steepest = across.windows(2).map(|h| (h[1] - h[0]).abs()).fold(0.0, f32::max);
+        assert!(steepest < 1e-3, "{steepest}");
+        let depths: Vec<f32> = across.chunks(100).map(|h| -h.iter().fold(0f32, |least, h| least.min(*h))).collect();
+        let apart = depths.windows(2).map(|d| (d[1] - d[0]).abs()).sum::<f32>() / depths.len().to_f32();
+        assert!((0.0015..0.008).contains(&apart), "{apart}");
     }
 
     /// Expected: grooves at 90° to the rows run across them.
