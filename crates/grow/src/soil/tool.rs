@@ -139,14 +139,15 @@ mod tests {
         Tool::draw(&desc, Vec2::X, &mut Stream::of(4, 0, Purpose::Test, 0))
     }
 
-    /// Expected: along a line across the grooves there is one groove each `spacing_mm`; the mean height is 0 and the range
+    /// Expected: along a line across the grooves there is one groove each `spacing_mm`, of which at most a fifth are so
+    /// shallow there that they stay above the mean height; that mean is 0 and the range
     /// about `depth_mm`; along a groove the height changes little; coarse cells show none.
     #[test]
     fn grooves_are_as_far_apart_and_as_deep_as_asked() {
         let tool = tool("(spacing_mm: 50, depth_mm: 10, angle_deg: 0, wander_mm: 0)");
         let across: Vec<f32> = (0..5000).map(|k| tool.height(vec2(1e-3 * k.to_f32(), 0.3), 1e-3)).collect();
         let valleys = across.windows(3).filter(|h| h[1] < h[0] && h[1] <= h[2] && h[1] < 0.0).count();
-        assert!((97..=103).contains(&valleys), "{valleys}");
+        assert!((80..=103).contains(&valleys), "{valleys}");
         let mean = across.iter().sum::<f32>() / 5000.0;
         let range = across.iter().fold(0f32, |m, h| m.max(*h)) - across.iter().fold(0f32, |m, h| m.min(*h));
         assert!(mean.abs() < 5e-4 && (0.008..0.02).contains(&range), "{mean} {range}");
