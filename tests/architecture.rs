@@ -101,7 +101,7 @@ const ALLOWED: &[(&str, &str)] = &[
         "report/ compare/page.rs compare/gap/ dataset/report/ train/figure/page.rs bin/trace/catalogue/page.rs bin/trace/dataset/status/page.rs",
     ),
     // Principal components and a linear solver.
-    ("nalgebra", "train/refine/appearance/logistic.rs"),
+    ("nalgebra", "train/refine/appearance/logistic.rs train/refine/self_training.rs"),
     ("noise", "texture/noise.rs"),
     // File watching: reload when a file is saved.
     ("notify", "bin/trace/watch/files.rs"),

@@ -523,7 +523,7 @@ fn copies_of_several_plants_are_numbered_apart() {
     let field = sown(&folder, rows).unwrap_or_else(|e| panic!("{e}"));
     let numbers: std::collections::BTreeSet<u32> = field.plants.iter().map(|plant| plant.number).collect();
     assert_eq!(numbers.len(), field.plants.len());
-    assert!(field.plants.len() >= 4 * once.plants.len() && field.plants.len() % once.plants.len() == 0);
+    assert!(field.plants.len() >= 4 * once.plants.len() && field.plants.len().is_multiple_of(once.plants.len()));
     let classes = |plants: &[furrow_field::PlantRecord]| plants.iter().map(|plant| plant.class).collect::<Vec<_>>();
     assert_eq!(classes(&field.plants[..once.plants.len()]), classes(&once.plants));
 }
