@@ -540,7 +540,7 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
 
     // What refinement changed is recorded and printed; one image is too little for appearance.
     let refined = at("refined");
-    let told = succeed(train(&["predict", "any-field", path(&photos.join("large.png")), "--out", path(&refined)]));
+    let told = succeed(train(&["predict", "any-field", path(&photos.join("large.JPG")), "--out", path(&refined)]));
     let told = String::from_utf8_lossy(&told.stderr).into_owned();
     assert!(told.contains("refinement: plants ") && told.contains("appearance skipped"), "{told}");
     let described: Prediction = run::read_json(&refined.join("prediction.json")).unwrap();

@@ -45,18 +45,21 @@ impl ExpectedPlants {
     /// Returns the distribution as a sentence.
     pub fn words(&self) -> String {
         let Self { median, low, high, fields } = *self;
-        let about = format!("an image shows about {} plants", number(median));
-        let range = format!("between {} and {} plants", number(low), number(high));
+        let about = format!("expected plants in an image: {}", number(median));
+        let range = format!("{} to {}", number(low), number(high));
         match fields {
             1 => about,
-            2..MANY => format!("{about} (median of {fields} fields, which have {range})"),
-            _ => format!("{about} (median; 90 % of the fields have {range})"),
+            2..MANY => format!("{about} (median of {fields} fields with {range})"),
+            _ => format!("{about} (median; 90 % of the fields: {range})"),
         }
     }
 
     /// Returns the warning if there is one, otherwise the sentence.
     pub fn message(&self) -> String {
-        self.warning().map_or_else(|| self.words(), |words| format!("warning: {words}"))
+        self.warning().map_or_else(
+            || format!("{}; images vary by chance as well", self.words()),
+            |words| format!("warning: {words}"),
+        )
     }
 
     /// Returns a warning if the number varies strongly from image to image.
@@ -94,16 +97,13 @@ mod tests {
         assert_eq!(even.warning(), None);
         let wide = ExpectedPlants::of((0..100).map(f64::from).collect()).unwrap();
         assert!(
-            wide.warning()
-                .unwrap()
-                .starts_with("an image shows about 49.5 plants (median; 90 % of the fields have between 5 and 94 plants), a factor of 18.8")
+            wide.warning().unwrap().starts_with(
+                "expected plants in an image: 49.5 (median; 90 % of the fields: 5 to 94), a factor of 18.8"
+            )
         );
         let few = ExpectedPlants::of(vec![19.5, 11.1]).unwrap();
-        assert_eq!(
-            few.words(),
-            "an image shows about 15.3 plants (median of 2 fields, which have between 11.1 and 19.5 plants)"
-        );
-        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "an image shows about 7 plants");
+        assert_eq!(few.words(), "expected plants in an image: 15.3 (median of 2 fields with 11.1 to 19.5)");
+        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "expected plants in an image: 7");
         // Fields with less than one plant count as one, so the ratio stays finite.
         assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
         assert_eq!(ExpectedPlants::of(Vec::new()), None);

@@ -52,15 +52,18 @@ impl Evidence {
         )];
         let pale = count(&|one| one.learnt_colours);
         if pale > 0 {
-            parts.push(format!("pale plants by the image's own colours in {pale} of {}", all.len()));
+            parts.push(format!("colours of pale plants learnt in {pale} of {} images", all.len()));
         }
         if rows {
             let found = count(&|one| one.row_score.is_some_and(|score| score >= super::plants::LIKELY));
-            parts.push(format!("rows likely in {found} of {}", all.len()));
+            parts.push(format!("rows found in {found} of {} images", all.len()));
         }
         parts.push(format!("class changed for {:.0} % of the plant pixels", percent(&|one| one.reclassified)));
         if appearance && !learnt {
-            parts.push("appearance skipped: it needs several images whose crop and weeds differ in appearance".into());
+            parts.push(
+                "appearance skipped: there are fewer than two images with plants, or crop and weeds look alike in them"
+                    .into(),
+            );
         }
         Some(parts.join("; "))
     }
@@ -88,13 +91,18 @@ mod tests {
         let pale = Evidence { vegetation: 0.1, to_plant: 0.1, learnt_colours: true, ..Evidence::default() };
         let rows = Evidence { vegetation: 0.3, reclassified: 0.5, row_score: Some(3.0), ..Evidence::default() };
         let words = Evidence::summary(&[&pale, &rows], true, true, false).unwrap();
-        for part in
-            ["20.0 %", "25.0 %", "own colours in 1 of 2", "rows likely in 1 of 2", "for 25 %", "appearance skipped"]
-        {
+        for part in [
+            "20.0 %",
+            "25.0 %",
+            "learnt in 1 of 2 images",
+            "rows found in 1 of 2 images",
+            "for 25 %",
+            "appearance skipped",
+        ] {
             assert!(words.contains(part), "{part}: {words}");
         }
         let words = Evidence::summary(&[&rows], false, true, true).unwrap();
-        assert!(!words.contains("own colours") && !words.contains("rows") && !words.contains("skipped"), "{words}");
+        assert!(!words.contains("learnt in") && !words.contains("rows") && !words.contains("skipped"), "{words}");
         assert!(Evidence::summary(&[], true, true, true).is_none());
     }
 }
