@@ -64,19 +64,6 @@ pub fn field(text: &str, options: &Options) -> Field {
     assemble::field_of(text, options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Waits until a program has a handler for TERM (bit 14 of its caught signals in `/proc`), or has ended.
-#[cfg(target_os = "linux")]
-pub fn handles_signals(child: &mut std::process::Child) {
-    let handles = |child: &std::process::Child| {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim().to_owned();
-        u64::from_str_radix(&caught, 16).unwrap() >> 14 & 1 == 1
-    };
-    while !handles(child) && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-}
-
 /// Renders the film and labels of a whole field on `threads` threads.
 pub fn shoot(field: &Field, spp: u32, threads: usize) -> (Film, LabelMap) {
     let scene = &field.scene;

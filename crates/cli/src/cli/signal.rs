@@ -1,15 +1,12 @@
 //! Signal handling: every signal that asks for a stop leads to a clean end with exit code 75.
 //!
 //! Terminals send INT and HUP; batch systems send USR1 (time is nearly up) and TERM (the node is needed). By default, each would end the
-//! process with a code that a scheduler takes for a failure. Until a verb [handles](Signals::catch) them, a thread that waits for them ends
-//! the process immediately with a message and 75, which loses nothing because files appear complete or not at all; from then on they
-//! set a flag. A second INT or TERM always ends the process immediately, because the user does not want to wait.
+//! process with a code that a scheduler takes for a failure. Until a verb [handles](Signals::catch) them, they end the process immediately
+//! with 75, which loses nothing because nothing has been written; from then on they set a flag. A second INT or TERM always ends the
+//! process immediately, because the user does not want to wait.
 
-use furrow_base::Error;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::{flag, low_level};
-use std::io::Read;
-use std::os::unix::net::UnixStream;
+use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -19,8 +16,10 @@ const STOPPED: i32 = 75;
 /// Signals that end the process immediately when they arrive a second time.
 const URGENT: [i32; 2] = [SIGINT, SIGTERM];
 
-/// Signals that ask for a stop however often they arrive.
+#[cfg(unix)]
 const PATIENT: [i32; 2] = [signal_hook::consts::SIGHUP, signal_hook::consts::SIGUSR1];
+#[cfg(not(unix))]
+const PATIENT: [i32; 0] = [];
 
 /// State set by signals.
 pub struct Signals {
@@ -30,8 +29,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Installs handlers for INT, TERM, HUP and USR1. Must be the first action of a program that does not restart itself
-    /// any more: earlier signals have their default effect.
+    /// Installs handlers for INT, TERM, HUP and USR1. Must be the first action of the program: earlier signals have their default effect.
     pub fn watch() -> Self {
         let signals = Self { stop: Arc::default(), urgent: Arc::default(), uncaught: Arc::new(AtomicBool::new(true)) };
         if let Err(e) = signals.install() {
@@ -41,7 +39,7 @@ impl Signals {
     }
 
     /// Registers the actions. They run in the order of registration: the one that ends the process comes before the one that sets the flag,
-    /// so the first signal only sets the flag. A message cannot be printed in a signal handler, so a thread prints it.
+    /// so the first signal only sets the flag.
     fn install(&self) -> std::io::Result<()> {
         let asked = Arc::new(AtomicBool::new(false));
         for signal in URGENT {
@@ -51,21 +49,11 @@ impl Signals {
         for signal in URGENT {
             flag::register(signal, self.urgent.clone())?;
         }
-        let (mut arrived, sent) = UnixStream::pair()?;
         for signal in URGENT.into_iter().chain(PATIENT) {
+            flag::register_conditional_shutdown(signal, STOPPED, self.uncaught.clone())?;
             flag::register(signal, self.stop.clone())?;
-            low_level::pipe::register(signal, sent.try_clone()?)?;
         }
-        let uncaught = self.uncaught.clone();
-        let wait = move || {
-            while arrived.read_exact(&mut [0]).is_ok() {
-                if uncaught.load(Ordering::SeqCst) {
-                    crate::message!("{}", Error::interrupted().message());
-                    low_level::exit(STOPPED);
-                }
-            }
-        };
-        std::thread::Builder::new().name("signals".into()).spawn(wait).map(drop)
+        Ok(())
     }
 
     /// Returns the flag that signals set from now on instead of ending the process.
