@@ -32,6 +32,9 @@ const AMBIGUOUS: std::ops::Range<f64> = 0.2..0.8;
 const MOST_AMBIGUOUS: f64 = 0.5;
 /// Minimum difference in greenness between added pixels and the remaining soil, in standard deviations of the soil.
 const LEAST_CONTRAST: f64 = 3.0;
+/// Maximum ratio of plant pixels after to those before: beyond it the classifier has taken soil for plants, and what remains is only the least
+/// green part of the soil.
+const MOST_GROWTH: f64 = 4.0;
 /// Standardized colours are clamped to this range, so that highlights do not dominate the fit.
 const REACH: f32 = 4.0;
 
@@ -63,7 +66,8 @@ pub(super) fn probabilities(colours: &[[f32; 3]], own: &[f64]) -> Option<Vec<f64
     (ambiguous.to_f64() < MOST_AMBIGUOUS * sure.to_f64()).then_some(plants)
 }
 
-/// Returns `true` if the pixels of `after` that are not in `before` are clearly greener than those in neither, and the plants do not shrink.
+/// Returns `true` if the pixels of `after` that are not in `before` are clearly greener than those in neither, and the plants
+/// neither shrink nor take over the image.
 pub(super) fn separates(colours: &[[f32; 3]], before: &[bool], after: &[bool]) -> bool {
     let plants = |mask: &[bool]| mask.iter().filter(|plant| **plant).count();
     // Number, sum and sum of squares of the greenness of added pixels and of soil.
@@ -82,7 +86,8 @@ pub(super) fn separates(colours: &[[f32; 3]], before: &[bool], after: &[bool]) -
     }
     let [added, mean] = [added, soil].map(|[n, sum, _]| sum / n);
     let deviation = (soil[2] / soil[0] - mean * mean).max(0.0).sqrt();
-    plants(after) > plants(before) && added - mean > LEAST_CONTRAST * deviation
+    let growth = plants(after).to_f64() / plants(before).max(1).to_f64();
+    growth > 1.0 && growth <= MOST_GROWTH && added - mean > LEAST_CONTRAST * deviation
 }
 
 fn features(colour: &[f32; 3]) -> Vector4<f64> {
