@@ -538,7 +538,7 @@ fn what_cannot_be_answered_is_refused_and_nothing_is_written_over() {
 
     assert!(stated.evidence.is_empty() && stated.appearance.is_none(), "nothing was refined");
 
-    // What refinement changed is recorded and printed; one image is too little for appearance.
+    // The changes by refinement are recorded and printed; one image is too little for appearance.
     let refined = at("refined");
     let told = succeed(train(&["predict", "any-field", path(&photos.join("large.JPG")), "--out", path(&refined)]));
     let told = String::from_utf8_lossy(&told.stderr).into_owned();

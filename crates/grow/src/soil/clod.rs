@@ -52,12 +52,13 @@ const PRESSED_LEFT: [f32; 2] = [0.5, 0.2];
 const FLUSH: f32 = 0.88;
 const SILTED: f32 = 0.4;
 
-/// Effect of fine earth that fills all joints and pores: fraction of the way to [`FLUSH`] by which the buried fraction
-/// grows, height of the earth against a clod relative to its visible height, horizontal over vertical extent of that
-/// earth's slope (the cotangent of its angle of repose, 35°), and fraction of the bodies' roughness that is gone.
+/// Growth of the buried fraction, relative to its distance from [`FLUSH`], if fine earth fills all joints and pores.
 const FILLED_SINK: f32 = 0.35;
+/// Height of that earth against a clod, relative to the clod's visible height.
 const HEAPED: f32 = 0.6;
+/// Horizontal over vertical extent of the earth's slope: the cotangent of its angle of repose, 35°.
 const REPOSE: f32 = 1.4;
+/// Fraction of the bodies' roughness that the earth removes.
 const SMOOTHED: f32 = 0.4;
 
 /// Grid spacing for which the levels of detail are designed, metres: about four pixels of 0.25 mm.
@@ -209,8 +210,8 @@ fn flush(sink: f32, slaked: f32, left: f32) -> f32 {
     washed + (1.0 - left) * (FLUSH - washed).max(0.0)
 }
 
-/// Returns the number of levels by which a clod is moister that tools and wheels have pressed into the moist ground. They
-/// have left a fraction `left` of the roughness.
+/// Returns the number of levels of moisture that a clod gains where tools and wheels have pressed it into the moist ground and left
+/// a fraction `left` of the roughness.
 fn pressed(left: f32) -> usize {
     PRESSED_LEFT.iter().filter(|most| left < **most).count()
 }

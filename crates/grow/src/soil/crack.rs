@@ -48,6 +48,8 @@ const RIM: f32 = 0.07;
 /// Distances from the middle of a crack where its floor ends and where its crumbled shoulder ends, half-widths; the depth
 /// at half a width is half.
 const WALL: (f32, f32) = (0.3, 1.6);
+/// Largest distance from the middle of a crack that its ragged shoulder reaches, widths.
+const SHOULDER: f32 = 0.5 * WALL.1 + 0.3;
 /// Ragged edges: wavelength in metres, and amplitude relative to the half-width.
 const RAGGED: [(f32, f32); 2] = [(0.009, 0.35), (0.004, 0.3)];
 /// Crumbs that have fallen into cracks: largest fraction of the depth that they fill, wavelengths in metres along which it
@@ -254,7 +256,7 @@ impl Cracks {
     fn cut(&self, piece: &Piece, raster: Raster, first: usize, heights: &mut [f32]) {
         let rim = RIM * self.plate;
         let widest = piece.width[0].max(piece.width[1]).max(NARROWEST * raster.step);
-        let reach = (0.5 * WALL.1 + 0.3) * widest + if self.curl > 0.0 { 3.0 * rim } else { 0.0 };
+        let reach = SHOULDER * widest + if self.curl > 0.0 { 3.0 * rim } else { 0.0 };
         let [a, b] = piece.ends.map(|end| end - raster.origin);
         let rows = (first.to_f32(), (first + heights.len() / raster.width).to_f32() - 1.0);
         let lo = ((a.min(b) - reach) / raster.step).ceil().max(vec2(0.0, rows.0));
@@ -267,7 +269,7 @@ impl Cracks {
                 let [width, strength] = [piece.width, piece.strength].map(|ends| lerp(ends[0], ends[1], t));
                 let distance = d.distance(along * t);
                 // Noise only where it matters: within the crack and its shoulders.
-                let near = distance < (0.5 * WALL.1 + 0.3) * width.max(NARROWEST * raster.step);
+                let near = distance < SHOULDER * width.max(NARROWEST * raster.step);
                 let (ragged, rubble) = if near { self.crumbled(d + a + raster.origin) } else { (1.0, 0.0) };
                 let new = self.profile(distance * ragged, width, raster.step) * strength;
                 let new = if new < 0.0 { new * (1.0 - rubble) } else { new };

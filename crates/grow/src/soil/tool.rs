@@ -139,9 +139,8 @@ mod tests {
         Tool::draw(&desc, Vec2::X, &mut Stream::of(4, 0, Purpose::Test, 0))
     }
 
-    /// Expected: along a line across the grooves there is one groove each `spacing_mm`, of which at most a fifth are so
-    /// shallow there that they stay above the mean height; that mean is 0 and the range
-    /// about `depth_mm`; along a groove the height changes little; coarse cells show none.
+    /// Expected: along a line across the grooves there is one groove each `spacing_mm`; at most a fifth are so shallow there
+    /// that they stay above the mean height. The mean is 0 and the range about `depth_mm`; along a groove the height changes little; coarse cells show none.
     #[test]
     fn grooves_are_as_far_apart_and_as_deep_as_asked() {
         let tool = tool("(spacing_mm: 50, depth_mm: 10, angle_deg: 0, wander_mm: 0)");

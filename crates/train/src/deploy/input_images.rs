@@ -329,15 +329,14 @@ pub struct Prediction {
     /// Result of the last prediction in this folder, if it labelled implausibly little vegetation as crop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub implausible: Option<Implausible>,
-    /// `true` if the last prediction in this folder learnt an appearance model from its images, `false` if it was asked to but could not, absent if it
-    /// was not asked to.
+    /// Whether the last prediction in this folder learnt an appearance model from its images; absent if it was not asked to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<bool>,
     /// Class names in the order of the class numbers, with their sRGB colours.
     pub classes: Vec<(String, [u8; 3])>,
     /// Path of the image of each prediction, by prediction name.
     pub pictures: BTreeMap<String, String>,
-    /// What refinement changed in each image, by prediction name.
+    /// Changes by refinement in each image, by prediction name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub evidence: BTreeMap<String, Evidence>,
 }
@@ -414,8 +413,8 @@ impl Prediction {
         run::write_json(&path, &Self { implausible: Some(implausible.clone()), ..there })
     }
 
-    /// Adds what refinement changed, and whether an appearance model was learnt. Removes the images `unread`, which could not be read, unless a prediction of them exists; deletes the file
-    /// if none is left.
+    /// Adds the changes by refinement, and whether an appearance model was learnt. Removes the images `unread`, which could not be read,
+    /// unless a prediction of them exists; deletes the file if none is left.
     pub fn finish(
         mut self,
         folder: &Path,

@@ -53,7 +53,7 @@ pub struct Predictions {
     pub seconds: f64,
     /// Number of pixels of each class, in the order of the class numbers.
     pub pixels: Vec<u64>,
-    /// What refinement changed in each image, by prediction name; empty without refinement.
+    /// Changes by refinement in each image, by prediction name; empty without refinement.
     pub evidence: BTreeMap<String, Evidence>,
     /// `true` if an appearance model of crop and weeds was learnt from the images.
     pub appearance: bool,

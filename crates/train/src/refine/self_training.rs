@@ -7,7 +7,7 @@
 //! mean). What it then classifies as plant is its training set for the next round (self-training, Scudder 1965).
 //!
 //! Colours do not separate plants from soil in every image, and self-training amplifies errors. The result is used only if few pixels
-//! are ambiguous and the added pixels are clearly greener than the rest.
+//! are ambiguous, the added pixels are clearly greener than the rest, and the plants grow at most [`MOST_GROWTH`] times.
 
 use furrow_base::math::ToFloat;
 use nalgebra::{Matrix4, Vector4};
@@ -32,8 +32,8 @@ const AMBIGUOUS: std::ops::Range<f64> = 0.2..0.8;
 const MOST_AMBIGUOUS: f64 = 0.5;
 /// Minimum difference in greenness between added pixels and the remaining soil, in standard deviations of the soil.
 const LEAST_CONTRAST: f64 = 3.0;
-/// Maximum ratio of plant pixels after to those before: beyond it the classifier has taken soil for plants, and what remains is only the least
-/// green part of the soil.
+/// Maximum ratio of plant pixels after to those before. Beyond it the classifier has taken soil for plants, and only the least green
+/// soil remains.
 const MOST_GROWTH: f64 = 4.0;
 /// Standardized colours are clamped to this range, so that highlights do not dominate the fit.
 const REACH: f32 = 4.0;
