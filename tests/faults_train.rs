@@ -10,10 +10,13 @@ use crate::common::dataset::{fail, path, same, succeed, tree};
 use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, misdate, open_to_all};
 use crate::common::program::scratch;
 use crate::common::training;
-use furrow_train::fit::checkpoint;
+use furrow_dataset::model::recipe::{self, Recipe};
+use furrow_train::deploy::input_images::{self, Prediction};
+use furrow_train::fit::checkpoint::{self, Checkpoint};
 use furrow_train::fit::hyper::NormalizationMode;
+use furrow_train::fit::log;
 use furrow_train::net::Network;
-use furrow_train::run;
+use furrow_train::run::{self, TrainedModel};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -186,6 +189,58 @@ fn full_and_closed_streams_end_no_training_and_no_prediction() {
     let message = String::from_utf8_lossy(&lost.stderr);
     assert!(lost.status.code() == Some(1) && message.contains("cannot write to stdout"), "{message}");
     assert!(out.join("000001.png").is_file());
+}
+
+/// Rationale: files by which the program recognises a folder may be cut by a full disk or edited by hand, and a folder
+/// must not become a dead end. Expected: each is refused with exit code 2, its name and a help; after `train predict`
+/// was refused, the help of the message works: the same command with another --out.
+#[test]
+fn damaged_files_of_the_program_are_refused_with_a_way_out() {
+    let (keep, out) = scratch();
+    let copied = |from: &Path, file: &str| -> PathBuf {
+        let folder = keep.path().join(file.replace('.', "-"));
+        fs::create_dir_all(&folder).expect("a folder");
+        fs::copy(from.join(file), folder.join(file)).expect("a copy");
+        folder
+    };
+    succeed(predict(&out, &["--quiet"]));
+    let partial = keep.path().join("partial");
+    half_trained(&partial);
+    let identity: run::Identity = run::read_json(&RUN.join(run::PLAN)).expect("a plan");
+    let trained = TrainedModel::open(&RUN).expect("a network");
+    let pictures = input_images::find(&[images("0..2").into()], &trained.card.input, &[]).expect("images");
+    let claim = |folder: &Path| Prediction::claim(folder, &trained.card, None, &pictures).map(drop);
+    let claim_plan = |folder: &Path| identity.claim(folder);
+    type Read<'a> = &'a dyn Fn(&Path) -> furrow::Result<()>;
+    let files: [(&Path, &str, Read<'_>); 7] = [
+        (&out, input_images::PREDICTION, &claim),
+        (&RUN, run::PLAN, &claim_plan),
+        (&RUN, run::RESULT, &|folder| run::results(folder).map(drop)),
+        (&RUN, run::MODEL, &|folder| TrainedModel::open(folder).map(drop)),
+        (&RUN, log::CSV, &|folder| log::read(folder).map(drop)),
+        (&partial, checkpoint::FILE, &|folder| Checkpoint::read(folder, "").map(drop)),
+        (&SET, recipe::FILE, &|folder| Recipe::read(folder).map(drop)),
+    ];
+    for (from, file, read) in files {
+        let folder = copied(from, file);
+        let whole = fs::read(folder.join(file)).expect("bytes");
+        for damaged in [&whole[..whole.len() / 2], b"nonsense", b"{\"furrow\": 3, \"plan\": []}", b""] {
+            // A log that ends at a row is a log of fewer steps.
+            if file == log::CSV && damaged.len() > 100 {
+                continue;
+            }
+            fs::write(folder.join(file), damaged).expect("a file");
+            let error = read(&folder).expect_err(file);
+            assert_eq!(error.exit_code(), 2, "{error}");
+            assert!(error.to_string().contains(file) && error.advice().is_some(), "{error}");
+        }
+    }
+    fs::write(out.join(input_images::PREDICTION), "{").expect("a file");
+    let before = tree(&out);
+    let message = fail(predict(&out, &["--quiet"]), 2);
+    assert!(message.contains("repeat the command that wrote it with another --out"), "{message}");
+    same(&tree(&out), &before);
+    succeed(predict(&keep.path().join("another"), &["--quiet"]));
 }
 
 /// Rationale: the dynamic loader prints its own error about a preloaded library that it cannot find. Expected: without

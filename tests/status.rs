@@ -258,7 +258,7 @@ fn what_is_no_dataset_is_refused() {
     let message = fail(verb("status", &data, &["--watch"]), 2);
     assert!(message.contains("it has no dataset.json") && message.contains("trace dataset plan"), "{message}");
     fs::write(data.join("dataset.json"), "{}").unwrap();
-    let message = fail(verb("status", &data, &["--json"]), 1);
+    let message = fail(verb("status", &data, &["--json"]), 2);
     assert!(message.contains("not a dataset's recipe"), "{message}");
     fail(verb("status", &data, &["--shards", "0"]), 2);
 }

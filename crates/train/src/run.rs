@@ -284,14 +284,15 @@ impl TrainedModel {
         let card = serde_json::from_slice(&bytes).map_err(|e| format!("this file cannot be read: {e}"));
         let card = card.and_then(|card: ModelCard| card.check().map(|()| card)).map_err(|what| {
             Error::input(what)
-                .help("this file was not written by `train fit`; use a network whose origin you trust")
+                .help("restore it or train again, with another --out; use only networks whose origin you trust")
                 .in_file(path)
         })?;
         let path = below(folder, &card.weights)?;
         let (values, _) = weights::read(&path)?;
         if weights::hash(&values) != card.weights_sha256 {
             let what = format!("these are not the weights that {MODEL} in this folder describes");
-            return Err(Error::damaged(what).in_file(path));
+            let help = "restore both files or train again, with another --out";
+            return Err(Error::damaged(what).help(help).in_file(path));
         }
         let species = film::species(&values);
         if species != card.species.len() {
@@ -359,11 +360,13 @@ pub fn results(folder: &Path) -> Result<Option<Results>> {
     if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
 }
 
-/// Reads a JSON file of a run.
+/// Reads a JSON file that the program wrote into a folder of its own.
 pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
     let bytes = furrow_base::input::contents(path).map_err(Error::reading(path))?;
     let unreadable = |e| {
-        Error::damaged(format!("this file cannot be read: {e}")).help("delete it to have it recreated").in_file(path)
+        Error::input(format!("this file cannot be read: {e}"))
+            .help("restore it, or repeat the command that wrote it with another --out")
+            .in_file(path)
     };
     serde_json::from_slice(&bytes).map_err(unreadable)
 }

@@ -188,6 +188,8 @@ pub(super) fn train(
         identity.claim(folder)?;
         remove_unfinished(folder)?;
         if let Some(results) = run::results(folder)? {
+            // A complete training is not repeated, so its damage must not pass in silence.
+            TrainedModel::open(folder)?;
             return Ok(results);
         }
         let hash = identity.hash()?;

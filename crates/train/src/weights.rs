@@ -94,7 +94,9 @@ pub fn encode(path: &Path, arrays: &[Array], text: &str, stored: Stored) -> Resu
 /// If the file is damaged or was written by another program.
 pub fn read(path: &Path) -> Result<(Vec<Array>, String)> {
     let damaged = |e: &dyn std::fmt::Display| {
-        Error::damaged(format!("this is not a weights file of `train`, or it is damaged: {e}")).in_file(path)
+        Error::damaged(format!("this is not a weights file of `train`, or it is damaged: {e}"))
+            .help("restore it or train again, with another --out")
+            .in_file(path)
     };
     let bytes = furrow_base::input::contents(path).map_err(Error::reading(path))?;
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| damaged(&e))?;

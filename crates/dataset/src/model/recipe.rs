@@ -198,7 +198,7 @@ impl Recipe {
             other => other.map_err(Error::reading(&path))?,
         };
         let wrong = |what: String| {
-            Error::damaged(what)
+            Error::input(what)
                 .in_file(&path)
                 .help("repeat the command that created the dataset with another --out, or restore the file")
         };

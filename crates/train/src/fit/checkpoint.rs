@@ -125,11 +125,11 @@ impl Checkpoint {
         }
         let restart = |error: Error| error.help("delete the file to restart this training").in_file(path.clone());
         let (arrays, text) = match weights::read(&path) {
-            Err(e) if e.kind() == Kind::Damaged => return Err(restart(e)),
+            Err(e) if e.kind() == Kind::Damaged => return Err(restart(Error::input(e.message()))),
             other => other?,
         };
         let words: CheckpointText =
-            serde_json::from_str(&text).map_err(|e| restart(Error::damaged(format!("not a checkpoint: {e}"))))?;
+            serde_json::from_str(&text).map_err(|e| restart(Error::input(format!("not a checkpoint: {e}"))))?;
         if words.plan != plan {
             return Err(restart(Error::input("it belongs to another training")));
         }

@@ -25,6 +25,9 @@ pub const CSV: &str = "log.csv";
 /// File name of the TensorBoard log. TensorBoard looks for `tfevents` in file names.
 pub const EVENTS: &str = "training.tfevents";
 
+/// First columns of the CSV log.
+const START: [&str; 5] = ["step", "loss", "rate", "validation_mean_iou", "validation_loss"];
+
 /// Open log of a training.
 pub struct TrainingLog {
     folder: PathBuf,
@@ -123,13 +126,18 @@ pub fn read(folder: &Path) -> Result<Option<History>> {
     }
     let bytes = input::contents(&path).map_err(Error::reading(&path))?;
     let text = String::from_utf8_lossy(&bytes);
+    let wrong = |line: usize| {
+        Error::input(format!("this is not a training log: line {line} does not start with {}", START.join(", ")))
+            .help("resume the training, which writes this file again, or leave this run out")
+            .in_file(&path)
+    };
+    if !text.starts_with(&START.join(",")) {
+        return Err(wrong(1));
+    }
     let mut history = History::default();
-    for line in text.lines().skip(1) {
-        let cells: Vec<Option<f64>> = line.split(',').take(5).map(|cell| cell.parse().ok()).collect();
-        let &[Some(step), loss, rate, miou, validation] = &cells[..] else {
-            let error = Error::damaged("this is not a training log").in_file(path);
-            return Err(error.help("a row starts with step, loss, rate, validation_mean_iou, validation_loss"));
-        };
+    for (row, line) in text.lines().enumerate().skip(1) {
+        let cells: Vec<Option<f64>> = line.split(',').take(START.len()).map(|cell| cell.parse().ok()).collect();
+        let &[Some(step), loss, rate, miou, validation] = &cells[..] else { return Err(wrong(row + 1)) };
         let step = step.trunc_to::<u64>();
         if let (Some(loss), Some(rate)) = (loss, rate) {
             history.losses.push(LossPoint { step, loss, rate });
@@ -151,7 +159,7 @@ pub fn table(history: &History, classes: &[String]) -> String {
         rows.entry(pass.step).or_default().1 = Some(pass);
     }
     let ious: Vec<String> = classes.iter().map(|name| format!("validation_iou_{name}")).collect();
-    let mut header = vec!["step", "loss", "rate", "validation_mean_iou", "validation_loss"];
+    let mut header = START.to_vec();
     header.extend(ious.iter().map(String::as_str));
     let cell = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
     let row = |(step, (point, pass)): (u64, (Option<&LossPoint>, Option<&ValidationPass>))| {
