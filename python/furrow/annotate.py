@@ -47,36 +47,53 @@ class Predictions:
         try:
             about = parsed(path.read_text(encoding="utf-8"), path)
             self.classes: List[str] = [str(name) for name, _ in about["classes"]]
-            self.colors: List[Tuple[int, ...]] = [tuple(color) for _, color in about["classes"]]
-            self.pictures: Dict[str, str] = dict(about["pictures"])
+            colors = np.array([color for _, color in about["classes"]])
+            if colors.shape != (len(self.classes), 3) or colors.min() < 0 or colors.max() > 255:
+                raise ValueError("the colors of its classes are not red, green and blue from 0 to 255")
+            self.colors: List[Tuple[int, ...]] = [(int(r), int(g), int(b)) for r, g, b in colors]
+            self.pictures: Dict[str, str] = {str(name): str(picture) for name, picture in about["pictures"].items()}
             self.version = f"{about['network']} {about['weights_sha256'][:12]}"
         except OSError as error:
             help = "write them: train predict NETWORK IMAGES --out DIR"
             raise FurrowError(f"{folder} has no predictions: {error}", help=help) from error
-        except (KeyError, TypeError, ValueError) as error:
-            raise FurrowError(f"{path} is damaged: {error!r}", "damaged") from error
+        except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
+            help = "restore it, or predict again with another --out"
+            raise FurrowError(f"{path} is damaged: {error!r}", "damaged", help=help) from error
 
     def __iter__(self) -> Iterator[Prediction]:
         for name, picture in self.pictures.items():
             path = self.folder / f"{name}.png"
             try:
                 classes = np.array(Picture.open(path))
-            except OSError as error:
-                raise FurrowError(f"{path}: {error}", "damaged") from error
+                if classes.ndim != 2 or classes.dtype != np.uint8 or classes.max(initial=0) >= len(self.classes):
+                    raise ValueError("it is not a mask of these classes")
+            # Pillow raises SyntaxError for damaged PNG files.
+            except (OSError, SyntaxError, ValueError, Picture.DecompressionBombError) as error:
+                help = "restore it, or predict again with another --out"
+                raise FurrowError(f"{path}: {error}", "damaged", help=help) from error
             yield Prediction(name, picture, classes)
 
 
 @contextlib.contextmanager
 def _replaced(path: Path) -> Iterator[IO[bytes]]:
     """Open a temporary file that becomes `path` if nothing fails, and is removed otherwise."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".furrow-", delete=False) as file:
+    try:
+        unfinished = tempfile.NamedTemporaryFile(dir=path.parent, prefix=".furrow-", delete=False)
+    except (FileNotFoundError, NotADirectoryError, PermissionError) as error:
+        help = "name a file in a folder in which you may write"
+        raise FurrowError(f"{path} cannot be written: {error.strerror}", help=help) from error
+    with unfinished as file:
         try:
             yield file
         except BaseException:
             os.unlink(file.name)
             raise
     os.chmod(file.name, 0o644)
-    os.replace(file.name, path)
+    try:
+        os.replace(file.name, path)
+    except OSError as error:
+        os.unlink(file.name)
+        raise FurrowError(f"{path} cannot be replaced: {error.strerror}", help="name another file") from error
 
 
 def cvat(predictions: Predictions, path: Path) -> None:
@@ -88,6 +105,9 @@ def cvat(predictions: Predictions, path: Path) -> None:
     with _replaced(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for found in predictions:
             stem = Path(found.picture).stem
+            if stem in stems:
+                help = "CVAT finds images by their names: predict them in several folders"
+                raise FurrowError(f"{path}: two images have the name {stem}", help=help)
             stems.append(stem)
             mask = io.BytesIO()
             Picture.fromarray(colors[found.classes]).save(mask, "png")

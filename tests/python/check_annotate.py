@@ -84,4 +84,26 @@ for task, classes in zip(tasks, MAPS.values()):
 (folder / "empty").mkdir()
 lost = run(folder / "empty", "--cvat", folder / "x.zip")
 assert lost.returncode == 2 and lost.stderr.startswith("error: ") and " help: write them: train predict" in lost.stderr
+
+# Damaged input and outputs that cannot be written: one error, exit code 2, no file.
+whole, mask = (folder / "prediction.json").read_bytes(), (folder / "a.png").read_bytes()
+wrong = {**about, "classes": [["soil", [1]], ["crop", "x"]]}
+twice = {**about, "pictures": {n: f"photos/{n}/rgb.png" for n in MAPS}}
+for out, file, content in [
+    (folder / "x.zip", "prediction.json", whole[: len(whole) // 2]),
+    (folder / "x.zip", "prediction.json", b"[]"),
+    (folder / "x.zip", "prediction.json", json.dumps(wrong).encode()),
+    (folder / "x.zip", "prediction.json", json.dumps(twice).encode()),
+    (folder / "x.zip", "a.png", mask[: len(mask) // 2]),
+    (folder / "x.zip", "a.png", b"no picture"),
+    ("/proc/x/x.zip", "a.png", mask),
+    (folder / "empty", "a.png", mask),
+]:
+    before = (folder / file).read_bytes()
+    (folder / file).write_bytes(content)
+    refused = run(folder, "--cvat", out)
+    (folder / file).write_bytes(before)
+    assert refused.returncode == 2 and refused.stderr.startswith("error: "), (file, content[:40], refused.stderr)
+    assert "Traceback" not in refused.stderr and not list(folder.glob(".furrow-*")), refused.stderr
+    assert not (folder / "x.zip").exists()
 print("annotate:", len(tasks), "images")
