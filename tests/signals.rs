@@ -93,6 +93,34 @@ fn a_signal_before_anything_is_rendered_exits_with_75_too() {
     }
 }
 
+/// Rationale: a verb without images in progress ends at once, possibly in the middle of a file. Expected: no unfinished
+/// file is left. The signal may come too late: the export is repeated until one comes in time.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_while_a_file_is_written_leaves_no_part_of_it() {
+    let unfinished = |out: &Path| out.exists() && names(out).iter().any(|name| name.starts_with(".furrow-"));
+    for _ in 0..50 {
+        let (_folder, out) = scratch();
+        let mut child = trace(&["export", "--format", "gltf", "--scene", SMALL, "--out", path(&out)])
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        while !unfinished(&out) && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        let _ = Command::new("kill").args(["-TERM", &child.id().to_string()]).stderr(Stdio::null()).status();
+        match end(&mut child).code() {
+            Some(0) => {}
+            code => {
+                assert_eq!(code, Some(75));
+                assert!(!unfinished(&out), "{:?}", names(&out));
+                return;
+            }
+        }
+    }
+    panic!("no signal came in time");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn two_signals_in_a_row_end_it_with_75() {

@@ -2,8 +2,14 @@
 //!
 //! Several programs may write into one folder, and one of them may remove the temporary files of killed programs. A
 //! temporary file that has disappeared before its rename is therefore not an error; it is written again.
+//! [`remove_own_unfinished`] removes those of this process before a signal ends it.
+
+mod live;
+
+pub use live::remove_own_unfinished;
 
 use crate::{Error, Result};
+use live::recorded;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -46,7 +52,9 @@ pub fn stream_atomically(path: &Path, write: impl FnOnce(&mut (dyn Write + Send)
 pub fn place_atomically(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let folder = parent(path);
     fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let within = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder).map_err(Error::io(path))?;
+    let mut builder = tempfile::Builder::new();
+    let within = recorded(|| builder.prefix(UNFINISHED).tempdir_in(folder), |within| within.path());
+    let within = within.map_err(Error::io(path))?;
     let unfinished = within.path().join(path.file_name().unwrap_or_default());
     write(&unfinished)?;
     File::open(&unfinished).and_then(|file| file.sync_all()).map_err(Error::io(path))?;
@@ -109,7 +117,9 @@ impl FileSet {
         let folder = parent(path);
         fs::create_dir_all(folder).map_err(Error::io(folder))?;
         let there = self.waiting.iter().find(|(_, target)| target == to).map_or(to, |(there, _)| there.as_ref());
-        match tempfile::Builder::new().prefix(UNFINISHED).make_in(folder, |name| fs::hard_link(there, name)) {
+        let mut builder = tempfile::Builder::new();
+        let link = || builder.prefix(UNFINISHED).make_in(folder, |name| fs::hard_link(there, name));
+        match recorded(link, |link| link.path()) {
             Ok(link) => self.waiting.push((link.into_temp_path(), path.into())),
             Err(_) => self.add(path, bytes)?,
         }
@@ -177,8 +187,8 @@ impl Replaced {
     fn keep(path: PathBuf) -> Self {
         let was_there = fs::symlink_metadata(&path).is_ok();
         let mut builder = tempfile::Builder::new();
-        let link = |name: &Path| fs::hard_link(&path, name);
-        let old = was_there.then(|| builder.prefix(UNFINISHED).make_in(parent(&path), link).ok()).flatten();
+        let mut link = || builder.prefix(UNFINISHED).make_in(parent(&path), |name| fs::hard_link(&path, name));
+        let old = was_there.then(|| recorded(&mut link, |old| old.path()).ok()).flatten();
         Self { old: old.map(tempfile::NamedTempFile::into_temp_path), was_there, path }
     }
 
@@ -237,7 +247,7 @@ fn temporary(path: &Path) -> Result<NamedTempFile> {
         // Permissions of any other new file: the umask applies.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder).map_err(Error::io(path))
+    recorded(|| builder.tempfile_in(folder), |file| file.path()).map_err(Error::io(path))
 }
 
 /// Copies an unfinished file to another temporary name; its content is accessible while it is open.

@@ -71,6 +71,7 @@ pub(crate) fn evaluate(
     let mut see = |seen: &session::Predicted<'_>| thumbnails.see(seen.example, seen.size, seen.predicted);
     let (precision, threads) = (&machine.precision, machine.threads());
     let report = session::evaluate(trained, set, precision, threads, &machine.machine(), signals.catch(), &mut see)?;
+    signals.release()?;
     let title = format!("{} on {set}", run.display());
     let lead = format!(
         "{}, {} parameters, {}{}{}.",

@@ -115,20 +115,24 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     // A quiet run would not print it.
     if args.dry_run || !args.quiet && !make.data.join(recipe::FILE).exists() {
         make.estimate()?;
+        signals.release()?;
     }
     if args.dry_run {
         return Ok(vec![make.scene]);
     }
     make.render()?;
+    signals.release()?;
     let names: Vec<String> = make.crops.iter().map(|crop| crop.desc.name.clone()).collect();
     let results = fit::shown(plan.hyper.steps, args.quiet, signals, |callbacks| {
         session::fit_crops(&plan, &names, &args.machine.machine(), &args.out, callbacks)
     })?;
+    signals.release()?;
     make.tell(&format!("{}: {}", args.out.display(), fit::in_words(&results)));
     let mut paths = [run::WEIGHTS, run::MODEL].map(|file| args.out.join(file)).to_vec();
     paths.extend(fit::write_page(&args.out)?);
     let trained = Ensemble::open(&args.out)?;
     paths.extend(make.evaluate(&trained)?);
+    signals.release()?;
     paths.extend(make.predict(&trained)?);
     Ok(paths)
 }
@@ -313,6 +317,7 @@ impl<'a> Make<'a> {
             signals: self.signals,
         };
         let mut paths = job.run(trained, &out)?;
+        self.signals.release()?;
         let described: Prediction = run::read_json(&out.join(PREDICTION))?;
         let names = trained.card.crops.join(" and ");
         let mut folders = vec![(format!("network for {names}"), out.clone())];

@@ -2,26 +2,19 @@
 //!
 //! Terminals send INT and HUP; batch systems send USR1 (time is nearly up) and TERM (the node is needed). By default, each would end the
 //! process with a code that a scheduler takes for a failure. Until a verb [handles](Signals::catch) them, they end the process immediately
-//! with 75, which loses nothing because nothing has been written; from then on they set a flag. A second INT or TERM always ends the
-//! process immediately, because the user does not want to wait.
+//! with 75; from then on they set a flag. A second INT or TERM always ends the process immediately, because the user does not want to
+//! wait. Both remove unfinished files first, which a signal handler cannot do: it only wakes a thread.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
+use furrow_base::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code of a clean stop that can be resumed: `EX_TEMPFAIL`.
+#[cfg(unix)]
 const STOPPED: i32 = 75;
 
-/// Signals that end the process immediately when they arrive a second time.
-const URGENT: [i32; 2] = [SIGINT, SIGTERM];
-
-#[cfg(unix)]
-const PATIENT: [i32; 2] = [signal_hook::consts::SIGHUP, signal_hook::consts::SIGUSR1];
-#[cfg(not(unix))]
-const PATIENT: [i32; 0] = [];
-
 /// State set by signals.
+#[derive(Clone)]
 pub struct Signals {
     stop: Arc<AtomicBool>,
     urgent: Arc<AtomicBool>,
@@ -38,20 +31,48 @@ impl Signals {
         signals
     }
 
-    /// Registers the actions. They run in the order of registration: the one that ends the process comes before the one that sets the flag,
-    /// so the first signal only sets the flag.
+    /// Starts the threads that wait for signals, then the handlers that wake them. A handler does all of its work in one action, so a
+    /// signal between two registrations has either its default effect or the whole one.
+    #[cfg(unix)]
     fn install(&self) -> std::io::Result<()> {
-        let asked = Arc::new(AtomicBool::new(false));
-        for signal in URGENT {
-            flag::register_conditional_shutdown(signal, STOPPED, asked.clone())?;
-            flag::register(signal, asked.clone())?;
+        use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
+        self.wait([SIGINT, SIGTERM], true)?;
+        self.wait([SIGHUP, SIGUSR1], false)
+    }
+
+    /// Waits for signals in a thread. The second one of those that are urgent ends the process even if a verb handles them.
+    #[cfg(unix)]
+    fn wait(&self, kinds: [i32; 2], urgent: bool) -> std::io::Result<()> {
+        use std::io::Read;
+        let (mut arrived, sent) = std::os::unix::net::UnixStream::pair()?;
+        let state = self.clone();
+        let wait = move || {
+            let mut count = 0;
+            while arrived.read_exact(&mut [0]).is_ok() {
+                count += 1;
+                // The flags come first: a verb may begin to handle signals at this moment.
+                state.urgent.fetch_or(urgent, Ordering::SeqCst);
+                state.stop.store(true, Ordering::SeqCst);
+                if state.uncaught.load(Ordering::SeqCst) || urgent && count > 1 {
+                    furrow_base::atomic_file::remove_own_unfinished();
+                    signal_hook::low_level::exit(STOPPED);
+                }
+            }
+        };
+        std::thread::Builder::new().name("signals".into()).stack_size(1 << 18).spawn(wait)?;
+        for kind in kinds {
+            signal_hook::low_level::pipe::register(kind, sent.try_clone()?)?;
         }
-        for signal in URGENT {
-            flag::register(signal, self.urgent.clone())?;
-        }
-        for signal in URGENT.into_iter().chain(PATIENT) {
-            flag::register_conditional_shutdown(signal, STOPPED, self.uncaught.clone())?;
-            flag::register(signal, self.stop.clone())?;
+        Ok(())
+    }
+
+    #[cfg(not(unix))]
+    fn install(&self) -> std::io::Result<()> {
+        for kind in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            signal_hook::flag::register_conditional_shutdown(kind, 75, self.uncaught.clone())?;
+            signal_hook::flag::register_conditional_shutdown(kind, 75, self.urgent.clone())?;
+            signal_hook::flag::register(kind, self.urgent.clone())?;
+            signal_hook::flag::register(kind, self.stop.clone())?;
         }
         Ok(())
     }
@@ -66,5 +87,19 @@ impl Signals {
     /// the second, which means not to wait for the current work to finish.
     pub fn catch_graceful(&self) -> (&Arc<AtomicBool>, &Arc<AtomicBool>) {
         (self.catch(), &self.urgent)
+    }
+
+    /// Ends the handling of signals by [`Self::catch`]: they end the process immediately again, for work that looks at no flag.
+    ///
+    /// # Errors
+    /// [`Interrupted`](furrow_base::error::Kind::Interrupted) if a signal arrived before.
+    pub fn release(&self) -> Result<()> {
+        self.uncaught.store(true, Ordering::SeqCst);
+        if self.stop.load(Ordering::SeqCst) {
+            return Err(
+                Error::stopped("stopped; what is complete was kept").help("run the same command again to continue")
+            );
+        }
+        Ok(())
     }
 }
