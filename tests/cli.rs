@@ -88,6 +88,40 @@ fn the_exit_code_follows_the_kind_of_failure() {
     assert_eq!(verify.status.code(), Some(1), "damaged: {}", text(&verify.stderr));
 }
 
+/// Rationale: exit code 1 makes a scheduler repeat a command that can never succeed. Expected: a place in which no file
+/// can be created is a misuse for every verb with an output, before any work. Source: the table of `errors.md`.
+#[test]
+fn outputs_in_places_that_cannot_be_written_are_refused_by_every_verb() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::write(at.join("file"), "").unwrap();
+    std::fs::create_dir(at.join("photos")).unwrap();
+    let scene = ["--scene", "page.ron", "--out"];
+    let verbs: [(&[&str], &str); 12] = [
+        (&scene, ""),
+        (&["catalogue", "--species", "sugar_beet", "--out"], ""),
+        (&[&["export", "--format", "gltf"][..], &scene].concat(), ""),
+        (&[&["scan", "--lidar", "Vlp16"][..], &scene].concat(), ""),
+        (&["preview", "page.ron", "--out"], "/x.png"),
+        (&["leaf", "page.ron", "--out"], "/x.png"),
+        (&["compare", "--real", "photos", "--synthetic", "photos", "--out"], ""),
+        (&[&["dataset", "--count", "1"][..], &scene].concat(), ""),
+        (&[&["dataset", "plan", "--count", "1"][..], &scene].concat(), ""),
+        (&[&["sequence", "--days", "8..16/8"][..], &scene].concat(), ""),
+        (&[&["ablate", "--count", "1"][..], &scene].concat(), ""),
+        (&["init"], ""),
+    ];
+    for (verb, end) in verbs {
+        for out in ["/proc/x", "/dev/null/x", "file"] {
+            let out = format!("{out}{end}");
+            let done = run(at, &[verb, &[out.as_str()]].concat());
+            let message = text(&done.stderr);
+            assert_eq!(done.status.code(), Some(2), "{verb:?} {out}: {message}");
+            assert!(message.contains("\n help: ") && !message.contains("panicked"), "{verb:?} {out}: {message}");
+        }
+    }
+}
+
 #[test]
 fn without_arguments_the_help_is_shown() {
     let message = refused(&[]);
@@ -443,9 +477,9 @@ fn a_terminal_shows_the_progress_of_a_cost_estimate() {
     let folder = folder();
     let out = folder.path().join("out").display().to_string();
     let order = |verb: &str, estimate: &str| {
-        format!("{verb} --scene scenes/field.ron --width 81 --spp 300 --count 1 --out {out} {estimate}")
+        format!("{verb} --scene scenes/field.ron --width 81 --spp 8 --count 1 --out {out} {estimate}")
     };
-    let of_days = "--days 20 --width 81 --spp 300 --format tum --dry-run";
+    let of_days = "--days 20 --width 81 --spp 8 --format tum --dry-run";
     let days = format!("sequence --scene scenes/field.ron {of_days} --out {out}");
     let commands = [
         (order("dataset", "--dry-run"), true),

@@ -225,7 +225,7 @@ fn files_of_another_user_and_old_clocks_are_an_error_or_the_same_result() {
     let before = tree(&data);
     let output = command.output().expect("the program");
     let stderr_text = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{stderr_text}");
+    assert_eq!(output.status.code(), Some(2), "{stderr_text}");
     assert!(
         stderr_text.starts_with("error: ")
             && stderr_text.contains("Permission denied")

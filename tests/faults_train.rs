@@ -118,21 +118,21 @@ fn a_training_of_another_user_is_reported() {
     half_trained(&out);
     let Some(mut barred) = as_nobody(&fit(&out, &["--quiet"])) else { return };
     let before = tree(&out);
-    let refused = |command: &mut Command| {
+    let refused = |command: &mut Command, code: i32| {
         let output = command.output().expect("the program");
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert_eq!(output.status.code(), Some(code), "{message}");
         assert!(message.starts_with("error: ") && message.matches("error: ").count() == 1, "{message}");
         assert!(message.contains("Permission denied") && message.contains("\n help: "), "{message}");
         same(&tree(&out), &before);
         message
     };
     open_to_all(&out, 0o755);
-    refused(&mut barred);
+    refused(&mut barred, 2);
     open_to_all(&out, 0o777);
     let checkpoint = out.join(checkpoint::FILE);
     fs::set_permissions(&checkpoint, fs::Permissions::from_mode(0o600)).expect("permissions");
-    let message = refused(&mut barred);
+    let message = refused(&mut barred, 1);
     assert!(message.contains(checkpoint::FILE), "{message}");
 }
 

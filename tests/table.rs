@@ -199,7 +199,7 @@ fn files_of_another_user_and_jumping_clocks_are_an_error_or_the_same_tables() {
         let before = tree(&out);
         let output = command.output().expect("the program");
         let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.starts_with("error: ") && message.contains("Permission denied"), "{message}");
         assert!(message.contains("\n help: "), "{message}");
         same(&tree(&out), &before);

@@ -63,10 +63,12 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     }
     match args.format {
         Format::Onnx => {
+            cli::check_file(&out)?;
             onnx::write(&trained, &out)?;
             Ok(vec![out])
         }
         Format::Torchscript => {
+            cli::check_file(&out)?;
             let input = &trained.card.input;
             torchscript::write(&trained, args.size.unwrap_or((input.width, input.height)), &out)?;
             let facts = torchscript::facts_path(&out);

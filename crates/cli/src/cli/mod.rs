@@ -10,7 +10,7 @@ use furrow_base::math::ToInt;
 use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 use std::fmt;
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -60,7 +60,7 @@ pub fn print(words: &str) -> Result<bool> {
 fn written(done: io::Result<()>) -> Result<bool> {
     match done {
         Ok(()) => Ok(true),
-        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(false),
         Err(e) => Err(Error::failed(format!("cannot write to stdout: {e}"))),
     }
 }
@@ -142,13 +142,27 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     // File names in the folder will be about as long as this one.
     check_length(&folder.join("semantics.png")).map_err(|e| e.in_file(folder))?;
     // Try it instead of checking permissions: root may write despite them, and no user can write to a read-only file system.
-    tempfile::tempfile_in(there).map_err(Error::io(there)).map(drop)
+    tempfile::tempfile_in(there).map(drop).map_err(|e| match e.kind() {
+        ErrorKind::PermissionDenied
+        | ErrorKind::ReadOnlyFilesystem
+        | ErrorKind::NotFound
+        | ErrorKind::NotADirectory
+        | ErrorKind::InvalidInput
+        | ErrorKind::Unsupported => {
+            Error::misuse(format!("no file can be created in this folder: {e}")).in_file(there).help(WRITABLE)
+        }
+        // The disk is full or failed: the same command may succeed later.
+        _ => Error::io(there)(e),
+    })
 }
+
+/// Help for a folder in which no file can be created.
+const WRITABLE: &str = "give --out a folder in which you may write, or change its permissions";
 
 /// Checks that the file name is not too long for the file system.
 fn check_length(file: &Path) -> Result<()> {
     match file.symlink_metadata() {
-        Err(e) if e.kind() == io::ErrorKind::InvalidFilename => {
+        Err(e) if e.kind() == ErrorKind::InvalidFilename => {
             Err(Error::misuse("this name is too long for the file system")
                 .in_file(file)
                 .help("give --out a shorter name"))
