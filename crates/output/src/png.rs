@@ -173,6 +173,8 @@ fn decode_kinds(path: &Path, bytes: &[u8], kinds: &[(BitDepth, ColorType)], what
     let size = plausible(reader.output_buffer_size(), (w, h), bytes.len().to_u64()).map_err(|what| wrong(&what))?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(|e| wrong(&e))?;
+    // The end of the file with its checksums.
+    reader.finish().map_err(|e| wrong(&e))?;
     Ok((w, h, kind.1 == ColorType::Rgb, data))
 }
 
@@ -299,6 +301,7 @@ fn map_of(path: &Path) -> Result<(u32, u32, Map)> {
     let size = plausible(reader.output_buffer_size(), (w, h), bytes).map_err(wrong)?;
     let mut data = vec![0; size];
     reader.next_frame(&mut data).map_err(unreadable)?;
+    reader.finish().map_err(unreadable)?;
     let values = unpack(&data, w.to_usize() * color.samples(), depth);
     let map = match color {
         ColorType::Indexed => Map::Indexed(values, palette),

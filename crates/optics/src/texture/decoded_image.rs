@@ -2,10 +2,11 @@
 //!
 //! A picture is returned as viewers show it, turned by its EXIF orientation. Models are the exception: their texture
 //! coordinates refer to the pixels as stored. Colour profiles are not applied. Refused, with the reason: other formats,
-//! JPEG files without their end (decoders fill the rest with grey), JPEG files in CMYK, and pictures above the limits.
+//! JPEG files without their end (decoders fill the rest with grey), PNG files with a damaged end, JPEG files in CMYK, and pictures above the limits.
 //! Source: ITU-T T.81, annex B (JPEG segments).
 
 use super::orientation::orientation;
+use super::png_end;
 use furrow_base::input::{self, Refusal};
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
@@ -109,6 +110,9 @@ fn stored(bytes: &[u8], most_side: u32) -> Result<(DynamicImage, Orientation), F
     }
     let orientation = orientation(bytes, &mut decoder);
     let pixels = DynamicImage::from_decoder(decoder).map_err(fault(most_side))?;
+    if let Some(what) = png_end::fault(bytes) {
+        return Err(Fault::new(what, "copy it from its source again"));
+    }
     Ok((pixels, orientation))
 }
 
@@ -399,6 +403,7 @@ mod tests {
         for length in [whole.len() - 2, whole.len() / 2, 40] {
             assert!(refused(&whole[..length]).contains("cut short"), "{length}");
         }
+        assert!(refused(&png()[..png().len() - 3]).contains("cut short"));
         assert!(refused(&png()[..60]).contains("ends too early"), "{}", refused(&png()[..60]));
         for (start, name) in [
             (&b"\0\0\0\x18ftypheic\0\0\0\0"[..], "HEIC"),

@@ -18,6 +18,7 @@ mod need;
 pub mod noise;
 mod openexr;
 mod orientation;
+mod png_end;
 pub mod panorama;
 mod petiole;
 mod primaries;
