@@ -2,6 +2,7 @@
 //!
 //! The reader takes the keys of the first level: numbers, words, matrices with `rows`, `cols` and `data`, and numbers by
 //! name, as in ROS's `roi`. Other values are passed over. YAML without the tag `!!opencv-matrix`, as ROS writes it, is read alike.
+//! A parser of all of YAML would refuse what OpenCV writes: its header `%YAML:1.0`, and tabs.
 
 use furrow_base::{Error, Result};
 
@@ -16,7 +17,7 @@ pub(super) struct Entry {
     pub(super) key: String,
     /// Line of the key, from 1.
     pub(super) line: usize,
-    /// Number or word; empty for a matrix.
+    /// Number or word; a map as written; empty for a list.
     pub(super) text: String,
     rows: Option<String>,
     cols: Option<String>,
@@ -46,6 +47,9 @@ impl Entry {
     /// Returns the numbers of a matrix, row by row.
     pub(super) fn matrix(&self) -> Result<Vec<f64>> {
         if self.data.is_empty() {
+            if self.text.starts_with(['|', '>', '&', '*']) {
+                return Err(self.fault("is written with an anchor or as a block of text").help(FORMS));
+            }
             return Err(self.fault("has no data").help("it is a matrix: write rows, cols and data: [ … ]"));
         }
         if self.long {
@@ -73,9 +77,7 @@ impl Entry {
 
     /// Returns the number with this name below the key, in lines of their own or as `{name: number, …}`; `None` if it has none.
     pub(super) fn named(&self, name: &str) -> Result<Option<f64>> {
-        let inline = self.text.trim_matches(['{', '}']).split(',').filter_map(|pair| pair.split_once(':'));
-        let own = self.named.iter().map(|(key, value)| (key.as_str(), value.as_str()));
-        let Some((_, value)) = own.chain(inline).find(|(key, _)| key.trim().trim_matches('"') == name) else {
+        let Some((_, value)) = self.named.iter().find(|(key, _)| key == name) else {
             return Ok(None);
         };
         let value = number(value.trim());
@@ -92,6 +94,31 @@ impl Entry {
             "data" => self.add(text),
             _ if self.named.len() < MOST => self.named.push((part.to_owned(), text.to_owned())),
             _ => {}
+        }
+    }
+
+    /// Sets the value of the entry itself: a list of numbers, a map of its parts, or a number or word.
+    fn give(&mut self, value: &str) {
+        if value.starts_with('[') {
+            return self.add(&value.replace(['[', ']'], " "));
+        }
+        unquoted(value).clone_into(&mut self.text);
+        let Some(mut rest) = value.strip_prefix('{').and_then(|map| map.strip_suffix('}')) else { return };
+        while let Some((key, after)) = rest.split_once(':') {
+            let after = untagged(after);
+            // A list may contain commas; it ends at the bracket that closes its first one.
+            let mut depth = 0_usize;
+            let ends = |(_, c): &(usize, char)| {
+                match c {
+                    '[' => depth += 1,
+                    ']' => depth = depth.saturating_sub(1),
+                    _ => {}
+                }
+                *c == ',' && depth == 0
+            };
+            let end = after.char_indices().find(ends).map_or(after.len(), |(at, _)| at);
+            self.set(unquoted(key.trim_start_matches(',')), unquoted(&after[..end].replace(['[', ']'], " ")));
+            rest = after[end..].trim_start_matches(',');
         }
     }
 
@@ -121,60 +148,100 @@ pub(super) fn read(text: &str) -> Result<Vec<Entry>> {
     }
 }
 
+/// Reads YAML as OpenCV, ROS and common libraries write it: lists and maps in one line or over several, in any nesting, lists of items
+/// `- number`, comments and tags. Anchors and block scalars are not read.
 fn yaml(text: &str) -> Result<Vec<Entry>> {
     let mut all: Vec<Entry> = Vec::new();
-    // Line of a `[` that no `]` has closed yet.
-    let mut open: Option<usize> = None;
-    for (line, raw) in (1..).zip(text.lines()) {
-        let text = raw.split_once(" #").map_or(raw, |(text, _)| text).trim_end();
+    // Part of the entry to which items `- …` in the next lines belong.
+    let mut items = String::new();
+    let mut lines = (1..).zip(text.lines());
+    while let Some((line, raw)) = lines.next() {
+        let text = without_comment(raw).trim_end();
         let plain = text.trim_start();
-        if open.is_some() {
-            let (inside, closed) = plain.split_once(']').map_or((plain, false), |(inside, _)| (inside, true));
-            if let Some(entry) = all.last_mut() {
-                entry.add(inside);
-            }
-            if closed {
-                open = None;
+        if plain.is_empty() || ["%", "---", "..."].iter().any(|mark| plain.starts_with(mark)) {
+            continue;
+        }
+        if let Some(item) = item(plain) {
+            if let Some(entry) = all.last_mut().filter(|_| items == "data") {
+                entry.add(&whole(item, line, &mut lines)?.replace(['[', ']'], " "));
             }
             continue;
         }
-        if plain.is_empty() || ["%", "---", "...", "#"].iter().any(|mark| plain.starts_with(mark)) {
+        if plain.starts_with(['[', '{']) {
+            if let Some(entry) = all.last_mut().filter(|_| items == "data") {
+                entry.give(&whole(plain, line, &mut lines)?);
+            }
             continue;
         }
         let first = plain.len() == text.len();
-        // Items of lists belong to keys that are passed over.
-        if plain.starts_with('-') && !first {
-            continue;
-        }
         let Some((key, value)) = plain.split_once(':') else {
             if first {
                 return Err(Error::input(format!("line {line} is not `key: value`")).help(FORMS));
             }
             continue;
         };
-        let (key, value) = (key.trim().trim_matches('"'), value.trim());
-        let value = value.split_once("!!opencv-matrix").map_or(value, |(_, after)| after.trim());
+        let value = whole(untagged(value), line, &mut lines)?;
+        let key = unquoted(key);
         if first {
             all.push(Entry::new(key, line));
         }
         let Some(entry) = all.last_mut() else { continue };
         let part = if first { "data" } else { key };
-        match value.strip_prefix('[') {
-            Some(list) => {
-                let (inside, closed) = list.split_once(']').map_or((list, false), |(inside, _)| (inside, true));
-                entry.set(part, inside);
-                open = (!closed).then_some(line);
-            }
-            None if first => value.trim_matches('"').clone_into(&mut entry.text),
-            None => entry.set(part, value),
+        part.clone_into(&mut items);
+        if first {
+            entry.give(&value);
+        } else if value.starts_with('[') {
+            entry.set(part, &value.replace(['[', ']'], " "));
+        } else if !value.is_empty() || part != "data" {
+            entry.set(part, unquoted(&value));
         }
     }
-    match open {
-        Some(line) => {
-            Err(Error::input(format!("line {line}: the list has no `]`")).help("the file was cut: write it again"))
-        }
-        None => Ok(all),
+    Ok(all)
+}
+
+/// Removes a comment: `#` at the start or after white space.
+fn without_comment(line: &str) -> &str {
+    let starts = |(at, _): &(usize, &str)| *at == 0 || line[..*at].ends_with([' ', '\t']);
+    line.match_indices('#').find(starts).map_or(line, |(at, _)| &line[..at])
+}
+
+/// Returns the rest of an item of a list, also of a list in a list; `None` for other lines, such as `-1.5`.
+fn item(plain: &str) -> Option<&str> {
+    let rest = plain.strip_prefix('-').filter(|rest| rest.is_empty() || rest.starts_with([' ', '\t']))?.trim();
+    Some(item(rest).unwrap_or(rest))
+}
+
+/// Removes a tag such as `!!opencv-matrix`.
+fn untagged(value: &str) -> &str {
+    let value = value.trim();
+    if value.starts_with('!') { value.split_once([' ', '\t']).map_or("", |(_, after)| after.trim()) } else { value }
+}
+
+/// Removes white space and quotation marks.
+fn unquoted(text: &str) -> &str {
+    text.trim().trim_matches(['"', '\''])
+}
+
+/// Returns a value with the following lines, if it is a list or a map that they close.
+fn whole<'a>(start: &str, line: usize, lines: &mut impl Iterator<Item = (usize, &'a str)>) -> Result<String> {
+    let mut value = start.to_owned();
+    if !value.starts_with(['[', '{']) {
+        return Ok(value);
     }
+    let opened = |text: &str| text.matches(['[', '{']).count();
+    let closed = |text: &str| text.matches([']', '}']).count();
+    let (mut open, mut shut) = (opened(&value), closed(&value));
+    while open > shut {
+        let Some((_, next)) = lines.next() else {
+            let what = format!("line {line}: the list has no `]`, or the map no `}}`");
+            return Err(Error::input(what).help("the file was cut: write it again"));
+        };
+        let next = without_comment(next).trim();
+        (open, shut) = (open + opened(next), shut + closed(next));
+        value.push(' ');
+        value.push_str(next);
+    }
+    Ok(value)
 }
 
 fn xml(text: &str) -> Result<Vec<Entry>> {
@@ -212,5 +279,44 @@ fn xml(text: &str) -> Result<Vec<Entry>> {
             Err(Error::input(format!("line {line}: <{name}> is not closed")).help("the file was cut: write it again"))
         }
         None => Ok(all),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: YAML writers write the same matrix in many ways. Expected: all are read; what is not read is refused with its reason.
+    /// Source: YAML 1.2; files of OpenCV, ROS, Kalibr and PyYAML.
+    #[test]
+    fn matrices_are_read_as_yaml_writers_write_them() {
+        let expected = [8.5, 0.0, 3.0, 0.0, -9e1, 2.0, 0.0, 0.0, 1.0];
+        for text in [
+            "%YAML:1.0\n---\nK: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 8.5, 0., 3., 0., -9e1, 2.,\n       0., 0., 1. ]\n",
+            "K: {rows: 3, cols: 3, data: [8.5, 0, 3, 0, -90, 2, 0, 0, 1]}  # one line\n",
+            "K: !!opencv-matrix {rows: 3, cols: 3, dt: d,\n  data: [8.5, 0, 3, 0, -90, 2, 0, 0, 1]}\n",
+            "'K': [[8.5, 0, 3], [0, -90, 2], [0, 0, 1]]\n",
+            "K: [[8.5, 0, 3],\n  [0, -90, 2], # the second row\n  [0, 0, 1]]\n",
+            "K:\n- [8.5, 0, 3]\n- [0, -90, 2]\n- [0, 0, 1]\n",
+            "K:\n- - 8.5\n  - 0\n  - 3\n- - 0\n  - -90\n  - 2\n- - 0\n  - 0\n  - 1\n",
+            "K:\n\trows: 3\n\tcols: 3\n\tdata:\n\t- 8.5\n\t- 0\n\t- 3\n\t- 0\n\t- -90\n\t- 2\n\t- 0\n\t- 0\n\t- 1\n",
+            "K:\n  {rows: 3, cols: 3, data: [8.5, 0, 3, 0, -90, 2, 0, 0, 1]}\n",
+            "K:\n  data:\n    [8.5, 0, 3, 0, -90, 2, 0, 0, 1]\n  rows: 3\n",
+        ] {
+            let all = read(text).unwrap_or_else(|e| panic!("{text}: {e}"));
+            assert_eq!((all.len(), all[0].key.as_str()), (1, "K"), "{text}");
+            assert_eq!(all[0].matrix().unwrap_or_else(|e| panic!("{text}: {e}")), expected, "{text}");
+        }
+        for (text, words) in [
+            ("K: {rows: 3, cols: 3, data: [1, 2]}\n", "2 numbers, not 3 × 3"),
+            ("K: [[1, x]]\n", "contains `x`"),
+            ("K: *other\n", "anchor"),
+            ("K: 3\n", "has no data"),
+        ] {
+            let error = read(text).unwrap()[0].matrix().unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+        assert!(read("K: {data: [1, 2\n").unwrap_err().to_string().contains("has no `]`"));
+        assert_eq!(read("roi: {x_offset: 3, y_offset: 4}\n").unwrap()[0].named("y_offset").unwrap(), Some(4.0));
     }
 }
