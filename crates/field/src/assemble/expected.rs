@@ -40,8 +40,8 @@ impl Source {
         if let Some(soil) = &self.desc.soil {
             ground::soil(drawn, library, soil, sight.view)?;
         }
-        for model in &self.desc.models {
-            library.model(self.page(), model)?;
+        for (k, model) in self.desc.models.iter().enumerate() {
+            models::load(self.page(), library, k, model)?;
         }
         warnings.extend(plausibility::camera(drawn));
         warnings.extend(plausibility::plants(drawn, library)?);

@@ -12,7 +12,7 @@ use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::{Mesh, Placement};
 use furrow_base::math::{Mat3, Spectrum, ToInt, Vec3};
-use furrow_base::ron_file::{Num, Step};
+use furrow_base::ron_file::{Num, RonFile, Step};
 use furrow_base::sampling::Purpose;
 use furrow_base::sampling::rng::mix;
 use furrow_base::{Error, Result};
@@ -114,6 +114,17 @@ pub(super) fn models(
     Ok(records)
 }
 
+/// Loads the file of model `k` of the scene file and checks that it has a class.
+pub(super) fn load(page: &RonFile, library: &mut Library, k: usize, desc: &ModelDesc) -> Result<Arc<Model>> {
+    let model = library.model(page, desc)?;
+    if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
+        let fault = Error::input("this model's file defines no class")
+            .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
+        return Err(page.blame(&[Step::Field("models"), Step::Item(k)], fault));
+    }
+    Ok(model)
+}
+
 /// Loads the file of a model and creates its materials.
 fn open<'a>(
     drawn: &Drawn<'_>,
@@ -121,12 +132,7 @@ fn open<'a>(
     all: &mut Contents,
     (k, desc, kind): (usize, &'a ModelDesc, PartKind),
 ) -> Result<Entry<'a>> {
-    let model = library.model(drawn.page, desc)?;
-    if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
-        let fault = Error::input("this model's file defines no class")
-            .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
-        return Err(drawn.page.blame(&[Step::Field("models"), Step::Item(k)], fault));
-    }
+    let model = load(drawn.page, library, k, desc)?;
     let repaint = SurfaceOverride {
         roughness: desc.roughness.map(Num::f32),
         transmission: desc.transmission.map(|(r, g, b, nir)| Spectrum::new(r.f32(), g.f32(), b.f32(), nir.f32())),
