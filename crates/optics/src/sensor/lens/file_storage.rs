@@ -287,7 +287,7 @@ mod tests {
     use super::*;
 
     /// Rationale: YAML writers write the same matrix in many ways. Expected: all are read; what is not read is refused with its reason.
-    /// Source: YAML 1.2; files of OpenCV, ROS, Kalibr and PyYAML.
+    /// Source: YAML 1.2; files of OpenCV, ROS, Kalibr and Python.
     #[test]
     fn matrices_are_read_as_yaml_writers_write_them() {
         let expected = [8.5, 0.0, 3.0, 0.0, -9e1, 2.0, 0.0, 0.0, 1.0];
