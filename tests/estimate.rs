@@ -98,7 +98,7 @@ fn dense_ground_grows_as_estimated() {
 #[test]
 fn what_would_take_too_much_is_refused_where_it_stands() {
     for (soil, blamed) in [
-        ("soil: (\n clods: (over_5mm_per_m2: 9e7)\n)", "clods"),
+        ("soil: (\n clods: (over_5mm_per_m2: 9e5, min_mm: 0.001)\n)", "clods"),
         ("soil: (\n clods: (min_mm: 0.001),\n)", "clods"),
         ("soil: (\n crumbs: (min_mm: 0.0001),\n)", "crumbs"),
         ("soil: (\n stones: [(cover: 0.5), (cover: 0.5, median_mm: 0.0001, min_mm: 0.0001)],\n)", "stones"),
@@ -232,7 +232,7 @@ fn pictures_of_a_model_are_counted_together() {
 /// Every command that builds a field refuses it.
 #[test]
 fn every_verb_that_grows_a_field_refuses_it() {
-    let (keep, path) = with_soil("soil: (clods: (over_5mm_per_m2: 9e7))");
+    let (keep, path) = with_soil("soil: (clods: (over_5mm_per_m2: 9e5, min_mm: 0.001))");
     let scene = path.to_str().expect("UTF-8");
     let out = keep.path().join("out.png");
     let out = out.to_str().expect("UTF-8");

@@ -39,7 +39,7 @@ fn the_generated_pages_are_fresh() {
 #[test]
 fn a_field_is_explained_with_unit_range_default_and_example() {
     let words = message(&trace(&["explain", "soil.clods.over_5mm_per_m2"]));
-    for part in ["longer than 5 mm", "between 0 and 100000000", "m⁻²", "Uniform(8000, 14000)", "number or distribution"]
+    for part in ["longer than 5 mm", "between 0 and 1000000", "m⁻²", "Uniform(8000, 14000)", "number or distribution"]
     {
         assert!(words.contains(part), "{part}: {words}");
     }

@@ -100,6 +100,47 @@ fn every_number_has_bounds() {
     }
 }
 
+/// Returns an example with its first number replaced; `None` for an example without numbers.
+fn with_number(example: &str, number: &str) -> Option<String> {
+    let value = example.find(": ")? + 2;
+    let part = |c: char| c.is_ascii_digit() || matches!(c, '-' | '.');
+    let begin = value + example[value..].find(|c: char| c.is_ascii_digit() || c == '-')?;
+    let end = begin + example[begin..].find(|c: char| !part(c)).unwrap_or(example.len() - begin);
+    Some(format!("{}{number}{}", &example[..begin], &example[end..]))
+}
+
+fn every_number_is_checked<T: DeserializeOwned>(reference: &Reference) {
+    let (mut checked, mut wrong) = (0, Vec::new());
+    for section in &reference.sections {
+        for entry in section.entries.iter().filter(|entry| !entry.variant && !entry.range.is_empty()) {
+            let path = super::walk::joined(&section.path, &entry.name);
+            let file = reference.file_with(&path);
+            let most = entry.range.rsplit(' ').next().and_then(|most| most.parse::<f64>().ok());
+            let above = most.map(|most| format!("{}", most * 1.5 + 1.0));
+            for number in ["NaN", "inf", "-inf", "1e300", "-1e300"].into_iter().chain(above.as_deref()) {
+                let Some(bad) = with_number(&entry.example, number) else { continue };
+                checked += 1;
+                match RonFile::of(&file.replacen(&entry.example, &bad, 1)).parse::<T>() {
+                    Err(e) if e.to_string().contains(&entry.name) && e.to_string().contains('^') => {}
+                    Err(e) => wrong.push(format!("{path}: {bad}: {e}")),
+                    Ok(_) => wrong.push(format!("{path}: {bad} is read")),
+                }
+            }
+        }
+    }
+    assert!(checked > 100, "{checked} numbers");
+    assert!(wrong.is_empty(), "{} of {checked} wrong:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// Rationale: a value that no field has must not start minutes of work. Expected: each number of the files is refused where it is written
+/// if it is not finite, astronomically large, or above the bound of the reference. No field is built.
+#[test]
+fn every_number_is_refused_beyond_its_bounds() {
+    every_number_is_checked::<FieldDesc>(&scene());
+    every_number_is_checked::<SpeciesDesc>(&species());
+    every_number_is_checked::<Recipe>(&texture());
+}
+
 /// Rationale: an example that the program rejects is worse than none. Expected: every example of a hyper-parameter applies to a plan.
 #[cfg(feature = "train")]
 #[test]
@@ -149,6 +190,6 @@ fn paths_lead_where_they_say() {
     assert_eq!(scene.named("max_mm"), ["soil.clods.max_mm", "soil.stones.max_mm"]);
     let (_, entry) = scene.find("soil.clods.over_5mm_per_m2").unwrap();
     let entry = entry.unwrap();
-    assert_eq!((entry.unit, entry.range.as_str()), ("m⁻²", "between 0 and 100000000"));
+    assert_eq!((entry.unit, entry.range.as_str()), ("m⁻²", "between 0 and 1000000"));
     assert_eq!(entry.default.as_deref(), Some("Uniform(8000, 14000)"));
 }

@@ -34,7 +34,7 @@ pub struct WeedsDesc {
     /// Clusters around former mother plants.
     pub clusters: ClustersDesc,
     /// Minimum distance between two stems.
-    pub min_distance_m: Vary<NonNegative<100>>,
+    pub min_distance_m: Vary<NonNegative<1>>,
 }
 
 impl Default for WeedsDesc {

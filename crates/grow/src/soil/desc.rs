@@ -297,7 +297,7 @@ impl Default for CrumbsDesc {
 #[serde(deny_unknown_fields, default)]
 pub struct ClodsDesc {
     /// Number longer than 5 mm, m⁻²; 0 for none, including crumbs.
-    pub over_5mm_per_m2: Vary<NonNegative<100_000_000>>,
+    pub over_5mm_per_m2: Vary<NonNegative<1_000_000>>,
     /// Length of the shortest clod; smaller aggregates are crumbs, which are part of the surface.
     pub min_mm: Num<Positive<1000>>,
     /// Length of the longest clod.
