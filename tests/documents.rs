@@ -8,6 +8,7 @@ use crate::common::book::{self, anchors, blocks, commands, links, pages, program
 use crate::common::program::SMALL;
 use furrow_base::ron_file::RonFile;
 use furrow_field::desc::{FieldDesc, ModelDesc};
+use furrow_field::horizon::HorizonDesc;
 use furrow_field::shipped;
 use furrow_grow::soil::SoilDesc;
 use furrow_optics::light::LightDesc;
@@ -238,6 +239,7 @@ fn parsed(note: &str, text: &str) -> Option<furrow_base::Result<()>> {
         "sensor" => file.parse::<SensorDesc>().map(drop),
         "lidar" => file.parse::<LidarDesc>().map(drop),
         "light" => file.parse::<LightDesc>().map(drop),
+        "horizon" => file.parse::<HorizonDesc>().map(drop),
         "soil" => file.parse::<SoilDesc>().map(drop),
         "model" => file.parse::<ModelDesc>().map(drop),
         "leaf" => file.parse::<LeafDesc>().map(drop),
@@ -264,7 +266,7 @@ fn every_piece_of_ron_is_what_it_says() {
             kinds.insert(block.note);
         }
     }
-    for kind in ["camera", "sensor", "lidar", "light", "soil", "model", "leaf", "scenes"] {
+    for kind in ["camera", "sensor", "lidar", "light", "horizon", "soil", "model", "leaf", "scenes"] {
         assert!(kinds.contains(kind), "no page has a block of kind {kind}");
     }
     assert!(

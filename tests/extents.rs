@@ -176,7 +176,7 @@ fn squares_in(size: (u32, u32), parts: &[(Vec3, f32, u32, u16)]) -> Scene {
         }
     };
     let parts = parts.iter().map(part).collect();
-    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, filter: Filter::Box.footprint() }
+    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera: eye, haze: None, filter: Filter::Box.footprint() }
 }
 
 /// Expected: a leaf of 20 × 20 pixels whose right half is below another plant's leaf, a stem of 10 × 10 pixels beside

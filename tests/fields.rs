@@ -827,3 +827,43 @@ fn a_front_camera_shows_the_same_field_by_pixel() {
     assert!(plants > 2000 && 50 * other < labels.tags.len(), "{other} of {}, {plants} of plants", labels.tags.len());
     assert!(film.pixels.iter().all(|pixel| !pixel.mean.is_black()), "there is a gap between the ground and the sky");
 }
+
+/// Expected: with a horizon, a camera that looks over the field sees parts of kind `Backdrop`, labelled soil without a plant, beyond the
+/// planted area; another camera sees the same ones where their views overlap; one that looks down has none. Without one there are none.
+/// A hedge within the planted field is refused by name.
+#[test]
+fn a_hedge_and_haze_end_the_view() {
+    let scene = |target: &str, horizon: &str| {
+        format!(
+            "Field(seed: 5, camera: Pinhole(size: (64, 48), intrinsics: FieldOfView(horizontal_deg: 60),
+            pose: LookAt(position_m: (0, 0, 1.2), target_m: {target})), lights: [Daylight(sun: Angles(elevation_deg: 40, azimuth_deg: 90))],
+            soil: (layers: [(albedo: \"textures/soil/dirt.png\", height: \"textures/soil/dirt.height.png\", size_m: 0.5, height_mm: (0, 1))]),
+            reach_m: 100, detail: ByPixel, {horizon})"
+        )
+    };
+    let ahead = "(0, 4, 1.1)";
+    let built = |target: &str, horizon: &str| field(&scene(target, horizon), &Options::default());
+    let trees = |field: &Field| -> Vec<[f32; 3]> {
+        let parts = field.scene.parts.iter().zip(&field.kinds).filter(|(_, kind)| **kind == PartKind::Backdrop);
+        let at = |part: &furrow_render::scene::Part| {
+            assert_eq!(part.tag, Tag { class: Class::Soil, ..Tag::default() });
+            let placement = part.placement().expect("an instance");
+            assert!(placement.offset.truncate().length() > 180.0, "{placement:?}");
+            // The height of the ground depends on its cells, and these on the view.
+            [placement.offset.x, placement.offset.y, placement.scale]
+        };
+        parts.map(|(part, _)| at(part)).collect()
+    };
+    let shown = built(ahead, "horizon: (distance_m: 250, visibility_km: 3)");
+    let seen = trees(&shown);
+    assert!(seen.len() > 50, "{}", seen.len());
+    let turned = trees(&built("(1, 4, 1.1)", "horizon: (distance_m: 250, visibility_km: 3)"));
+    let both = seen.iter().filter(|tree| turned.contains(tree)).count();
+    assert!(both > seen.len() / 2 && both < seen.len(), "{both} of {}", seen.len());
+    assert_eq!((trees(&built(ahead, "")).len(), built(ahead, "").scene.haze), (0, None));
+    assert!(trees(&built("(0, 0.01, 0)", "horizon: ()")).is_empty());
+    assert!(shown.scene.haze.is_some() && shown.conditions.horizon.is_some_and(|h| h.distance_m == 250.0));
+    let near = assemble::field_of(&scene(ahead, "horizon: (distance_m: 100)"), &Options::default());
+    let error = near.err().unwrap().to_string();
+    assert!(error.contains("within the planted field"), "{error}");
+}

@@ -37,7 +37,7 @@ fn part(mesh: Mesh, mask: Option<Arc<AlphaMask>>, tag: Tag) -> Part {
 
 #[allow(clippy::large_types_passed_by_value, reason = "the scene takes the camera")]
 fn scene(parts: Vec<Part>, camera: Camera) -> Scene {
-    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, filter: Filter::Box.footprint() }
+    Scene { parts, materials: Vec::new(), lights: Vec::new(), camera, haze: None, filter: Filter::Box.footprint() }
 }
 
 fn labels_of(scene: &Scene) -> LabelMap {
@@ -552,7 +552,8 @@ fn normals_are_smooth_and_face_the_camera_everywhere() {
 #[test]
 fn the_list_of_a_species_decides_its_class() {
     let (text, listed) = (program::small_text(), [("sugar_beet", "beet"), ("chenopodium", "fat hen")]);
-    let [crop, weed] = listed.map(|(file, _)| format!("species: \"scenes/species/{file}.ron\""));
+    let [crop, weed] =
+        listed.map(|(file, _)| format!("species: \"{}/tests/ref/species/{file}.ron\"", env!("CARGO_MANIFEST_DIR")));
     let swapped = text.replacen(&crop, "species: \"?\"", 1).replace(&weed, &crop).replace("species: \"?\"", &weed);
     for (text, fat_hen, warnings) in [(&text, Class::Weed, 0), (&swapped, Class::Crop, 2)] {
         let field = program::field(text, &Options { width: Some(32), ..Options::default() });

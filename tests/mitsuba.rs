@@ -83,7 +83,7 @@ fn sheets() -> Scene {
     let lights = vec![Light::Sun(sun.expect("a sun")), Light::Sky(Box::new(dome.expect("a sky")))];
     let materials = [soil, green, pale].map(Material::Plain).to_vec();
     let camera = camera((120, 90), vec3(0.2, -0.5, 0.6), vec3(0.0, 0.0, 0.05), 38.0);
-    Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
+    Scene { parts, materials, lights, camera, haze: None, filter: Filter::Box.footprint() }
 }
 
 /// A scene of a ball on a plane under two lamps, with the principal point far from the image's centre.
@@ -113,6 +113,7 @@ fn lamps() -> Scene {
         parts,
         materials: [plane, ball].map(Material::Plain).to_vec(),
         lights,
+        haze: None,
         camera,
         filter: Filter::Box.footprint(),
     }
@@ -300,7 +301,7 @@ fn large_and_small() -> Scene {
     let parts = vec![part(0.1, vec3(-0.1, 0.0, 0.0), 1), part(0.025, vec3(0.1, 0.0, 0.0), 2)];
     let lights = vec![Light::Constant(Constant::new(Spectrum::ONE))];
     let camera = camera((100, 80), vec3(0.0, -0.01, 1.0), Vec3::ZERO, 34.0);
-    Scene { parts, materials: vec![Material::Leaf(leaf)], lights, camera, filter: Filter::Box.footprint() }
+    Scene { parts, materials: vec![Material::Leaf(leaf)], lights, camera, haze: None, filter: Filter::Box.footprint() }
 }
 
 /// Rationale: if the relief of a small leaf is exported at the resolution of a large one, its gloss differs from that

@@ -99,6 +99,7 @@ fn plane(bsdf: Bsdf, lights: Vec<Light>, distortion: Distortion) -> Scene {
         parts: vec![Part { mesh: Arc::new(square(Vec3::ZERO, 4.0)), mask: None, material: 0, tag, instance: None }],
         materials: vec![Material::Plain(bsdf)],
         lights,
+        haze: None,
         camera,
         filter: Filter::Box.footprint(),
     }

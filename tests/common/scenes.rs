@@ -67,7 +67,7 @@ pub fn scene(parts: Vec<(Mesh, Bsdf)>, lights: Vec<Light>, camera: Camera) -> Sc
         instance: None,
     };
     let parts = parts.into_iter().enumerate().map(part).collect();
-    Scene { parts, materials, lights, camera, filter: Filter::Box.footprint() }
+    Scene { parts, materials, lights, camera, haze: None, filter: Filter::Box.footprint() }
 }
 
 /// Renders a whole scene on two threads with Sobol points.

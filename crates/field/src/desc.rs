@@ -2,6 +2,7 @@
 
 use crate::days::DaysDesc;
 use crate::drive::{DriveDesc, MountedDesc};
+use crate::horizon::HorizonDesc;
 use furrow_base::math::RoundTo;
 use furrow_base::ron_file::{self, Bound, Fraction, NonNegative, Num, Pick, Positive, PositiveCount, Signed, Vary};
 use furrow_base::sampling::Stream;
@@ -74,6 +75,10 @@ pub struct FieldDesc {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "(colors: [Loess], moisture: (mean: 0.4))"))]
     pub soil: Option<SoilDesc>,
+    /// Hedges, trees and haze beyond the field, for views that show the horizon. Without it, bare ground ends at a clear sky.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-example" = "(distance_m: 250)"))]
+    pub horizon: Option<HorizonDesc>,
     /// Crops, sown in rows.
     #[serde(default)]
     pub crops: Vec<CropDesc>,

@@ -7,6 +7,7 @@ pub mod days;
 pub mod desc;
 pub mod drive;
 pub mod estimate;
+pub mod horizon;
 mod image_memory;
 mod layer;
 mod library;

@@ -15,6 +15,8 @@ pub enum PartKind {
     Model,
     /// A model from disk with a name, by the index of the name in the scene file; below [`Self::MOST_NAMED`].
     Named(u8),
+    /// A hedge or tree on the horizon.
+    Backdrop,
     /// An organ of a plant.
     Organ(OrganKind),
 }
@@ -28,13 +30,14 @@ impl PartKind {
 
     /// All kinds except named models: number in label maps, name, colour in label maps (RGB), kind. Number 0 marks pixels that
     /// show no part, such as the sky.
-    pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 19] = [
+    pub const NUMBERED: [(u8, &'static str, [u8; 3], Self); 20] = [
         (1, "soil", [94, 72, 52], Self::Soil),
         (2, "stone", [150, 150, 160], Self::Debris(DebrisKind::Stone)),
         (3, "straw", [214, 190, 110], Self::Debris(DebrisKind::Straw)),
         (4, "stick", [120, 80, 30], Self::Debris(DebrisKind::Stick)),
         (5, "bit", [160, 110, 70], Self::Debris(DebrisKind::Bit)),
         (6, "model", [60, 110, 220], Self::Model),
+        (7, "backdrop", [20, 50, 45], Self::Backdrop),
         (11, "blade", [40, 170, 60], Self::Organ(OrganKind::Blade)),
         (12, "petiole", [200, 220, 60], Self::Organ(OrganKind::Petiole)),
         (13, "cotyledon", [120, 220, 150], Self::Organ(OrganKind::Cotyledon)),
@@ -109,7 +112,7 @@ mod tests {
         ];
         let debris = [DebrisKind::Stone, DebrisKind::Stick, DebrisKind::Straw, DebrisKind::Bit];
         let all = organs.map(PartKind::Organ).into_iter().chain(debris.map(PartKind::Debris));
-        let all: Vec<PartKind> = all.chain([PartKind::Soil, PartKind::Model]).collect();
+        let all: Vec<PartKind> = all.chain([PartKind::Soil, PartKind::Model, PartKind::Backdrop]).collect();
         let mut numbers: Vec<u8> = all.iter().map(|kind| kind.number()).collect();
         numbers.sort_unstable();
         numbers.dedup();

@@ -50,6 +50,8 @@ pub enum Purpose {
     Lidar = 24,
     /// Light, exposure and sensor of a relit field, as a child of the streams of the field's own.
     Relight = 25,
+    /// Hedges and trees on the horizon.
+    Horizon = 26,
 }
 
 /// Addressed stream of random numbers.

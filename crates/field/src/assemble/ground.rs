@@ -10,7 +10,7 @@ use super::preview::CoverInputs;
 use super::terrain::{GROUND_MARGIN, tilted_to};
 use super::view::View;
 use super::view::VisibleGround;
-use super::{plausibility, sow, view};
+use super::{horizon, plausibility, sow, view};
 use crate::PartKind;
 use crate::layer::Layer;
 use crate::library::Library;
@@ -165,7 +165,11 @@ pub(super) fn site(drawn: &Drawn<'_>, view: View) -> Site {
     Site {
         area: view.near.grown(GROUND_MARGIN),
         grid_m: (2.5 * cells * pixel).clamp(8e-4, coarsest).max((view.near.area() / MOST_CELLS).sqrt()),
-        margin_m: if view.open { OPEN_REACH } else { GROUND_REACH + beyond(view) },
+        margin_m: if view.open {
+            horizon::reach(drawn).unwrap_or(0.0).max(OPEN_REACH)
+        } else {
+            GROUND_REACH + beyond(view)
+        },
         growth: if view.is_graded() { GROWTH_BY_PIXEL } else { GROWTH },
         level_m: if view.is_graded() { tilted_to(view.near) } else { f32::INFINITY },
         smallest_mm,

@@ -16,6 +16,7 @@ mod footprint;
 mod ground;
 mod ground_view;
 mod grown;
+mod horizon;
 mod identity;
 mod illumination;
 mod individual;
@@ -246,12 +247,15 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     let (species, models) = (known::species(&drawn, library)?, models::names(&drawn)?);
     known::number_kinds(&mut plants, &species);
     warnings.extend(plausibility::view(&drawn, &plants, sight.shown(&drawn)));
+    let horizon = horizon::drawn_of(&drawn);
+    let haze = horizon.map(|horizon| horizon.haze());
     let conditions = Conditions {
         camera: drawn.camera.record(),
         sensor: LightAddress { seed: drawn.seed, index: drawn.index, light: 0 }.sensor(&desc.sensor).record(),
         lights: lit.records,
         lighting: lit.lighting,
         soil,
+        horizon,
         crops: known::crop_records(&drawn, library)?,
         weeds: known::weed_records(&drawn, library)?,
         season: drawn.season,
@@ -260,7 +264,14 @@ fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Libr
     warnings.extend(library.warnings());
     let Contents { parts, kinds, materials } = parts;
     Ok(Field {
-        scene: Scene { parts, materials, lights: lit.lights, camera: drawn.camera, filter: desc.filter.footprint() },
+        scene: Scene {
+            parts,
+            materials,
+            lights: lit.lights,
+            haze,
+            camera: drawn.camera,
+            filter: desc.filter.footprint(),
+        },
         captures: drawn.captures,
         scanners: drawn.scanners,
         day: drawn.today.map(|today| today.day),

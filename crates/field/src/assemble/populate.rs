@@ -5,7 +5,7 @@ use super::drawn::{Drawn, Floor};
 use super::progress::Stage;
 use super::seedling::Seedling;
 use super::view::VisibleGround;
-use super::{identity, models, stand};
+use super::{horizon, identity, models, stand};
 use crate::PlantRecord;
 use crate::library::Library;
 use furrow_base::Result;
@@ -29,6 +29,9 @@ pub(super) fn populate(
     let mut parts = Contents::default();
     let mut plants = stand::plant(drawn, library, &mut parts, seedlings, floor, sight.shown(drawn))?;
     plants.extend(models::models(drawn, library, &mut parts, seedlings.len(), &ModelGround { floor, sight, stones })?);
+    if sight.view.open || !drawn.scanners.is_empty() {
+        horizon::plant(drawn, &mut parts, |p| floor.map_or(0.0, |floor| floor.height(p.x, p.y)))?;
+    }
     identity::settle(&mut plants);
     if floor.is_some() {
         drawn.options.progress.enter(Stage::Cover);

@@ -3,6 +3,7 @@
 use super::lighting::Lighting;
 use super::season::Season;
 use crate::desc::Detail;
+use crate::horizon::HorizonRecord;
 use furrow_grow::scatter::{RowsRecord, WeedsRecord};
 use furrow_grow::soil::SoilRecord;
 use furrow_optics::light::LightRecord;
@@ -37,6 +38,9 @@ pub struct Conditions {
     pub lighting: Vec<Lighting>,
     /// Ground; `None` if the scene file has none.
     pub soil: Option<SoilRecord>,
+    /// Hedge and haze beyond the field; left out if the scene file has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub horizon: Option<HorizonRecord>,
     /// Sown crops and models in rows, in the order of the scene file.
     pub crops: Vec<CropRecord>,
     /// Weeds and models sown by density, in the order of the scene file.

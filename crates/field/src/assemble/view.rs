@@ -51,7 +51,7 @@ pub(super) struct View {
     pub(super) area: Rect,
     /// Part of the area with uniform ground cells, clods and debris. All of it, unless detail is by pixel and much of the area is far away.
     pub(super) near: Rect,
-    /// Whether a camera sees ground beyond the area.
+    /// Whether a camera sees ground beyond the area, or the horizon.
     pub(super) open: bool,
 }
 
@@ -192,12 +192,14 @@ fn view_of(
     // Include the point below the camera: tall plants in front of the nearest visible ground may be in the image.
     let points = seen.iter().chain(&level).chain(&met).copied();
     each.push(GroundView::around(points.chain([below])));
+    // The horizon is built if a camera looks above it.
+    let open = drawn.desc.horizon.is_some() && !level.is_empty();
     if level.is_empty() && [lo, hi] == whole && !farther {
-        return Ok(View { area, near, open: false });
+        return Ok(View { area, near, open });
     }
     let (bare, farthest) = beyond(raster(camera).filter_map(|look| terrain.meets(look, 0.0)), area, below);
     if bare <= 0.0 {
-        return Ok(View { area, near, open: false });
+        return Ok(View { area, near, open });
     }
     let far = if level.is_empty() { format!("{farthest:.0} m away") } else { "to the horizon".into() };
     let words = format!(

@@ -328,7 +328,7 @@ mod tests {
         let pose = Pose::look_at(vec3(0.0, -1.0, 1.0), Vec3::ZERO).unwrap();
         let camera = Camera::new((8, 8), [8.0; 2], [4.0; 2], Distortion::default(), pose).unwrap();
         let materials = vec![Material::Plain(Bsdf::OrenNayar(OrenNayar::new(Spectrum::ONE, 0.0)))];
-        Scene { parts, materials, lights: Vec::new(), camera, filter: Filter::Box.footprint() }
+        Scene { parts, materials, lights: Vec::new(), haze: None, camera, filter: Filter::Box.footprint() }
     }
 
     /// Rationale: parts are grouped by a hash of their shared properties, in any order. Expected: one shape per plant,

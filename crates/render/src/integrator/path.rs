@@ -14,6 +14,7 @@ use super::roulette::RouletteSplitting;
 use super::trail::{Fleeting, KeptTrails, ScatteredRay, Trail, Trails};
 use super::vertex::Vertex;
 use super::{CameraSample, Integrator, Sample, World};
+use crate::scene::Haze;
 use furrow_base::geometry::{PACKET, Ray};
 use furrow_base::math::{RoundTo, Spectrum, ToInt, Vec3};
 use furrow_base::sampling::{Sampler, sets};
@@ -112,6 +113,18 @@ impl PathTracer {
             }
         }
         sum
+    }
+
+    /// Radiance at the camera of a surface of radiance `surface` at a distance, metres: haze attenuates it and adds light.
+    #[inline]
+    fn through_air(&self, world: &World<'_>, ray: &Ray, distance: f32, surface: Spectrum) -> Spectrum {
+        match &world.scene.haze {
+            None => surface,
+            Some(haze) => {
+                let sky = Ray { direction: Haze::horizontal(ray.direction), ..*ray };
+                haze.over(distance, surface, self.escaped(world, &sky, None))
+            }
+        }
     }
 
     /// Radiance of the lamps that a scattered ray hits before `end`. Lamps are visible only to scattered rays, not to
@@ -359,7 +372,9 @@ impl PathTracer {
             let (radiance, first) = match &seen[i] {
                 Some(first) => {
                     let indirect = self.indirect(world, first, &mut trails[i], &roulette, direct[i], narrow);
-                    (direct[i].found + indirect, Some(first.0.describe(distances[i])))
+                    let surface = direct[i].found + indirect;
+                    let seen = self.through_air(world, &sample.ray, distances[i], surface);
+                    (seen, Some(first.0.describe(distances[i])))
                 }
                 None => (self.escaped(world, &sample.ray, None), None),
             };

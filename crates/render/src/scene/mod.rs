@@ -1,5 +1,6 @@
 //! A scene: parts with materials and tags, lights, and a camera.
 
+mod haze;
 mod part;
 pub mod tag;
 
@@ -10,6 +11,7 @@ use furrow_optics::light::Light;
 use furrow_optics::sensor::Camera;
 use tag::Tag;
 
+pub use haze::Haze;
 pub use part::{Instance, Part};
 
 /// The scene of one field.
@@ -20,6 +22,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Light sources.
     pub lights: Vec<Light>,
+    /// Haze of the air; `None` for clear air.
+    pub haze: Option<Haze>,
     /// The camera.
     pub camera: Camera,
     /// Reconstruction filter of the pixels.
