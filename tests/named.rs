@@ -86,7 +86,7 @@ fn the_named_crop_decides_and_every_command_takes_it() {
         (std::fs::read(out.join("p.png")).unwrap(), described)
     };
     let (beet, described) = predicted("net", "beet", &["Beta vulgaris"]);
-    assert_eq!((described.crops, described.refine.name()), (vec!["sugar beet".to_owned()], "colour".into()));
+    assert_eq!((described.crops, described.refine.name()), (vec!["sugar beet".to_owned()], "colour,smooth".into()));
     assert_eq!(predicted("net", "beet-again", &["BEAVX"]).0, beet);
     assert_ne!(predicted("net", "weed", &["fat hen"]).0, beet);
     let (_, both) = predicted("net", "both", &["fat hen", "sugar beet"]);

@@ -159,11 +159,12 @@ impl ModelCard {
     }
 
     /// Returns the card of the ordinary network that these species, indices of [`Self::species`], give. It knows which crop is sown, so a
-    /// vote of connected plants and rows must not overrule it: of the refinement, colour remains.
+    /// vote of connected plants and rows must not overrule it: of the refinement, colour remains, with `smooth` for plants.
     #[must_use]
     pub fn of_crops(&self, crops: &[usize]) -> Self {
         let names = crops.iter().filter_map(|crop| self.species.get(*crop)).cloned().collect();
-        let refine = Refine { colour: self.refine.colour, ..Refine::default() };
+        let smooth = self.refine.plants || self.refine.smooth;
+        let refine = Refine { colour: self.refine.colour, smooth, ..Refine::default() };
         let mut card = Self { crops: names, species: Vec::new(), refine, ..self.clone() };
         card.parameters = card.trainable();
         card

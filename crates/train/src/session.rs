@@ -63,15 +63,16 @@ pub fn fit(
     train(plan, &[], begin, None, machine, folder, callbacks)
 }
 
-/// Like [`fit()`], from random or pretrained weights, for a network of the named crops: its model card lists them.
+/// Like [`fit()`], for a network of the named crops: its model card lists them.
 pub fn fit_crops(
     plan: &Plan,
     crops: &[String],
+    begin: Option<&Path>,
     machine: &Machine,
     folder: &Path,
     callbacks: &Callbacks<'_>,
 ) -> Result<Results> {
-    train(plan, crops, None, None, machine, folder, callbacks)
+    train(plan, crops, begin, None, machine, folder, callbacks)
 }
 
 /// Returns the run to start from. Its network, normalization, and numbers of bands and classes must be those of the plan.

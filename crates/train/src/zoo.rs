@@ -8,6 +8,9 @@ use furrow_base::input::shipped;
 use furrow_base::{Error, Result};
 use std::path::{Path, PathBuf};
 
+/// Name of the network for crops of any kind.
+pub const ANY_FIELD: &str = "any-field";
+
 /// A network that ships with the program.
 pub struct Shipped {
     /// Name: the name of its folder.

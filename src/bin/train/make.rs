@@ -124,7 +124,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     signals.release()?;
     let names: Vec<String> = make.crops.iter().map(|crop| crop.desc.name.clone()).collect();
     let results = fit::shown(plan.hyper.steps, args.quiet, signals, |callbacks| {
-        session::fit_crops(&plan, &names, &args.machine.machine(), &args.out, callbacks)
+        session::fit_crops(&plan, &names, make.recipe.begin(), &args.machine.machine(), &args.out, callbacks)
     })?;
     signals.release()?;
     make.tell(&format!("{}: {}", args.out.display(), fit::in_words(&results)));

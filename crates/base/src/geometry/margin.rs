@@ -7,9 +7,6 @@ use crate::math::{RoundTo, ToFloat, ToInt, Vec2};
 const ROWS: u32 = 192;
 
 /// Distances to the nearest transparent texel of a mask, sampled on a coarse grid.
-///
-/// Two-pass 5 × 5 chamfer distance transform (steps of 1, 1.4, 2.2), with an error of at most 2 %. Source: Borgefors
-/// 1986, "Distance transformations in digital images".
 #[derive(Clone, Debug, PartialEq)]
 pub struct Margin {
     width: usize,
@@ -26,16 +23,7 @@ impl Margin {
         let cells = |n: u32| (n.to_f32() / step).round_to::<usize>().max(1);
         let (width, height) = (cells(w), cells(h));
         let texel = |i: usize| ((i.to_f32() + 0.5) * step).trunc_to::<i32>();
-        let far = (width + height).to_f32();
-        let mut d: Vec<f32> = (0..width * height)
-            .map(|i| if mask.texel(texel(i % width), texel(i / width)) { far } else { 0.0 })
-            .collect();
-        for k in 0..width * height {
-            relax(&mut d, (width, height), k, 1);
-        }
-        for k in (0..width * height).rev() {
-            relax(&mut d, (width, height), k, -1);
-        }
+        let d = distances_inside((width, height), |i| mask.texel(texel(i % width), texel(i / width)));
         let distances = d.into_iter().map(|v| v / height.to_f32()).collect();
         Self { width, height, distances }
     }
@@ -56,6 +44,22 @@ impl Margin {
         let row = |y: f32| at(floor.x, y) * (1.0 - part.x) + at(floor.x + 1.0, y) * part.x;
         row(floor.y) * (1.0 - part.y) + row(floor.y + 1.0) * part.y
     }
+}
+
+/// Returns the distance of each cell of a grid from the nearest one that is not `inside`, in cells; cells beyond the border are not.
+///
+/// Two-pass 5 × 5 chamfer distance transform (steps of 1, 1.4, 2.2), with an error of at most 2 %. Source: Borgefors
+/// 1986, "Distance transformations in digital images".
+pub fn distances_inside((width, height): (usize, usize), inside: impl Fn(usize) -> bool) -> Vec<f32> {
+    let far = (width + height).to_f32();
+    let mut d: Vec<f32> = (0..width * height).map(|i| if inside(i) { far } else { 0.0 }).collect();
+    for k in 0..width * height {
+        relax(&mut d, (width, height), k, 1);
+    }
+    for k in (0..width * height).rev() {
+        relax(&mut d, (width, height), k, -1);
+    }
+    d
 }
 
 /// Relaxes cell `k` with the neighbours already visited in this pass. `way` is 1 for the forward pass, −1 for the

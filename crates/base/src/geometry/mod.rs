@@ -13,7 +13,7 @@ mod window;
 pub use alpha::{AlphaMask, Coverage};
 pub use cost::Cost;
 pub use interaction::Interaction;
-pub use margin::Margin;
+pub use margin::{Margin, distances_inside};
 pub use mesh::{JointWeights, Mesh};
 pub use placement::Placement;
 pub use ray::{Hit, Intersect, PACKET, Ray};

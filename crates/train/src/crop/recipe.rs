@@ -6,6 +6,7 @@
 use crate::data::{Pick, Selection};
 use crate::fit::{Plan, Settings};
 use crate::net::Network;
+use crate::zoo::ANY_FIELD;
 use furrow_base::Result;
 use furrow_base::math::ToFloat;
 use furrow_dataset::model::split::{Shares, Split};
@@ -76,7 +77,7 @@ impl Recipe {
             normalization: own("image"),
             logit_adjustment: Some(0.5),
             // The network knows the crop: rows and connected plants would overrule it.
-            refine: own("colour"),
+            refine: own("colour,smooth"),
             ..Settings::default()
         };
         if self.size == SIZE {
@@ -85,13 +86,18 @@ impl Recipe {
             settings.resize = own("480,640,960");
         }
         if self.network == NETWORK {
-            settings.pretrained = own("imagenet");
             settings.encoder_rate = Some(0.1);
         }
         let train = vec![Selection { pick: Some(Pick::Split(Split::Train)), ..Selection::of(data) }];
         let mut plan = Plan { network: self.network, train, precision: precision.into(), threads, ..Plan::default() };
         settings.apply(&mut plan).map_err(|invalid| invalid.of_flag())?;
         Ok(plan)
+    }
+
+    /// Returns the run whose weights the training starts from: the network for any field, which knows leaves and soils of many more images
+    /// than the recipe renders. `None` for a network of another kind, which starts from random weights.
+    pub fn begin(&self) -> Option<&'static Path> {
+        (self.network == NETWORK).then(|| Path::new(ANY_FIELD))
     }
 
     /// Returns the images that are held out for the evaluation of the dataset in the folder `data`.
@@ -125,8 +131,12 @@ mod tests {
             let test = (0..order.count).filter(|k| order.split.of(*k) == Split::Test).count();
             assert_eq!((train, test.to_u64()), (images, recipe.images - images.to_u64()));
             let plan = recipe.plan(Path::new("data"), "f32", 2).unwrap();
-            assert_eq!((plan.hyper.refine.name(), plan.hyper.resize.name()), ("colour".into(), "480,640,960".into()));
-            assert_eq!((plan.hyper.crop_size, plan.hyper.pretrained.name()), (Some(CROP), "imagenet".into()));
+            assert_eq!(
+                (plan.hyper.refine.name(), plan.hyper.resize.name()),
+                ("colour,smooth".into(), "480,640,960".into())
+            );
+            assert_eq!((plan.hyper.crop_size, plan.hyper.pretrained.name()), (Some(CROP), "none".into()));
+            assert!(recipe.begin().is_some());
         }
     }
 }

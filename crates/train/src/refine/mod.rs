@@ -6,6 +6,7 @@
 //! | step | rule |
 //! |---|---|
 //! | `colour` | pixels of similar colour tend to be of the same kind, plant or soil |
+//! | `smooth` | the class of a plant pixel follows from the plant pixels around it |
 //! | `plants` | connected plant pixels are of one class |
 //! | `rows` | crop rows and plant sizes also decide which plants are crop and which are weed |
 //! | `appearance` | plants of one field with similar appearance features tend to be of one class |
@@ -19,6 +20,7 @@ mod evidence;
 mod plants;
 mod rows;
 mod self_training;
+mod smooth;
 
 use super::data::Band;
 use furrow_base::math::ToInt;
@@ -35,6 +37,8 @@ pub use evidence::Evidence;
 pub struct Refine {
     /// Pixels of similar colour are moved towards the same kind, plant or soil.
     pub colour: bool,
+    /// The class of a plant pixel follows from the plant pixels around it; excludes `plants`.
+    pub smooth: bool,
     /// Connected plant pixels take one class.
     pub plants: bool,
     /// Rows and plant sizes decide together with the network which plants are crop and which are weed; needs `plants`.
@@ -65,10 +69,10 @@ impl Seen<'_> {
 }
 
 impl Refine {
-    /// Parses `none`, or a comma-separated list of `colour`, `plants`, `rows` and `appearance`. `rows` requires `plants`;
-    /// `appearance` requires `rows`.
+    /// Parses `none`, or a comma-separated list of `colour`, `smooth`, `plants`, `rows` and `appearance`. `rows` requires
+    /// `plants`; `appearance` requires `rows`; `smooth` excludes `plants`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let help = "write none, or a comma-separated list of colour, plants, rows and appearance";
+        let help = "write none, or a comma-separated list of colour, smooth, plants, rows and appearance";
         if text.trim() == "none" {
             return Ok(Self::default());
         }
@@ -76,6 +80,7 @@ impl Refine {
         for name in text.split(',').map(str::trim) {
             let step = match name {
                 "colour" => &mut refine.colour,
+                "smooth" => &mut refine.smooth,
                 "plants" => &mut refine.plants,
                 "rows" => &mut refine.rows,
                 "appearance" => &mut refine.appearance,
@@ -91,13 +96,21 @@ impl Refine {
         if refine.appearance && !refine.rows {
             return Err("appearance needs rows: write plants,rows,appearance".into());
         }
+        if refine.smooth && refine.plants {
+            return Err("smooth and plants both decide the class of plants: leave one out".into());
+        }
         Ok(refine)
     }
 
     /// Returns the steps in the syntax that [`Self::parse`] reads.
     pub fn name(self) -> String {
-        let names =
-            [(self.colour, "colour"), (self.plants, "plants"), (self.rows, "rows"), (self.appearance, "appearance")];
+        let names = [
+            (self.colour, "colour"),
+            (self.smooth, "smooth"),
+            (self.plants, "plants"),
+            (self.rows, "rows"),
+            (self.appearance, "appearance"),
+        ];
         let names: Vec<&str> = names.iter().filter(|(done, _)| *done).map(|(_, name)| *name).collect();
         if names.is_empty() { "none".into() } else { names.join(",") }
     }
@@ -141,8 +154,14 @@ impl Refine {
         Evidence { learnt_colours, row_score, ..found }
     }
 
-    /// Applies `plants`, `rows` and `appearance`. Returns the row score.
+    /// Applies `smooth`, or `plants`, `rows` and `appearance`. Returns the row score.
     fn vote(self, seen: &Seen<'_>, probabilities: &mut [f32], appearance: Option<&Appearance>) -> Option<f64> {
+        if self.smooth {
+            let n = seen.extent().0 * seen.extent().1;
+            let own = plants::classes(n, probabilities);
+            let won = smooth::classes(seen.extent(), &own, seen.finest.unwrap_or(probabilities));
+            plants::assign(n, probabilities, |at| (own[at] > 0).then(|| won[at]));
+        }
         if !self.plants {
             return None;
         }
@@ -212,6 +231,7 @@ mod tests {
             "plants,rows",
             "colour,plants,rows",
             "colour,plants,rows,appearance",
+            "colour,smooth",
         ] {
             assert_eq!(Refine::parse(text).unwrap().name(), text);
         }
@@ -227,6 +247,7 @@ mod tests {
             "colour,none",
             "colour,colour",
             "colour,plants,plants",
+            "smooth,plants",
         ] {
             assert!(Refine::parse(bad).is_err(), "{bad}");
         }

@@ -78,13 +78,19 @@ impl PlantRegions {
     /// highest plant probability of the pixel and the other plant classes 0, so that upscaling the map puts no third class between
     /// a plant and soil.
     pub(super) fn write(&self, probabilities: &mut [f32], won: impl Fn(usize, usize) -> usize) {
-        let n = self.size.0 * self.size.1;
-        for (at, region) in self.regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            let (own, won) = (best(at, n, probabilities), won(at, region.to_usize() - 1));
-            let highest = probabilities[own * n + at];
-            (1..self.classes)
-                .for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });
-        }
+        let labels = &self.regions.labels;
+        assign(self.size.0 * self.size.1, probabilities, |at| {
+            (labels[at] > 0).then(|| won(at, labels[at].to_usize() - 1))
+        });
+    }
+}
+
+/// Assigns each of `n` pixels the plant class that `won` returns, if any, as [`PlantRegions::write`] does.
+pub(super) fn assign(n: usize, probabilities: &mut [f32], won: impl Fn(usize) -> Option<usize>) {
+    let classes = probabilities.len() / n.max(1);
+    for (at, won) in (0..n).filter_map(|at| Some((at, won(at)?))) {
+        let highest = probabilities[best(at, n, probabilities) * n + at];
+        (1..classes).for_each(|class| probabilities[class * n + at] = if class == won { highest } else { 0.0 });
     }
 }
 
