@@ -310,10 +310,7 @@ fn a_robot_in_view_is_ignored() {
         plate("class: Soil, position_m: (0.03, 0)"),
         plate("name: \"dummy\", class: Weed, position_m: (0, 0.06)"),
     ];
-    let root = env!("CARGO_MANIFEST_DIR");
     let text = small_text().replacen("lights:", &format!("models: [{}], lights:", models.join(", ")), 1);
-    let text =
-        text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
     let (page, data) = (folder.join("page.ron"), folder.join("data"));
     fs::write(&page, text).unwrap();
     let make = |classes: &str| {

@@ -139,7 +139,7 @@ fn every_way_of_rendering_counts_the_same_samples() {
         }
         // If the number of samples varies between pixels, the fractions still sum to one.
         let open = Settings { spp: 256, ..settings };
-        let adaptive = render::adaptive(world, &path, &open, 0.1, None, watch).unwrap();
+        let adaptive = render::adaptive(world, &path, &open, 0.04, None, watch).unwrap();
         let (least, _, most) = adaptive.samples();
         assert!(least < most, "all tiles have {least} samples");
         for share in coverage(&adaptive, &scene.tags()) {

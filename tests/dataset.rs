@@ -134,7 +134,7 @@ fn what_is_of_all_images_is_checked_though_one_is_missing() {
     assert!(printed.contains("2 of 3 images checked") && printed.contains("; 0 faults"), "{printed}");
     assert!(printed.contains("1 of 3 images are missing: 1"), "{printed}");
     assert!(printed.contains("not checked: whether missing images are in two splits\n"), "{printed}");
-    let of_all = ["scene/tests/ref/small.ron", "plants.parquet"];
+    let of_all = ["scene/small.ron", "plants.parquet"];
     for name in of_all {
         fs::write(data.join(name), [&whole[name][..], b"\n"].concat()).unwrap();
     }
@@ -343,7 +343,7 @@ fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
     let whole = tree(&data);
     fs::write(around.join("secret.ron"), "a secret of this machine").unwrap();
     fs::copy("textures/soil/dirt.png", around.join("secret.png")).unwrap();
-    let scene = "scene/tests/ref/small.ron";
+    let scene = "scene/small.ron";
     let text = String::from_utf8(whole[scene].clone()).unwrap();
     let species = whole.keys().find(|name| name.ends_with("sugar_beet.ron")).unwrap();
     let named = |text: &str, ending: &str| {
@@ -357,13 +357,13 @@ fn the_scene_of_a_dataset_reads_nothing_outside_its_folder() {
     let replaced = |from: &str, to: &str| (scene, text.replace(&format!("\"{from}\""), &format!("\"{to}\"")));
     let placed = |model: &str| (scene, text.replacen("Field(", &format!("Field(models: [{model}], "), 1));
     let model = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nmtllib ";
-    fs::write(data.join("scene/tests/ref/a.obj"), format!("{model}../../../../secret.ron\n")).unwrap();
-    fs::write(data.join("scene/tests/ref/b.obj"), format!("{model}{absolute}\n")).unwrap();
+    fs::write(data.join("scene/a.obj"), format!("{model}../../secret.ron\n")).unwrap();
+    fs::write(data.join("scene/b.obj"), format!("{model}{absolute}\n")).unwrap();
     let forged = [
-        replaced(&beet, "../../../../secret.ron"),
+        replaced(&beet, "../../secret.ron"),
         replaced(&beet, absolute),
-        (species.as_str(), of_species.replacen(&named(&of_species, ".png"), "../../../../secret.png", 1)),
-        placed("(file: \"../../../../a.obj\", class: Weed)"),
+        (species.as_str(), of_species.replacen(&named(&of_species, ".png"), "../../../secret.png", 1)),
+        placed("(file: \"../../a.obj\", class: Weed)"),
         placed("(file: \"a.obj\", class: Weed)"),
         placed("(file: \"a.obj\", class: Weed, allow_outside: true)"),
         placed("(file: \"b.obj\", class: Weed, allow_outside: true)"),
@@ -564,9 +564,10 @@ fn feathery_leaves_are_no_fault_and_shifted_maps_are() {
         shifted.coverage[at] = share(((at % width).div_ceil(2) % 2) as u8);
     }
     assert!(message(&shifted));
-    // A shipped scene file whose leaves are much narrower than a pixel at this size.
+    // A weed whose leaves are much narrower than a pixel at this size.
     let coarse = path(&data).to_owned() + "-coarse";
-    let mut command = trace(&["dataset", "--scene", "scenes/any-field.ron", "--count", "3", "--spp", "1", "--quiet"]);
+    let mut command = trace(&["dataset", "--scene", SMALL, "--count", "2", "--spp", "1", "--quiet"]);
+    command.args(["--set", "weeds[0].species=tripleurospermum", "--set", "weeds[0].growth=AgeDays(40)"]);
     command.args(["--width", "64", "--height", "48", "--out", &coarse]);
     succeed(command);
 }
@@ -626,8 +627,8 @@ fn bad_input_is_refused_and_changes_nothing() {
     assert!(printed.contains("such as thesis.tex"), "{printed}");
     assert_eq!(tree(&full).len(), 1);
     // A scene file that was changed after the dataset was started.
-    let page = fs::read_to_string(data.join("scene/tests/ref/small.ron")).unwrap();
-    fs::write(data.join("scene/tests/ref/small.ron"), page.replace("elevation_deg: 45", "elevation_deg: 50")).unwrap();
+    let page = fs::read_to_string(data.join("scene/small.ron")).unwrap();
+    fs::write(data.join("scene/small.ron"), page.replace("elevation_deg: 45", "elevation_deg: 50")).unwrap();
     fs::remove_file(data.join("images/000001/rgb.png")).unwrap();
     let printed = fail(verb("render", &data, &[]), 2);
     assert!(printed.contains("was changed since the dataset was created"), "{printed}");

@@ -6,7 +6,7 @@
 //! partial file; TERM and USR1 give exit code 75. Source: none needed, equality is exact.
 
 use crate::common::dataset::{made, make, path, same, succeed, tree};
-use crate::common::program::{SMALL, scratch, trace};
+use crate::common::program::{PLANT, SMALL, scratch, trace};
 use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -55,7 +55,7 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     const COUNT: u64 = 3;
     let make = |data: &Path| {
         let mut command =
-            trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(data), "--spp", "1", "--width", "32"]);
+            trace(&["dataset", "--scene", PLANT, "--quiet", "--out", path(data), "--spp", "1", "--width", "32"]);
         command.args(["--count", &COUNT.to_string(), "--format", "imagefolder,coco", "--threads", "2"]);
         command
     };
@@ -65,7 +65,7 @@ fn two_that_make_one_dataset_at_once_make_what_one_makes() {
     let once = begin.elapsed();
     let whole = tree(&whole);
     let mut next = moments();
-    for pair in 0..16 {
+    for pair in 0..8 {
         let (_keep, data) = scratch();
         let start = || make(&data).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program");
         let first = start();

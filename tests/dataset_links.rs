@@ -77,7 +77,7 @@ fn a_folder_of_a_dataset_that_is_a_link_is_refused() {
     let (data, victim) = (around.join("data"), around.join("victim"));
     succeed(make(&data, 2, &[]));
     let whole = tree(&data);
-    let names = ["images", "images/000001", "seals", "ledger", "packs", "pushed", "scene", "scene/tests"];
+    let names = ["images", "images/000001", "seals", "ledger", "packs", "pushed", "scene", "scene/species"];
     for name in names.into_iter().chain(["imagefolder", "imagefolder/train", "imagefolder/train/images"]) {
         let linked = Linked::at(&data, name, &victim);
         linked.keeps(|| {

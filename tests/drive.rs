@@ -34,10 +34,7 @@ fn page(folder: &Path, name: &str, change: &dyn Fn(String) -> String) -> PathBuf
     let drive = "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), \
                  pose: Nadir(height_m: 0.45, at_m: (0.04, 0))))],\n    \
                  drive: (frames: 3, rate_hz: 10, path: Straight(heading_deg: 30, speed_m_s: 0.2), shake: (height_mm: 2, roll_deg: 0.5)),\n    lights:";
-    let root = env!("CARGO_MANIFEST_DIR");
     let text = small_text().replacen("lights:", drive, 1);
-    let text =
-        text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
     let path = folder.join(name);
     std::fs::write(&path, change(text)).unwrap();
     path

@@ -8,7 +8,7 @@
 
 use crate::common::dataset::{path, same, succeed, tree};
 use crate::common::faults::{self, Tree, as_nobody, each_is_gone_on_from, failed_well, misdate, open_to_all};
-use crate::common::program::{FILES, SMALL, names, scratch, trace};
+use crate::common::program::{FILES, PLANT, names, scratch, trace};
 use furrow_output::{ImageData, write_png};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ use std::process::Command;
 
 /// Returns the command that renders one small image.
 fn image(out: &Path, seed: &str) -> Command {
-    trace(&["--scene", SMALL, "--spp", "1", "--width", "24", "--quiet", "--seed", seed, "--out", path(out)])
+    trace(&["--scene", PLANT, "--spp", "1", "--width", "24", "--quiet", "--seed", seed, "--out", path(out)])
 }
 
 /// Expected: after any fault the old image is unchanged, and files already renamed are restored. If the disk fails
@@ -90,8 +90,7 @@ fn dataset(data: &Path, count: &str) -> Command {
 
 /// The same on several threads.
 fn dataset_on(data: &Path, count: &str, threads: &str) -> Command {
-    let mut command =
-        trace(&["dataset", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--out", path(data)]);
+    let mut command = trace(&["dataset", "--scene", PLANT, "--quiet", "--out", path(data)]);
     command.args(["--count", count, "--width", "32", "--spp", "1", "--threads", threads]);
     command
 }
@@ -173,7 +172,7 @@ fn a_panic_ends_a_dataset_or_stream_with_the_images_number() {
         is_whole(&there, &whole, &Tree::new(), &format!("reading {at}"));
         succeed(make(&out, "1"));
         same(&tree(&out), &whole);
-        let mut stream = trace(&["stream", "--scene", "tests/data/dataset/scene/field.ron", "--quiet", "--spp", "1"]);
+        let mut stream = trace(&["stream", "--scene", PLANT, "--quiet", "--spp", "1"]);
         stream.args(["--count", "4", "--width", "32", "--threads", threads]);
         in_streams += u32::from(message(&mut stream, at) == Some(true));
     }

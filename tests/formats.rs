@@ -27,9 +27,7 @@ static BARE: LazyLock<PathBuf> = LazyLock::new(|| {
     let text = small_text();
     let bare = text.lines().filter(|l| !["crops:", "weeds:", "plants:"].iter().any(|key| l.trim().starts_with(key)));
     let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("formats-bare.ron");
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("textures");
-    let text = bare.collect::<Vec<_>>().join("\n").replace("textures", root.to_str().unwrap());
-    std::fs::write(&page, text).unwrap();
+    std::fs::write(&page, bare.collect::<Vec<_>>().join("\n")).unwrap();
     dataset("formats-bare", &page, 3)
 });
 

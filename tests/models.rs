@@ -411,11 +411,7 @@ fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
     let (_keep, folder) = scratch();
     write(&folder, "square.obj", SQUARE);
     write(&folder, "square.mtl", "newmtl leaf\nKd 0.1 0.3 0.05\n");
-    let root = env!("CARGO_MANIFEST_DIR");
-    let text = small_text()
-        .replace("\"scenes/", &format!("\"{root}/scenes/"))
-        .replace("\"textures/", &format!("\"{root}/textures/"));
-    let text = text.trim_end().strip_suffix(')').unwrap().to_owned()
+    let text = small_text().trim_end().strip_suffix(')').unwrap().to_owned()
         + "models: [(file: \"square.obj\", up: Z, class: Weed, position_m: (0.05, -0.03), scale: 0.01)])";
     let page = write(&folder, "page.ron", text);
     let field =

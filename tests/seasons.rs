@@ -216,13 +216,10 @@ fn a_scene_file_without_days_is_of_the_day_that_its_crop_says() {
 /// Writes the small scene file, whose images render in a fraction of a second, with a second camera and two frames on
 /// each day.
 fn page(folder: &Path) -> PathBuf {
-    let root = env!("CARGO_MANIFEST_DIR");
     let more = "cameras: [(name: \"right\", camera: Pinhole(size: (96, 72), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 0.45, \
                 at_m: (0.04, 0))))], drive: (frames: 2, path: Straight(speed_m_s: 0.2)), days: (on: [9, 21]), lights:";
     let text = small_text().replacen("lights:", more, 1);
     let text = text.replace("growth:", "condition: (holes: 2, dust: 0.2, wilt: 0.3), growth:");
-    let text =
-        text.replace("\"textures/", &format!("\"{root}/textures/")).replace("\"scenes/", &format!("\"{root}/scenes/"));
     let path = folder.join("page.ron");
     std::fs::write(&path, text).unwrap();
     path

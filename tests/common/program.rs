@@ -15,13 +15,20 @@ use std::sync::atomic::AtomicBool;
 /// Scene file with a few plants on a square of soil.
 pub const SMALL: &str = "tests/ref/small.ron";
 
+/// Scene file with one plant, for tests of files and interruptions: an image takes a few percent of the time of the small scene's.
+pub const PLANT: &str = "tests/ref/plant.ron";
+
 /// Names of the output files of an image.
 pub const FILES: [&str; 7] =
     ["leaves.png", "nir.png", "overlay.png", "plants.png", "radiance.exr", "rgb.png", "semantics.png"];
 
-/// Text of the small scene file, with paths relative to the package.
+/// Text of the small scene file, with absolute paths.
 pub fn small_text() -> String {
-    std::fs::read_to_string(SMALL).expect("the small scene file").replace("../../", "")
+    let text = std::fs::read_to_string(SMALL).expect("the small scene file");
+    let folder = concat!("\"", env!("CARGO_MANIFEST_DIR"), "/tests/ref/");
+    ["species/", "textures/"]
+        .iter()
+        .fold(text, |text, below| text.replace(&format!("\"{below}"), &format!("{folder}{below}")))
 }
 
 /// Returns the command `trace` with these arguments.
