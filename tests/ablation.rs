@@ -25,10 +25,11 @@ use furrow_render::material::Material;
 use furrow_render::render::{self, LabelMap, RenderMonitor, Settings};
 use furrow_render::scene::Part;
 use furrow_render::settings::{Engine, Quality, RenderOptions};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 use std::process::Stdio;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Render options of the small field without an edit.
@@ -39,10 +40,17 @@ fn options() -> RenderOptions {
 /// Scene file with a field that contains everything the edits remove.
 const DRIVING: &str = "tests/ref/driving.ron";
 
-fn grow(edit: &Edit) -> Field {
+/// The field with an edit, grown once for all tests that ask for it.
+fn grow(edit: &Edit) -> Arc<Field> {
+    static ALL: LazyLock<Mutex<HashMap<&'static str, Arc<OnceLock<Arc<Field>>>>>> = LazyLock::new(Mutex::default);
+    let one = ALL.lock().expect("no test panics here").entry(edit.name).or_default().clone();
+    one.get_or_init(|| Arc::new(grow_on(edit, 2))).clone()
+}
+
+fn grow_on(edit: &Edit, threads: usize) -> Field {
     let options = Options { width: Some(72), ..Options::default() };
     let source = edit.open(Path::new(DRIVING), furrow_base::input::Scope::Anywhere).unwrap();
-    render::pool(2).unwrap().install(|| edit.field(&source, &options)).unwrap()
+    render::pool(threads).unwrap().install(|| edit.field(&source, &options)).unwrap()
 }
 
 /// Rendered outputs of a field.
