@@ -40,9 +40,12 @@ fn options() -> RenderOptions {
 /// Scene file with a field that contains everything the edits remove.
 const DRIVING: &str = "tests/ref/driving.ron";
 
+/// Fields by the names of their edits.
+type Fields = HashMap<&'static str, Arc<OnceLock<Arc<Field>>>>;
+
 /// The field with an edit, grown once for all tests that ask for it.
 fn grow(edit: &Edit) -> Arc<Field> {
-    static ALL: LazyLock<Mutex<HashMap<&'static str, Arc<OnceLock<Arc<Field>>>>>> = LazyLock::new(Mutex::default);
+    static ALL: LazyLock<Mutex<Fields>> = LazyLock::new(Mutex::default);
     let one = ALL.lock().expect("no test panics here").entry(edit.name).or_default().clone();
     one.get_or_init(|| Arc::new(grow_on(edit, 2))).clone()
 }

@@ -191,6 +191,9 @@ fn full_and_closed_streams_end_no_training_and_no_prediction() {
     assert!(out.join("000001.png").is_file());
 }
 
+/// Reads a file of the program in a folder.
+type Read<'a> = &'a dyn Fn(&Path) -> furrow::Result<()>;
+
 /// Rationale: files by which the program recognises a folder may be cut by a full disk or edited by hand, and a folder
 /// must not become a dead end. Expected: each is refused with exit code 2, its name and a help; after `train predict`
 /// was refused, the help of the message works: the same command with another --out.
@@ -211,7 +214,6 @@ fn damaged_files_of_the_program_are_refused_with_a_way_out() {
     let pictures = input_images::find(&[images("0..2").into()], &trained.card.input, &[]).expect("images");
     let claim = |folder: &Path| Prediction::claim(folder, &trained.card, None, &pictures).map(drop);
     let claim_plan = |folder: &Path| identity.claim(folder);
-    type Read<'a> = &'a dyn Fn(&Path) -> furrow::Result<()>;
     let files: [(&Path, &str, Read<'_>); 7] = [
         (&out, input_images::PREDICTION, &claim),
         (&RUN, run::PLAN, &claim_plan),
