@@ -359,7 +359,7 @@ fn an_impossible_folder_is_reported_first() {
     let message = text(&done.stderr);
     assert!(done.status.code() == Some(2) && message.contains("a symbolic link that leads to no file"), "{message}");
     let done = run(at, &["--scene", "page.ron", "--spp", "65536", "--out", "/proc/x"]);
-    assert_eq!(done.status.code(), Some(1), "{}", text(&done.stderr));
+    assert_eq!(done.status.code(), Some(2), "{}", text(&done.stderr));
 }
 
 fn full() -> Stdio {
