@@ -58,7 +58,7 @@
 //! | 7 | `furrow-output` | file formats |
 //! | 6 | `furrow-field` | scene file → scene |
 //! | 4 | `furrow-render` | `film`, `settings` · `material`, `accel` · `scene` · `integrator` · `render` · `raster` |
-//! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model` |
+//! | 4 | `furrow-grow` | `scatter` · `plant`, `soil`, `model`, `tree` |
 //! | 3 | `furrow-optics` | `optics` · `texture` · `bsdf`, `light`, `sensor` |
 //! | 2 | `furrow-report` | charts, tables, HTML pages |
 //! | 1 | `furrow-base` | `math`, `error`, `dispatch` · `supervise`, `shell` · `sampling`, `geometry`, `input`, `atomic_file` · `ron_file` |
