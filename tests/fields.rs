@@ -861,7 +861,7 @@ fn a_hedge_and_haze_end_the_view() {
     let both = seen.iter().filter(|tree| turned.contains(tree)).count();
     assert!(both > seen.len() / 2 && both < seen.len(), "{both} of {}", seen.len());
     assert_eq!((trees(&built(ahead, "")).len(), built(ahead, "").scene.haze), (0, None));
-    assert!(trees(&built("(0, 0.01, 0)", "horizon: ()")).is_empty());
+    assert!(trees(&built("(0, 0.01, 0)", "horizon: (distance_m: 250)")).is_empty());
     assert!(shown.scene.haze.is_some() && shown.conditions.horizon.is_some_and(|h| h.distance_m == 250.0));
     let near = assemble::field_of(&scene(ahead, "horizon: (distance_m: 100)"), &Options::default());
     let error = near.err().unwrap().to_string();

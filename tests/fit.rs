@@ -250,7 +250,7 @@ fn what_cannot_be_continued_is_reported() {
     bad[middle] ^= 1;
     for bytes in [&bad[..], &good[..1000], b""] {
         fs::write(&checkpoint, bytes).unwrap();
-        let error = refuse(&mut fit(&set, &out, more), 1);
+        let error = refuse(&mut fit(&set, &out, more), 2);
         assert!(
             error.contains("checkpoint.safetensors") && error.contains("damaged") && error.contains("delete the file"),
             "{error}"

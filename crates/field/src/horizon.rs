@@ -37,8 +37,8 @@ impl Bound for Range {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default, rename = "Horizon")]
 pub struct HorizonDesc {
-    /// Mean distance of the hedge from the world's origin, metres; it varies by a fifth around the field. It must be farther than
-    /// `reach_m`.
+    /// Mean distance of the hedge from the world's origin, metres; it varies by a fifth around the field. It must be more than 1.8
+    /// times `reach_m`, so that no shrub stands among the plants.
     #[schemars(extend("x-example" = "Uniform(120, 300)"))]
     pub distance_m: Vary<Away>,
     /// Height of each shrub of the hedge, metres.

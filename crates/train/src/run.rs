@@ -358,7 +358,10 @@ impl TrainedModel {
 /// Returns the results of the training in `folder`, or `None` if it is not complete.
 pub fn results(folder: &Path) -> Result<Option<Results>> {
     let path = folder.join(RESULT);
-    if path.exists() { read_json(&path).map(Some) } else { Ok(None) }
+    if !path.exists() {
+        return Ok(None);
+    }
+    read_json(&path).map(Some).map_err(|error: Error| error.help("delete it, and the same command trains again"))
 }
 
 /// Reads a JSON file that the program wrote into a folder of its own.

@@ -6,10 +6,11 @@
 use super::contents::Contents;
 use super::drawn::Drawn;
 use crate::PartKind;
+use crate::desc::FieldDesc;
 use crate::horizon::HorizonRecord;
 use furrow_base::geometry::{Mesh, Placement};
 use furrow_base::math::{Mat3, RoundTo, Spectrum, ToFloat, Vec2, Vec3};
-use furrow_base::ron_file::Step;
+use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_base::{Error, Result};
 use furrow_grow::tree::{Woody, WoodyPlant, woody};
@@ -54,6 +55,19 @@ pub(super) fn reach(drawn: &Drawn<'_>) -> Option<f32> {
     drawn_of(drawn).map(|horizon| 1.1 * WOODS * (1.0 + BAYS.0) * horizon.distance_m.to_f32())
 }
 
+/// Returns an error if the hedge may stand within the planted field.
+pub(super) fn check(page: &RonFile, desc: &FieldDesc) -> Result<()> {
+    let Some(horizon) = &desc.horizon else { return Ok(()) };
+    let nearest = (1.0 - BAYS.0) * horizon.distance_m.usual().0.to_f32();
+    let planted = SQRT_2 * desc.reach_m.f32();
+    if nearest > planted {
+        return Ok(());
+    }
+    let error = Error::input(format!("the hedge may be {nearest:.0} m away, within the planted field"))
+        .help(format!("write distance_m above {:.0}, or a smaller reach_m", (planted / (1.0 - BAYS.0)).ceil()));
+    Err(page.blame(&[Step::Field("horizon"), Step::Field("distance_m")], error))
+}
+
 /// A ring of plants of one kind.
 struct Ring {
     number: u64,
@@ -69,13 +83,6 @@ struct Ring {
 /// Adds hedge, trees and woods to the parts. `height` returns the height of the ground.
 pub(super) fn plant(drawn: &Drawn<'_>, parts: &mut Contents, height: impl Fn(Vec2) -> f32) -> Result<()> {
     let Some((desc, horizon)) = drawn.desc.horizon.as_ref().zip(drawn_of(drawn)) else { return Ok(()) };
-    let nearest = (1.0 - BAYS.0) * desc.distance_m.usual().0.to_f32();
-    let planted = SQRT_2 * drawn.desc.reach_m.f32();
-    if nearest <= planted {
-        let error = Error::input(format!("the hedge may be {nearest:.0} m away, within the planted field"))
-            .help(format!("write distance_m above {:.0}, or a smaller reach_m", planted / (1.0 - BAYS.0)));
-        return Err(drawn.page.blame(&[Step::Field("horizon"), Step::Field("distance_m")], error));
-    }
     let distance = horizon.distance_m.to_f32();
     let (shrub, tree) = (middle(desc.hedge_m.usual()), middle(desc.tree_m.usual()));
     let ring = |number, kind, radius, apart, cover| Ring { number, kind, radius, apart, cover };
