@@ -1,10 +1,15 @@
 //! What stands beyond the field, and the air before it: description and drawn values.
 
 use furrow_base::math::ToFloat;
-use furrow_base::ron_file::{Bound, Fraction, Num, Positive, Vary};
+use furrow_base::ron_file::{Bound, Fraction, Num, Positive, RonFile, Step, Vary};
 use furrow_base::sampling::{Purpose, Stream};
+use furrow_base::{Error, Result};
 use furrow_render::scene::Haze;
 use serde::{Deserialize, Serialize};
+use std::f32::consts::SQRT_2;
+
+/// Relative variation of the distance of hedge and woods around the field.
+pub(crate) const BAY_DEPTH: f32 = 0.2;
 
 /// Allowed distance of a hedge, metres: beyond the nearest plants, and within the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +78,18 @@ pub struct HorizonRecord {
 }
 
 impl HorizonDesc {
+    /// Returns an error if the hedge may stand within the field, which is planted up to `reach_m` metres in four directions.
+    pub(crate) fn check(&self, page: &RonFile, reach_m: f32) -> Result<()> {
+        let nearest = (1.0 - BAY_DEPTH) * self.distance_m.usual().0.to_f32();
+        let planted = SQRT_2 * reach_m;
+        if nearest > planted {
+            return Ok(());
+        }
+        let error = Error::input(format!("the hedge may be {nearest:.0} m away, within the planted field"))
+            .help(format!("write distance_m above {:.0}, or a smaller reach_m", (planted / (1.0 - BAY_DEPTH)).ceil()));
+        Err(page.blame(&[Step::Field("horizon"), Step::Field("distance_m")], error))
+    }
+
     /// Draws distance and haze of a field from the stream of its horizon.
     pub fn draw(&self, stream: &Stream) -> HorizonRecord {
         HorizonRecord {

@@ -6,7 +6,7 @@ use super::field_day::FieldDay;
 use super::illumination::{DrawnLights, LightAddress};
 use super::options::Options;
 use super::season::Season;
-use super::{horizon, lidar, rig, seed_rows};
+use super::{lidar, rig, seed_rows};
 use crate::desc::FieldDesc;
 use crate::drive::Capture;
 use crate::estimate::usual_memory;
@@ -77,7 +77,9 @@ impl<'a> Drawn<'a> {
         library: &mut Library,
     ) -> Result<(Self, DrawnLights, Vec<String>)> {
         library.counted.begin(options.memory);
-        horizon::check(page, desc)?;
+        if let Some(horizon) = &desc.horizon {
+            horizon.check(page, desc.reach_m.f32())?;
+        }
         let (seed, index) = (options.seed.unwrap_or(desc.seed), options.index);
         let mut stream = Stream::of(seed, index, Purpose::Page, 0);
         let camera = rig::first(page, desc, library, (options.width, options.height), &mut stream)?;

@@ -6,24 +6,22 @@
 use super::contents::Contents;
 use super::drawn::Drawn;
 use crate::PartKind;
-use crate::desc::FieldDesc;
-use crate::horizon::HorizonRecord;
+use crate::horizon::{BAY_DEPTH, HorizonRecord};
+use furrow_base::Result;
 use furrow_base::geometry::{Mesh, Placement};
 use furrow_base::math::{Mat3, RoundTo, Spectrum, ToFloat, Vec2, Vec3};
-use furrow_base::ron_file::{RonFile, Step};
 use furrow_base::sampling::{Purpose, Stream};
-use furrow_base::{Error, Result};
 use furrow_grow::tree::{Woody, WoodyPlant, woody};
 use furrow_optics::sensor::Camera;
 use furrow_optics::texture::noise::Perlin;
 use furrow_render::material::{LeafDesc, LeafMaterial, Material, Solid};
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Instance, Part};
-use std::f32::consts::{SQRT_2, TAU};
+use std::f32::consts::TAU;
 use std::sync::Arc;
 
-/// Relative variation of a ring's radius, and its number of bays around the field.
-const BAYS: (f32, f32) = (0.2, 5.0);
+/// Number of bays of a ring around the field.
+const BAYS: f32 = 5.0;
 /// Distance of the woods relative to that of the hedge.
 const WOODS: f32 = 1.8;
 /// Spacing of plants in a ring relative to their mean height: shrubs touch, crowns of trees overlap.
@@ -52,20 +50,7 @@ pub(super) fn drawn_of(drawn: &Drawn<'_>) -> Option<HorizonRecord> {
 
 /// Returns the distance from the world's origin beyond which nothing stands, metres; `None` without a horizon.
 pub(super) fn reach(drawn: &Drawn<'_>) -> Option<f32> {
-    drawn_of(drawn).map(|horizon| 1.1 * WOODS * (1.0 + BAYS.0) * horizon.distance_m.to_f32())
-}
-
-/// Returns an error if the hedge may stand within the planted field.
-pub(super) fn check(page: &RonFile, desc: &FieldDesc) -> Result<()> {
-    let Some(horizon) = &desc.horizon else { return Ok(()) };
-    let nearest = (1.0 - BAYS.0) * horizon.distance_m.usual().0.to_f32();
-    let planted = SQRT_2 * desc.reach_m.f32();
-    if nearest > planted {
-        return Ok(());
-    }
-    let error = Error::input(format!("the hedge may be {nearest:.0} m away, within the planted field"))
-        .help(format!("write distance_m above {:.0}, or a smaller reach_m", (planted / (1.0 - BAYS.0)).ceil()));
-    Err(page.blame(&[Step::Field("horizon"), Step::Field("distance_m")], error))
+    drawn_of(drawn).map(|horizon| 1.1 * WOODS * (1.0 + BAY_DEPTH) * horizon.distance_m.to_f32())
 }
 
 /// A ring of plants of one kind.
@@ -175,7 +160,7 @@ fn slots(ring: &Ring, of: &Stream) -> Vec<Slot> {
         let of = of.child(Purpose::Plant, (u64::from(k) << 8) | 0xff);
         let around = (k.to_f32() + of.child(Purpose::Scatter, 0).uniform32()) * TAU / count.to_f32();
         let depth = of.child(Purpose::Scatter, 1).range32(-0.5, 0.5) * ring.apart;
-        let radius = ring.radius * (1.0 + BAYS.0 * circle(&bays, around, BAYS.1 / TAU)) + depth;
+        let radius = ring.radius * (1.0 + BAY_DEPTH * circle(&bays, around, BAYS / TAU)) + depth;
         (circle(&groups, around, ring.radius / GROUP_M), Slot { at: Vec2::from_angle(around) * radius, of })
     };
     let mut slots: Vec<(f32, Slot)> = (0..count).map(slot).collect();
