@@ -69,6 +69,8 @@ const ALLOWED: &[(&str, &str)] = &[
     ("clap", "bin/ cli/mod.rs train/fit/settings.rs reference/manual.rs"),
     // Checksums of TensorBoard records.
     ("crc32c", "train/fit/log/events.rs"),
+    // Checksums at the end of PNG files.
+    ("crc32fast", "texture/png_end.rs"),
     // Tables: measured spectra (input), bounding boxes of plants and report figures (output).
     (
         "csv",

@@ -1,4 +1,4 @@
-//! What stands beyond the field, and the air before it: description and drawn values.
+//! Hedges and trees beyond the field, and the haze before them: description and drawn values.
 
 use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Bound, Fraction, Num, Positive, RonFile, Step, Vary};

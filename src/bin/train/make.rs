@@ -15,7 +15,6 @@ use furrow_job::Threads;
 use furrow_output::write_atomically;
 use furrow_report::{count, number};
 use furrow_train::crop::{Recipe, Species, scene};
-use furrow_train::deploy::guard;
 use furrow_train::deploy::input_images::{self, InputImage, PREDICTION, Prediction, files};
 use furrow_train::ensemble::Ensemble;
 use furrow_train::fit::Plan;
@@ -24,6 +23,7 @@ use furrow_train::net::Network;
 use furrow_train::run::{self, Identity};
 use furrow_train::session;
 use furrow_train::torch::{Precision, device};
+use furrow_train::zoo::ANY_FIELD;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -324,7 +324,7 @@ impl<'a> Make<'a> {
         let lead = match &described.implausible {
             None => format!("Predictions of a network for {names}."),
             Some(found) => {
-                folders.push((format!("network {}", guard::OTHER), out.join(&found.beside)));
+                folders.push((format!("network {ANY_FIELD}"), out.join(&found.beside)));
                 found.warning(&trained.card)
             }
         };

@@ -8,11 +8,12 @@ use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
 use furrow_train::crop::with_crops;
 use furrow_train::data::Band;
-use furrow_train::deploy::guard::{self, Implausible};
+use furrow_train::deploy::guard::Implausible;
 use furrow_train::deploy::input_images::{self, InputImage, Prediction};
 use furrow_train::deploy::predict::{self, Options, Predictions};
 use furrow_train::ensemble::Ensemble;
 use furrow_train::refine::Evidence;
+use furrow_train::zoo::ANY_FIELD;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
@@ -105,7 +106,7 @@ impl Job<'_> {
         let Some(found) = found else { return Ok(paths) };
         furrow_cli::message!("warning: {}", found.warning(&trained.card));
         Prediction::note(out, &found)?;
-        let other = Ensemble::open(Path::new(guard::OTHER))?;
+        let other = Ensemble::open(Path::new(ANY_FIELD))?;
         let pictures = input_images::find(self.images, &other.card.input, &[])?;
         let beside = Job { bands: &[], pixel_mm: None, ..*self };
         let predicted = beside.predict(&other, &pictures, &out.join(&found.beside))?;

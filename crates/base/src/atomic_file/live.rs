@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
-/// Names that may exist. Renamed and removed ones are only sorted out when there are many.
+/// Names that may exist. Renamed and removed ones stay listed until there are many.
 struct Live {
     names: BTreeSet<PathBuf>,
-    /// Number of names at which those that do not exist any more are sorted out.
+    /// Number of names above which the list is freed of files that no longer exist.
     most: usize,
 }
 

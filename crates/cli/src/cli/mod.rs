@@ -156,8 +156,8 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     })
 }
 
-/// Help for a folder in which no file can be created.
-const WRITABLE: &str = "give --out a folder in which you may write, or change its permissions";
+/// Help for a folder that takes no files.
+const WRITABLE: &str = "give another --out, or change the permissions of this folder";
 
 /// Checks that the file name is not too long for the file system.
 fn check_length(file: &Path) -> Result<()> {

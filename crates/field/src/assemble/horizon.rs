@@ -1,7 +1,7 @@
 //! Plants the hedge, its trees and the woods behind it around a field.
 //!
-//! Both are rings of slots around the world's origin. What stands in a slot follows from the slot's own random stream, so it does not depend
-//! on the camera; what no camera sees is left out. All are instances of a few shapes.
+//! Both are rings of slots around the world's origin. The plant of a slot follows from the slot's own random stream, so it does not depend
+//! on the camera; plants that no camera sees are left out. All are instances of a few shapes.
 
 use super::contents::Contents;
 use super::drawn::Drawn;

@@ -2,8 +2,8 @@
 //!
 //! A picture is returned as viewers show it, turned by its EXIF orientation. Models are the exception: their texture
 //! coordinates refer to the pixels as stored. Colour profiles are not applied. Refused, with the reason: other formats,
-//! JPEG files without their end (decoders fill the rest with grey), PNG files with a damaged end, JPEG files in CMYK, and pictures above the limits.
-//! Source: ITU-T T.81, annex B (JPEG segments).
+//! JPEG files without their end (decoders fill the rest with grey), PNG files with a damaged end, JPEG files in CMYK,
+//! and pictures above the limits. Source: ITU-T T.81, annex B (JPEG segments).
 
 use super::orientation::orientation;
 use super::png_end;

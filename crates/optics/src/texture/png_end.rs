@@ -34,29 +34,7 @@ fn split(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 
 /// Returns `true` if a chunk has its checksum.
 fn is_whole(chunk: &[u8]) -> bool {
-    chunk.split_last_chunk::<4>().is_some_and(|(data, sum)| crc(data) == u32::from_be_bytes(*sum))
-}
-
-/// CRC-32 of each byte.
-const TABLE: [u32; 256] = {
-    let mut table = [0; 256];
-    let mut byte = 0_u32;
-    while byte < 256 {
-        let (mut sum, mut bit) = (byte, 0);
-        while bit < 8 {
-            sum = if sum & 1 == 1 { 0xedb8_8320 ^ (sum >> 1) } else { sum >> 1 };
-            bit += 1;
-        }
-        table[byte as usize] = sum;
-        byte += 1;
-    }
-    table
-};
-
-/// Returns the CRC-32 of bytes.
-fn crc(bytes: &[u8]) -> u32 {
-    let step = |sum: u32, byte: &u8| TABLE[usize::from(sum.to_le_bytes()[0] ^ byte)] ^ (sum >> 8);
-    !bytes.iter().fold(u32::MAX, step)
+    chunk.split_last_chunk::<4>().is_some_and(|(data, sum)| crc32fast::hash(data) == u32::from_be_bytes(*sum))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! table of one per cent of crop would take it for a result.
 
 use crate::run::ModelCard;
+use crate::zoo::ANY_FIELD;
 use furrow_base::math::ToFloat;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +13,6 @@ use serde::{Deserialize, Serialize};
 pub const LEAST_CROP: f64 = 0.05;
 /// Smallest fraction of vegetation among all pixels for this check: with less, there may be no crop yet.
 pub const LEAST_VEGETATION: f64 = 0.005;
-/// Network whose predictions are given beside implausible ones: it ships, and knows no crop in particular.
-pub const OTHER: &str = "any-field";
 
 /// An implausible result for a set of photographs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +39,7 @@ impl Implausible {
         let vegetation = plants.to_f64() / all.max(1).to_f64();
         let crop_of_vegetation = pixels.get(crop)?.to_f64() / plants.max(1).to_f64();
         let found = vegetation >= LEAST_VEGETATION && crop_of_vegetation < LEAST_CROP;
-        found.then(|| Self { crop_of_vegetation, vegetation, beside: OTHER.into() })
+        found.then(|| Self { crop_of_vegetation, vegetation, beside: ANY_FIELD.into() })
     }
 
     /// Returns the warning for the user.

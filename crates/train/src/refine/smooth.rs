@@ -2,8 +2,8 @@
 //!
 //! The probabilities of each plant class are summed over the plant pixels around with Gaussian weights, and the largest sum decides. The
 //! standard deviation is [`WIDTHS`] times the mean distance of plant pixels from soil, which is about a quarter of the width of a leaf.
-//! A leaf thus becomes of one class, as with `plants`, but plants that touch keep their own, and a network that is sure of its crop is
-//! overruled by its own neighbouring pixels alone.
+//! All pixels of a leaf thus take one class, as with `plants`, but touching plants keep different classes, and only the network's own
+//! neighbouring pixels overrule it.
 
 use furrow_base::geometry::distances_inside;
 use furrow_base::math::{RoundTo, ToFloat};
@@ -27,8 +27,8 @@ pub(super) fn classes((width, height): (usize, usize), own: &[u8], probabilities
         sums
     };
     let mut best = vec![1; n];
-    let mut most = sums(1);
-    for class in 2..probabilities.len() / n.max(1) {
+    let mut most = vec![0.0; n];
+    for class in 1..probabilities.len() / n.max(1) {
         for ((best, most), sum) in best.iter_mut().zip(&mut most).zip(sums(class)) {
             if sum > *most {
                 (*best, *most) = (class, sum);
@@ -85,7 +85,7 @@ mod tests {
     /// Expected: on a leaf, a minority of wrong pixels takes the class of the rest; two leaves of different class that touch keep theirs
     /// but for a strip along their border, though one is larger; soil pixels do not count.
     #[test]
-    fn a_leaf_becomes_of_one_class_and_a_touching_one_keeps_its_own() {
+    fn a_leaf_takes_one_class_and_a_touching_one_keeps_its_own() {
         let size = (120, 40);
         // Two leaves side by side: columns 0 to 79 crop, 80 to 119 weed, rows 10 to 29; every fifth pixel is wrong.
         let leaf = |at: usize| (10..30).contains(&(at / 120)).then_some(if at % 120 < 80 { 1 } else { 2 });
