@@ -5,7 +5,7 @@
 //! same command ends with the bytes of an uninterrupted run and no extra file; a full disk gives one clear error and no
 //! partial file; TERM and USR1 give exit code 75. Source: none needed, equality is exact.
 
-use crate::common::dataset::{made, make, path, same, succeed, tree};
+use crate::common::dataset::{made, make, make_plants, path, same, succeed, tree};
 use crate::common::program::{PLANT, SMALL, scratch, trace};
 use std::io::Read;
 use std::path::Path;
@@ -25,17 +25,18 @@ fn moments() -> impl FnMut() -> u64 {
 
 #[test]
 fn killed_twenty_times_it_ends_as_if_never_killed() {
-    const COUNT: u64 = 8;
+    // More images than twenty killed runs complete: each makes one or two at most.
+    const COUNT: u64 = 24;
     let (_keep, whole) = scratch();
     let (_keep, data) = scratch();
     let begin = Instant::now();
-    succeed(make(&whole, COUNT, &[]));
+    succeed(make_plants(&whole, COUNT, &[]));
     let once = begin.elapsed();
     let mut next = moments();
     let mut alive = 0;
     for _ in 0..20 {
         let mut child =
-            make(&data, COUNT, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
+            make_plants(&data, COUNT, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
         // Within the first quarter of a full run, so that many kills hit a working program.
         std::thread::sleep(once.mul_f64(0.25 * (next() % 1000) as f64 / 1000.0));
         alive += u32::from(child.try_wait().expect("a child").is_none());
@@ -43,7 +44,7 @@ fn killed_twenty_times_it_ends_as_if_never_killed() {
         child.wait().expect("an end");
     }
     assert!(alive > 10, "{alive} of 20 kills hit a running program: too few");
-    succeed(make(&data, COUNT, &[]));
+    succeed(make_plants(&data, COUNT, &[]));
     same(&tree(&data), &tree(&whole));
     assert!(made(&data).len() as u64 >= COUNT);
 }

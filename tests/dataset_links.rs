@@ -5,8 +5,8 @@
 //! appears later is an error at the moment of writing; the target folder keeps every byte. Links to the dataset's own
 //! folder, and links that the user made on purpose, change nothing.
 
-use crate::common::dataset::{fail, make, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, scratch, trace};
+use crate::common::dataset::{fail, make_plants, path, same, succeed, tree, verb};
+use crate::common::program::{PLANT, scratch, trace};
 use furrow_base::Result;
 use furrow_dataset::check::verify;
 use furrow_dataset::check::verify::Rerender;
@@ -75,7 +75,7 @@ fn refused(command: Command, name: &str) {
 fn a_folder_of_a_dataset_that_is_a_link_is_refused() {
     let (_keep, around) = scratch();
     let (data, victim) = (around.join("data"), around.join("victim"));
-    succeed(make(&data, 2, &[]));
+    succeed(make_plants(&data, 2, &[]));
     let whole = tree(&data);
     let names = ["images", "images/000001", "seals", "ledger", "packs", "pushed", "scene", "scene/species"];
     for name in names.into_iter().chain(["imagefolder", "imagefolder/train", "imagefolder/train/images"]) {
@@ -85,7 +85,7 @@ fn a_folder_of_a_dataset_that_is_a_link_is_refused() {
             refused(verb("render", &data, &[]), name);
             refused(verb("finish", &data, &[]), name);
             refused(verb("finish", &data, &["--format", "phenobench"]), name);
-            refused(make(&data, 3, &[]), name);
+            refused(make_plants(&data, 3, &[]), name);
         });
         linked.undo();
         same(&tree(&data), &whole);
@@ -107,7 +107,7 @@ fn links_to_a_dataset_and_the_users_own_change_nothing() {
     let (data, name, mine) = (around.join("data"), around.join("name"), around.join("mine"));
     fs::create_dir_all(&data).unwrap();
     symlink(&data, &name).unwrap();
-    succeed(make(&name, 2, &[]));
+    succeed(make_plants(&name, 2, &[]));
     let whole = tree(&data);
     fs::create_dir(&mine).unwrap();
     fs::write(mine.join("page.html"), "the user's").unwrap();
@@ -144,7 +144,7 @@ fn fails<T: std::fmt::Debug>(done: Result<T>, name: &str) {
 fn a_link_that_appears_later_is_not_followed() {
     let (_keep, around) = scratch();
     let (data, victim) = (around.join("data"), around.join("victim"));
-    succeed(make(&data, 2, &[]));
+    succeed(make_plants(&data, 2, &[]));
     for name in ["images", "images/000001", "seals", "ledger", "imagefolder", "imagefolder/train"] {
         fs::remove_file(data.join("seals/000001.json")).unwrap();
         let set = Set::open(&data).unwrap();
@@ -172,7 +172,7 @@ fn a_link_that_appears_later_is_not_followed() {
 fn nothing_is_cleared_away_behind_a_link() {
     let (_keep, around) = scratch();
     let (data, victim) = (around.join("data"), around.join("victim"));
-    let mut make = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "4"]);
+    let mut make = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "4"]);
     make.args(["--pack", "2", "--split", "1,0,0", "--out", path(&data)]);
     succeed(make);
     let set = Set::open(&data).unwrap();

@@ -6,7 +6,7 @@
 //! dataset.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::program::{PLANT, SMALL, names, scratch, trace};
 use crate::common::python::python;
 use furrow_compare::{Pairs, gap};
 use furrow_dataset::Set;
@@ -29,9 +29,14 @@ const FORMATS: &str = "cityscapes,coco,cropandweed,mots,panoptic,phenobench,voc,
 /// Classes that `species.png` distinguishes.
 const CLASSES: [&str; 2] = ["--classes", "soil; beet=BEAVX; weed"];
 
-/// Returns the command that generates `count` small images.
+/// Returns the command that generates `count` small images of one plant.
 fn make(folder: &Path, count: u64, more: &[&str]) -> Command {
-    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--out", path(folder)]);
+    make_of(PLANT, folder, count, more)
+}
+
+/// The same for another scene file.
+fn make_of(scene: &str, folder: &Path, count: u64, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", scene, "--quiet", "--out", path(folder)]);
     command.args(["--count", &count.to_string(), "--width", "96", "--spp", "2", "--split", "2,1,1"]).args(more);
     command
 }
@@ -59,8 +64,8 @@ fn photographs_and_classes_alone_are_as_good_as_all_maps() {
     let [full, bare, early] = ["full", "bare", "early"].map(|name| base.join(name));
     let formats = format!("{FORMATS},imagefolder");
     let asked = [&["--format", &formats][..], &CLASSES].concat();
-    succeed(make(&full, 4, &[&["--keep", "none"][..], &asked].concat()));
-    succeed(make(&bare, 4, &["--keep", "rgb,semantics"]));
+    succeed(make_of(SMALL, &full, 4, &[&["--keep", "none"][..], &asked].concat()));
+    succeed(make_of(SMALL, &bare, 4, &["--keep", "rgb,semantics"]));
     assert_eq!(names(&bare.join("images/000000")), ["record.json", "rgb.png", "semantics.png"]);
     verify(&bare);
     let left_out = |name: &str| ["species.png", "plants.png", "leaves.png"].iter().any(|map| name.ends_with(map));
@@ -94,7 +99,7 @@ fn photographs_and_classes_alone_are_as_good_as_all_maps() {
     let report = fs::read_to_string(bare.join("report.html")).expect("a report");
     assert!(report.contains("semantics.png") && !report.contains("plants.png") && !report.contains("leaves.png"));
     // The same requested from the start; and the output of `status`.
-    succeed(make(&early, 4, &[&["--keep", "semantics,rgb"][..], &asked].concat()));
+    succeed(make_of(SMALL, &early, 4, &[&["--keep", "semantics,rgb"][..], &asked].concat()));
     same(&tree(&early), &tree(&bare));
     let printed = String::from_utf8_lossy(&succeed(verb("status", &bare, &[])).stdout).into_owned();
     assert!(printed.contains("4 of 4 images"), "{printed}");
@@ -147,7 +152,7 @@ fn a_dataset_goes_on_with_the_maps_that_it_has() {
 fn labels_alone_may_be_classes_alone() {
     let (_keep, data) = scratch();
     let make = |keep: &str| {
-        let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "96", "--count", "2"]);
+        let mut command = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "96", "--count", "2"]);
         command.args(["--labels-only", "--keep", keep, "--out", path(&data)]);
         command
     };

@@ -9,7 +9,7 @@
 //! `webdataset`, `datasets`, pandas, polars and DuckDB as readers.
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, names, scratch, trace};
+use crate::common::program::{PLANT, SMALL, names, scratch, trace};
 use crate::common::python::{ask, python, torch_with};
 use furrow_compare::gap;
 use furrow_dataset::Set;
@@ -25,9 +25,14 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Returns the command for a dataset of tiny images in packs of four.
+/// Returns the command for a dataset of tiny images of one plant in packs of four.
 fn packed(folder: &Path, count: u64, more: &[&str]) -> Command {
-    let mut command = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--out"]);
+    packed_of(PLANT, folder, count, more)
+}
+
+/// The same for another scene file, for tests of what images show.
+fn packed_of(scene: &str, folder: &Path, count: u64, more: &[&str]) -> Command {
+    let mut command = trace(&["dataset", "--scene", scene, "--quiet", "--width", "48", "--spp", "1", "--out"]);
     command.arg(folder).args(["--count", &count.to_string(), "--pack", "4", "--split", "3,1,0"]).args(more);
     command
 }
@@ -55,7 +60,7 @@ fn archives_hold_the_files_of_the_folders() {
     let (_keep, data) = scratch();
     let (_keep, folders) = scratch();
     succeed(packed(&data, 9, &["--format", "coco"]));
-    let mut plain = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "9"]);
+    let mut plain = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "9"]);
     plain.args(["--split", "3,1,0", "--format", "coco", "--out"]).arg(&folders);
     succeed(plain);
     let image =
@@ -76,7 +81,7 @@ fn archives_hold_the_files_of_the_folders() {
     let message = String::from_utf8_lossy(&succeed(verb("status", &data, &[])).stdout).into_owned();
     assert!(message.contains("9 of 9 images"), "{message}");
     // An archive has the bytes that `trace stream` writes for these images.
-    let mut stream = trace(&["stream", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--split", "3,1,0"]);
+    let mut stream = trace(&["stream", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--split", "3,1,0"]);
     stream.args(["--count", "3"]);
     let stream = succeed(stream).stdout;
     let whole = stream.len() - 1024;
@@ -91,7 +96,7 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     succeed(packed(&whole, 11, &[]));
     let whole = tree(&whole);
     let (_keep, shards) = scratch();
-    let plan = ["dataset", "plan", "--scene", SMALL, "--width", "48", "--spp", "1", "--count", "11", "--pack", "4"];
+    let plan = ["dataset", "plan", "--scene", PLANT, "--width", "48", "--spp", "1", "--count", "11", "--pack", "4"];
     succeed(trace(&[&plan[..], &["--split", "3,1,0", "--out", path(&shards)]].concat()));
     for shard in ["1/2", "0/2"] {
         succeed(verb("render", &shards, &["--quiet", "--shard", shard, "--threads", "3"]));
@@ -113,12 +118,12 @@ fn however_it_is_made_its_files_are_those_of_one_run() {
     same(&tree(&grown), &whole);
 
     let (_keep, later) = scratch();
-    let mut folders = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
+    let mut folders = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
     folders.args(["--split", "3,1,0", "--out"]).arg(&later);
     succeed(folders);
     succeed(packed(&later, 11, &[]));
     same(&tree(&later), &whole);
-    let mut other = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
+    let mut other = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "11"]);
     other.args(["--split", "3,1,0", "--pack", "5", "--out"]).arg(&later);
     let message = fail(other, 2);
     assert!(message.contains("another dataset is in this folder: pack 4 there, 5 here"), "{message}");
@@ -154,7 +159,7 @@ assert [sample['record']['index'] for sample in data] == list(range(6)) and sort
     succeed(packed(&whole, 6, &[]));
     let mut whole = tree(&whole);
     let (_keep, data) = scratch();
-    let mut folders = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "6"]);
+    let mut folders = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "6"]);
     folders.args(["--split", "3,1,0", "--out"]).arg(&data);
     succeed(folders);
     let before = native::read(&data, "000000").expect("an image");
@@ -369,7 +374,7 @@ fn folders_are_pushed_too() {
     let (_keep, data) = scratch();
     let there = data.with_extension("there");
     fs::create_dir_all(&there).expect("a folder");
-    let mut make = trace(&["dataset", "--scene", SMALL, "--quiet", "--width", "48", "--spp", "1", "--count", "3"]);
+    let mut make = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "3"]);
     make.args(["--format", "coco", "--push", &format!("cp -r {{dir}}/. {}", path(&there)), "--out"]).arg(&data);
     succeed(make);
     let mut expected = tree(&data);
@@ -414,7 +419,7 @@ fn a_folder_that_was_cleared_away_is_pushed_once_more() {
 #[test]
 fn who_reads_folders_says_how_to_unpack() {
     let (_keep, data) = scratch();
-    succeed(packed(&data, 5, &["--format", "imagefolder"]));
+    succeed(packed_of(SMALL, &data, 5, &["--format", "imagefolder"]));
     let out = data.join("out");
     for one in [data.clone(), data.join("packs"), data.join("packs/train-000000.tar")] {
         let one = path(&one);
@@ -495,7 +500,7 @@ fn examples_of_the_guide_run() {
 #[test]
 fn readers_of_others_open_packs_and_tables() {
     let (_keep, data) = scratch();
-    succeed(packed(&data, 11, &[]));
+    succeed(packed_of(SMALL, &data, 11, &[]));
     if let Some(python) = python("import webdataset, datasets, pandas, polars, duckdb") {
         ask(&python, "packs/check_readers.py", &[path(&data)]);
     }
