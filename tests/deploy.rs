@@ -443,7 +443,14 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
     let network = model(&learnt);
     let pixels = normalised(&learnt, &four, (w, h));
     let mut probabilities = network.probabilities(&pixels, (w, h), (w, h)).unwrap();
-    let seen = Seen { pixels: &pixels, size: (w, h), bands: &learnt.card.input.bands, finest: None, features: None };
+    let seen = Seen {
+        pixels: &pixels,
+        size: (w, h),
+        bands: &learnt.card.input.bands,
+        finest: None,
+        features: None,
+        vectors: None,
+    };
     Refine::parse("colour,plants").unwrap().apply(&seen, &mut probabilities, None);
     let n = (w * h) as usize;
     let class = |at: usize| {

@@ -108,6 +108,7 @@ impl Players {
             classes: plan.classes.clone(),
             crops: Vec::new(),
             species: Vec::new(),
+            plants: false,
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&values),
             plan_sha256: identity.hash()?,
@@ -152,6 +153,7 @@ impl Players {
                 truth: &example.labels,
                 predicted: &predicted,
                 plants: None,
+                separated: None,
                 seconds: Some(0.5),
             })?;
         }

@@ -193,6 +193,7 @@ fn report() -> Report {
             truth: &s.truth,
             predicted: &s.predictions[0],
             plants: None,
+            separated: None,
             seconds: Some(0.25),
         };
         evaluation.add(&answer).unwrap();

@@ -81,6 +81,7 @@ mod packs;
 mod pages;
 #[cfg(feature = "train")]
 mod pixel_size;
+mod plant_decoder;
 mod profile;
 mod python;
 mod quality;

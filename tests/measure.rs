@@ -33,7 +33,7 @@ fn map(rows: &[&str]) -> Vec<u8> {
 
 fn answer<'a>(width: u32, truth: &'a [u8], predicted: &'a [u8]) -> Prediction<'a> {
     let height = truth.len() as u32 / width;
-    Prediction { name: "a", width, height, truth, predicted, plants: None, seconds: None }
+    Prediction { name: "a", width, height, truth, predicted, plants: None, separated: None, seconds: None }
 }
 
 /// Builds a random map of three classes in blobs, partly unlabelled.

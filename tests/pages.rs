@@ -102,8 +102,16 @@ fn an_evaluation_opens_with_the_worst_first_and_pictures_enlarge() {
     for (name, right) in [("good", 23), ("bad", 3), ("middling", 12)] {
         let truth: Vec<u8> = (0..24).map(|k| u8::from(k % 2 == 0)).collect();
         let predicted: Vec<u8> = truth.iter().enumerate().map(|(k, t)| if k < right { *t } else { 1 - t }).collect();
-        let answer =
-            Prediction { name, width: 6, height: 4, truth: &truth, predicted: &predicted, plants: None, seconds: None };
+        let answer = Prediction {
+            name,
+            width: 6,
+            height: 4,
+            truth: &truth,
+            predicted: &predicted,
+            plants: None,
+            separated: None,
+            seconds: None,
+        };
         evaluation.add(&answer).unwrap();
         thumbnails.push(Thumbnail::new(name, (6, 4), &[[90, 120, 60]; 24], &truth, &[&predicted], 100));
     }

@@ -143,7 +143,7 @@ fn crops_are_scaled_by_the_pixels_of_their_own_image() {
         let expected = |k: usize| {
             let crop = Crop { image, size, rare: 0.0, ground: Some(Ground { pixel_mm: sizes[k], range_mm }) };
             let mut stream = Stream::of(3, place as u64, Purpose::Training, 2);
-            augment.apply(&store.get(k).unwrap(), &crop, &[true; 3], &normalization, &mut stream).0
+            augment.apply(&store.get(k).unwrap(), &crop, &[true; 3], &normalization, &mut stream).pixels
         };
         seen.extend((0..8).filter(|k| expected(*k) == found));
     }

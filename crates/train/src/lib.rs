@@ -23,6 +23,7 @@
 //! | [`Selection`] | images of a dataset |
 //! | `fit` | trains a plan into a folder; resumable |
 //! | `adapt` | continues the training of a network on photographs without labels |
+//! | `plants` | adds a decoder to a network that separates plants one by one |
 //! | `calibrated`, `evaluate` | class-bias calibration; scores of predictions against the ground truth |
 //! | [`TrainedModel`], [`Results`], [`Report`] | weights and model card; loss curve and validation passes; scores |
 //! | [`Ensemble`] | runs with several seeds whose probabilities are averaged |
@@ -54,6 +55,8 @@ pub mod fit;
 pub mod measure;
 pub mod memory;
 pub mod net;
+#[cfg(feature = "torch")]
+pub mod plants;
 pub mod refine;
 pub mod run;
 #[cfg(feature = "torch")]

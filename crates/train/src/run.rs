@@ -12,7 +12,7 @@ use super::data::{Band, Normalization, Resize, Shape, Store, ground};
 use super::fit::Plan;
 use super::fit::checkpoint::History;
 use super::fit::hyper::SIDES;
-use super::net::{Network, Pretrained, film, parameters};
+use super::net::{Extras, Network, Parameter, Pretrained, film};
 use super::refine::Refine;
 use super::weights::{self, Array, Stored};
 use furrow_base::input::{below, shipped};
@@ -141,6 +141,9 @@ pub struct ModelCard {
     /// English names of the species that the network takes as the crop, in the order of its embeddings; empty for an ordinary network.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub species: Vec<String>,
+    /// Whether the network has a plant decoder, which separates plants one by one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub plants: bool,
     /// File name of the weights, in the folder of the card.
     pub weights: String,
     /// SHA-256 over names, shapes and values of the weights.
@@ -152,10 +155,9 @@ pub struct ModelCard {
 impl ModelCard {
     /// Returns the number of parameters that are trained in such a network.
     fn trainable(&self) -> usize {
-        let (bands, classes) = (self.input.bands.len(), self.classes.len());
-        let film = film::film(self.network, bands, classes, self.species.len());
-        let all = parameters(self.network, bands, classes).into_iter().chain(film);
-        all.filter(|p| p.role.is_trainable()).map(|p| p.len()).sum()
+        let extras = Extras { species: self.species.len(), plants: self.plants };
+        let all = extras.parameters(self.network, self.input.bands.len(), self.classes.len());
+        all.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum()
     }
 
     /// Returns the card of the ordinary network that these species, indices of [`Self::species`], give. It knows which crop is sown, so a
@@ -295,10 +297,14 @@ impl TrainedModel {
             let help = "restore both files or train again, with another --out";
             return Err(Error::damaged(what).help(help).in_file(path));
         }
-        let species = film::species(&values);
+        let Extras { species, plants } = Extras::of(&values);
         if species != card.species.len() {
             let what =
                 format!("these weights are of a network for {species} species, {MODEL} lists {}", card.species.len());
+            return Err(Error::damaged(what).in_file(path));
+        }
+        if plants != card.plants {
+            let what = format!("{MODEL} and these weights differ on whether the network has a plant decoder");
             return Err(Error::damaged(what).in_file(path));
         }
         if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {

@@ -10,7 +10,7 @@ use super::fit::logits;
 use super::fit::warnings::warnings;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
-use super::net::{Parameter, film, fitting, parameters};
+use super::net::{Extras, Parameter, film, fitting, plants};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
 use super::weights;
@@ -130,7 +130,15 @@ pub(super) fn train(
         let place = machine.place(&plan.precision)?;
         device::set_threads(plan.threads);
         let open = |selections: &[Selection], otherwise| {
-            Store::open(selections, otherwise, plan.seed, &plan.classes, &plan.shape, false, machine.memory)
+            Store::open(
+                selections,
+                otherwise,
+                plan.seed,
+                &plan.classes,
+                &plan.shape,
+                plan.plants.is_some(),
+                machine.memory,
+            )
         };
         let train = open(&plan.train, Pick::Split(Split::Train))?;
         let val = open(&plan.val, Pick::Split(Split::Val))?;
@@ -172,6 +180,11 @@ pub(super) fn train(
             Some(_) => film::completed(plan.network, bands, classes, begin, species.len(), plan.seed),
             None => begin,
         };
+        let begin = if plan.plants.is_some() {
+            plants::completed(plan.network, bands, classes, begin, plan.seed)
+        } else {
+            begin
+        };
         let plan = Plan { begin_with, species, ..plan.clone() };
         let identity = Identity::of(&plan, &train, &val)?;
         // Reads one image, so that missing bands are reported before the folder is claimed.
@@ -206,8 +219,8 @@ pub(super) fn train(
         if plan.hyper.logit_adjustment > 0.0 {
             logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
         }
-        let mut list = parameters(plan.network, bands, classes);
-        list.extend(film::film(plan.network, bands, classes, plan.species.len()));
+        let extras = Extras { species: plan.species.len(), plants: plan.plants.is_some() };
+        let list = extras.parameters(plan.network, bands, classes);
         let card = ModelCard {
             furrow: env!("CARGO_PKG_VERSION").into(),
             network: plan.network,
@@ -220,6 +233,7 @@ pub(super) fn train(
             classes: plan.classes.clone(),
             crops: crops.to_vec(),
             species: plan.species.clone(),
+            plants: plan.plants.is_some(),
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&outcome.values),
             plan_sha256: hash,
@@ -321,8 +335,11 @@ pub fn evaluate(
             let (width, height) = size;
             let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
             let (name, truth) = (example.name.as_str(), example.labels.as_slice());
-            evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
-            seen(&Predicted { place, example: &example, size, predicted: &predicted })?;
+            let separated = plants.map(|_| scores.plants(&predicted, size));
+            let separated = separated.as_deref();
+            let predicted = predicted.as_slice();
+            evaluation.add(&Prediction { name, width, height, truth, predicted, plants, separated, seconds })?;
+            seen(&Predicted { place, example: &example, size, predicted })?;
         }
         Ok(evaluation.finish())
     })

@@ -14,6 +14,7 @@ mod inference;
 mod machine;
 mod make;
 mod pages;
+mod plants;
 mod predict;
 mod report;
 mod table;
@@ -46,6 +47,7 @@ Examples:
   train predict runs/d photos/ --out predictions          class masks of photographs, and overlays
   train predict any-field photos/ --out predictions       the same with a network that ships
   train adapt runs/d --images photos/ --out runs/d3       self-training on photographs without labels
+  train plants runs/d --set data/d --out runs/d4          a decoder that separates plants one by one
   train calibrate runs/d --set data/d --out runs/d2       calibrated class biases
   train export runs/d --format onnx                       the network for a robot
   train baseline exg-size --from data/real@0..10 --set data/real@12..20
@@ -69,6 +71,8 @@ enum Verb {
     Predict(predict::Args),
     /// Continue training on photographs without labels (self-training).
     Adapt(adapt::Args),
+    /// Add a decoder to a trained network that separates plants one by one; class scores stay the same.
+    Plants(plants::Args),
     /// Calibrate the class biases of a trained network against over- and under-prediction, on images with labels.
     Calibrate(calibrate::Args),
     /// List the trained networks that ship with the program.
@@ -102,6 +106,7 @@ fn main() -> ExitCode {
         Verb::Eval(args) => eval::run(&args, &signals),
         Verb::Predict(args) => predict::run(&args, &signals),
         Verb::Adapt(args) => adapt::run(&args, &signals),
+        Verb::Plants(args) => plants::run(&args, &signals),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Zoo => zoo::run(),
         Verb::Export(args) => export::run(&args),

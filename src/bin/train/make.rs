@@ -312,6 +312,7 @@ impl<'a> Make<'a> {
             bands: &[],
             batch: BATCH,
             pixel_mm: None,
+            plants: false,
             machine: &self.args.machine,
             quiet: self.args.quiet,
             signals: self.signals,

@@ -40,6 +40,10 @@ pub(crate) struct Args {
     /// A network that was trained for other crops is refused; for a network that knows no crop, a warning is printed.
     #[arg(long = "crop", value_name = "NAME")]
     crops: Vec<String>,
+    /// Write the plants one by one as well: NAME.plants.png (number of the plant, 0 for none) and plants.json (COCO). A plant decoder
+    /// (`train plants`) separates plants that touch; for a network without one, a plant is a connected region of plant pixels.
+    #[arg(long)]
+    plants: bool,
     #[command(flatten)]
     inference: InferenceArgs,
     #[command(flatten)]
@@ -70,6 +74,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         bands: &args.bands,
         batch: args.batch.into(),
         pixel_mm: args.inference.pixel_mm(),
+        plants: args.plants,
         machine: &args.machine,
         quiet: args.quiet,
         signals,
@@ -87,6 +92,8 @@ pub(crate) struct Job<'a> {
     pub(crate) batch: usize,
     /// Ground sampling distance of the images, if it was given.
     pub(crate) pixel_mm: Option<f64>,
+    /// Whether plants are written one by one.
+    pub(crate) plants: bool,
     /// Device and threads.
     pub(crate) machine: &'a MachineArgs,
     /// Whether progress is hidden.
@@ -125,6 +132,7 @@ impl Job<'_> {
             threads: self.machine.threads(),
             batch: self.batch,
             pixel_mm: self.pixel_mm,
+            plants: self.plants,
             done: &|done| bar.set_position(done.to_u64()),
             stop: self.signals.catch(),
         };

@@ -59,7 +59,16 @@ pub fn evaluate(
         let seconds = Some(begun.elapsed().as_secs_f64());
         let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
         let (name, truth) = (example.name.as_str(), example.labels.as_slice());
-        evaluation.add(&Prediction { name, width, height, truth, predicted: &predicted, plants, seconds })?;
+        evaluation.add(&Prediction {
+            name,
+            width,
+            height,
+            truth,
+            predicted: &predicted,
+            plants,
+            separated: None,
+            seconds,
+        })?;
         seen(&example, &predicted)?;
     }
     Ok(evaluation.finish())

@@ -8,6 +8,7 @@ use super::crop::{self, Crop, GeometricAugmentation, Placement};
 use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
+use super::plants;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::sampling::Stream;
 use furrow_optics::sensor::Jpeg;
@@ -128,8 +129,7 @@ impl Augment {
         Ok(augment)
     }
 
-    /// Returns an augmented crop of an image as input of the network (interleaved bands, normalized) and its labels. `colour[b]` is
-    /// `true` if band b is a channel of the colour image. A crop is normalized with the moments of the whole image, because
+    /// Returns an augmented crop of an image as input of the network and its labels. `colour[b]` is `true` if band b is a channel of the colour image. A crop is normalized with the moments of the whole image, because
     /// predictions are made on whole images.
     pub fn apply(
         &self,
@@ -138,18 +138,22 @@ impl Augment {
         colour: &[bool],
         normalization: &Normalization,
         stream: &mut Stream,
-    ) -> (Vec<f32>, Vec<u8>) {
+    ) -> Augmented {
         let &Crop { image, size, rare, .. } = crop;
         let anywhere = size == image || rare == 0.0 || !stream.chance(rare);
         let about = if anywhere { None } else { crop::rare_pixel(&example.labels, image, stream) };
         let placement = Placement::draw(self.moves(), crop, about, stream);
-        let (mut pixels, mut labels) = match &placement {
+        let Augmented { mut pixels, mut labels, mut plants } = match &placement {
             Some(placement) => placement.read(example, crop),
-            None => (interleave(example, 1), example.labels.clone()),
+            None => {
+                let (labels, plants) = (example.labels.clone(), example.plants.clone());
+                Augmented { pixels: interleave(example, 1), labels, plants }
+            }
         };
         if self.erase {
             erase::erase(&mut pixels, &mut labels, size, stream);
         }
+        plants::mask(&mut plants, &labels);
         let light = self.colour.then(|| Light::draw(colour, stream));
         let centred = |i: usize, (w, h): (u32, u32)| {
             let (x, y) = (i.to_u32() % w, i.to_u32() / w);
@@ -184,8 +188,19 @@ impl Augment {
             normalization.scales(&whole, colour.len())
         };
         normalise::scale(&mut pixels, &scales);
-        (pixels, labels)
+        Augmented { pixels, labels, plants }
     }
+}
+
+/// Crop of a training image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Augmented {
+    /// Pixels, bands interleaved.
+    pub pixels: Vec<f32>,
+    /// Class of each pixel; 255 for no label.
+    pub labels: Vec<u8>,
+    /// Plant number of each pixel, 0 for none; empty unless the example has them.
+    pub plants: Vec<u32>,
 }
 
 /// Every `THINNED`-th pixel is used for mean and standard deviation of a whole image. The step is prime, so that the sampled columns
@@ -339,7 +354,7 @@ mod tests {
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
             for window in [(w, h), (17, 21)] {
-                let (pixels, labels) =
+                let Augmented { pixels, labels, .. } =
                     augment.apply(&example(w, h), &crop((w, h), window), &[true; 3], &as_it_is(), &mut stream);
                 assert_eq!(labels.len(), (window.0 * window.1).to_usize());
                 let wrong =
@@ -355,7 +370,7 @@ mod tests {
         let augment = Augment { flip: true, crop: true, ..Augment::NONE };
         for seed in 0..50 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
-            let (pixels, labels) =
+            let Augmented { pixels, labels, .. } =
                 augment.apply(&example(w, h), &crop((w, h), (16, 13)), &[true; 3], &as_it_is(), &mut stream);
             let same =
                 |(pixel, label): (&[f32], &u8)| pixel.iter().all(|v| *v == [40.0, 200.0][usize::from(*label)] / 255.0);
@@ -367,7 +382,7 @@ mod tests {
     fn nothing_asked_nothing_changed() {
         let picture = example(8, 6);
         let mut stream = Stream::of(1, 0, Purpose::Test, 0);
-        let (pixels, labels) =
+        let Augmented { pixels, labels, .. } =
             Augment::NONE.apply(&picture, &crop((8, 6), (8, 6)), &[true; 3], &as_it_is(), &mut stream);
         assert_eq!(labels, picture.labels);
         assert_eq!(pixels, interleave(&picture, 1));
@@ -382,7 +397,7 @@ mod tests {
         let mut pure = [0, 0];
         for seed in 0..60 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
-            let (pixels, labels) =
+            let Augmented { pixels, labels, .. } =
                 Augment::NONE.apply(&picture, &crop((w, h), (8, 8)), &[true; 3], &Normalization::Band, &mut stream);
             let ones: usize = labels.iter().map(|l| usize::from(*l)).sum();
             for (side, all) in pure.iter_mut().zip([0, labels.len()]) {

@@ -1,5 +1,6 @@
 //! Random crops of training images.
 
+use super::augment::Augmented;
 use super::example::Example;
 use super::ground::Ground;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
@@ -106,8 +107,8 @@ impl Placement {
         [a * x + b * y + self.shift[0], c * x + d * y + self.shift[1]]
     }
 
-    /// Returns the pixels of the crop (interleaved bands, 0 to 1) and its labels.
-    pub(super) fn read(&self, example: &Example, crop: &Crop) -> (Vec<f32>, Vec<u8>) {
+    /// Returns the crop with pixels of 0 to 1.
+    pub(super) fn read(&self, example: &Example, crop: &Crop) -> Augmented {
         let &Crop { image: (w, h), size, .. } = crop;
         let bands = example.planes.len();
         let (cx, cy) = (w.to_f32() / 2.0, h.to_f32() / 2.0);
@@ -119,11 +120,14 @@ impl Placement {
         let count = size.0.to_usize() * size.1.to_usize();
         let mut pixels = Vec::with_capacity(count * bands);
         let mut labels = Vec::with_capacity(count);
+        let mut plants = Vec::with_capacity(if example.plants.is_empty() { 0 } else { count });
         for y in 0..size.1 {
             for x in 0..size.0 {
                 let middle = source(x.to_f32() + 0.5, y.to_f32() + 0.5);
                 let [column, row] = middle.map(RoundTo::trunc_to::<usize>);
-                labels.push(example.labels[row.min(h.to_usize() - 1) * w.to_usize() + column.min(w.to_usize() - 1)]);
+                let nearest = row.min(h.to_usize() - 1) * w.to_usize() + column.min(w.to_usize() - 1);
+                labels.push(example.labels[nearest]);
+                plants.extend(example.plants.get(nearest));
                 if self.points == 1 {
                     let around = BilinearTaps::new(middle, (w, h));
                     pixels.extend(example.planes.iter().map(|plane| around.value(plane)));
@@ -142,7 +146,7 @@ impl Placement {
                 }
             }
         }
-        (pixels, labels)
+        Augmented { pixels, labels, plants }
     }
 }
 
@@ -213,7 +217,8 @@ mod tests {
                 for seed in 0..400 {
                     let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
                     let crop = Crop { image, size: (20, 16), rare, ground: None };
-                    let (pixels, labels) = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream);
+                    let Augmented { pixels, labels, .. } =
+                        augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream);
                     assert!(pixels.iter().zip(&labels).all(|(v, l)| (v * 255.0 - f32::from(*l)).abs() < 1e-3));
                     (0..3).for_each(|class| holding[class] += u32::from(labels.contains(&class.to_u8())));
                     if let Some(i) = labels.iter().position(|l| *l == 2) {
@@ -247,7 +252,7 @@ mod tests {
         let crop = Crop { image: (256, 8), size: (32, 8), rare: 0.0, ground };
         let width = |draw: u64| {
             let stream = Stream::of(draw, 0, Purpose::Test, 0);
-            let (pixels, _) = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream.clone());
+            let pixels = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream.clone()).pixels;
             // At the mirrored edges of the image the ramp is less steep.
             let steps = pixels[..32].windows(2).map(|pair| f64::from((pair[1] - pair[0]).abs()));
             (255.0 * steps.fold(0.0, f64::max), stream)
@@ -304,7 +309,7 @@ mod tests {
         let augment = Augment { scale: true, ..Augment::NONE };
         for seed in 0..20 {
             let mut stream = Stream::of(seed, 0, Purpose::Test, 0);
-            let (pixels, _) = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream);
+            let pixels = augment.apply(&picture, &crop, &[true], &as_it_is, &mut stream).pixels;
             assert!(pixels.iter().all(|v| (255.0 * v - 100.0).abs() < 40.0), "{pixels:?}");
         }
     }

@@ -8,6 +8,7 @@ use super::crop::Crop;
 use super::fourier;
 use super::order::BatchSettings;
 use super::photos::{Photos, Views};
+use super::plants;
 use super::store::Store;
 use furrow_base::math::ToInt;
 use furrow_base::sampling::{Purpose, Stream};
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Batch of images with labels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
     /// Number of images.
     pub images: usize,
@@ -28,6 +29,8 @@ pub struct Batch {
     pub labels: Vec<u8>,
     /// Species named as the crops of each image, as indices in the network's list; empty for crops of any kind.
     pub crops: Vec<Vec<u8>>,
+    /// Targets of the plant decoder, images × [`plants::PLANES`] × height × width; empty unless the examples have plant numbers.
+    pub plants: Vec<f32>,
 }
 
 /// Iterator over the inputs of steps (by default batches), in the order of the steps.
@@ -127,7 +130,7 @@ fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) ->
     let shape = store.shape();
     let colour: Vec<bool> = shape.bands.iter().map(Band::is_color).collect();
     let crop = Crop { image: (shape.width, shape.height), size: order.crop_size, rare: order.rare, ground: None };
-    let mut batch = Batch { images: order.batch, pixels: Vec::new(), labels: Vec::new(), crops: Vec::new() };
+    let mut batch = Batch { images: order.batch, ..Batch::default() };
     for slot in 0..order.batch.to_u64() {
         let place = step * order.batch.to_u64() + slot;
         let image = epochs.at(place, store.len());
@@ -144,9 +147,10 @@ fn make(store: &Store, order: &BatchSettings, step: u64, epochs: &mut Epochs) ->
         batch.crops.push(named);
         let crop = Crop { ground: order.pixels.as_ref().map(|pixels| pixels.at(image)), ..crop };
         let mut stream = Stream::of(order.seed, place, Purpose::Training, 2);
-        let (pixels, labels) = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);
-        batch.pixels.extend(pixels);
-        batch.labels.extend(labels);
+        let found = order.augment.apply(&example, &crop, &colour, &order.normalization, &mut stream);
+        batch.plants.extend(plants::targets(&found.plants, crop.size.0.to_usize()));
+        batch.pixels.extend(found.pixels);
+        batch.labels.extend(found.labels);
     }
     Ok(batch)
 }

@@ -14,6 +14,7 @@
 //! | `ground` | scale augmentation by the pixel size on the ground |
 //! | `normalise` | input normalization |
 //! | `naming` | species named as crops, and the labels that follow |
+//! | `plants` | targets of the plant decoder |
 //! | `order` | parameters of batch sampling |
 //! | `photos` | photographs without labels, for self-training |
 //! | `paste` | pastes plants of one batch over the images of another |
@@ -34,11 +35,12 @@ pub mod normalise;
 mod order;
 mod paste;
 pub mod photos;
+pub mod plants;
 pub mod resize;
 pub mod select;
 pub mod store;
 
-pub use augment::Augment;
+pub use augment::{Augment, Augmented};
 pub use bands::Band;
 pub use crop::Crop;
 pub use example::{Example, Shape, Wanted};

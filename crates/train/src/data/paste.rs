@@ -40,8 +40,9 @@ mod tests {
         let images = 600;
         let labels: Vec<u8> = [0, 1, 2, IGNORE].repeat(images);
         let pixels = labels.iter().flat_map(|l| [f32::from(*l), 1.0]).collect();
-        let from = Batch { images, pixels, labels, crops: Vec::new() };
-        let mut onto = Batch { images, pixels: vec![-7.0; 8 * images], labels: vec![9; 4 * images], crops: Vec::new() };
+        let from = Batch { images, pixels, labels, ..Batch::default() };
+        let mut onto =
+            Batch { images, pixels: vec![-7.0; 8 * images], labels: vec![9; 4 * images], ..Batch::default() };
         paste(&from, &mut onto, &mut Stream::of(5, 0, Purpose::Test, 0));
         let mut found = [0; 2];
         for (labels, pixels) in onto.labels.chunks_exact(4).zip(onto.pixels.chunks_exact(8)) {
@@ -53,8 +54,8 @@ mod tests {
             found.iter_mut().zip([labels[1] != 9, labels[2] != 9]).for_each(|(n, there)| *n += u32::from(there));
         }
         assert!(found.iter().all(|n| (410..490).contains(n)), "{found:?} for three quarters of {images}");
-        let bare = Batch { images: 1, pixels: vec![0.0; 4], labels: vec![0; 2], crops: Vec::new() };
-        let mut same = Batch { images: 1, pixels: vec![5.0; 4], labels: vec![1; 2], crops: Vec::new() };
+        let bare = Batch { images: 1, pixels: vec![0.0; 4], labels: vec![0; 2], ..Batch::default() };
+        let mut same = Batch { images: 1, pixels: vec![5.0; 4], labels: vec![1; 2], ..Batch::default() };
         paste(&bare, &mut same, &mut Stream::of(5, 0, Purpose::Test, 0));
         assert_eq!((same.labels, same.pixels), (vec![1; 2], vec![5.0; 4]));
     }

@@ -93,8 +93,8 @@ impl Photos {
             let crop = Crop { image, size: order.crop_size, rare: 0.0, ground: None };
             // Both views start with the same random numbers and so show the same part of the photograph.
             let mut again = stream.clone();
-            views.plain.extend(moved.apply(&example, &crop, &color, &order.normalization, &mut stream).0);
-            views.changed.extend(changed.apply(&example, &crop, &color, &order.normalization, &mut again).0);
+            views.plain.extend(moved.apply(&example, &crop, &color, &order.normalization, &mut stream).pixels);
+            views.changed.extend(changed.apply(&example, &crop, &color, &order.normalization, &mut again).pixels);
         }
         views
     }

@@ -112,7 +112,7 @@ impl InputImage {
     }
 
     /// Returns a canonical path that identifies the image however its path is written.
-    fn identity(&self) -> Result<String> {
+    pub(super) fn identity(&self) -> Result<String> {
         let place = match &self.source {
             Source::Files(_) => std::fs::canonicalize(&self.photo).map_err(Error::reading(&self.photo))?,
             Source::Packed(set, _) => {

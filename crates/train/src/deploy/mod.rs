@@ -8,6 +8,7 @@
 //! | `guard` | predictions of a network for a named crop that can hardly be right |
 //! | `enlarge` | scores resized to the image's original size, and their argmax |
 //! | `overlay` | prediction blended over its image |
+//! | `plants` | plants of predictions, one by one |
 //! | `predict` | prediction of images with a trained model |
 //!
 //! Exported networks include the input normalization, so that callers cannot apply a different mean or scale. The input `image` holds
@@ -23,6 +24,7 @@ pub mod guard;
 pub mod input_images;
 pub mod onnx;
 pub mod overlay;
+pub mod plants;
 #[cfg(feature = "torch")]
 pub mod predict;
 #[cfg(feature = "torch")]

@@ -5,6 +5,7 @@
 
 use super::input_images::{InputImage, PREDICTION, Prediction, files};
 use super::overlay;
+use super::plants::{self, Found};
 use crate::data::resize::{self, Input};
 use crate::enlarge;
 use crate::ensemble::Ensemble;
@@ -34,6 +35,8 @@ pub struct Options<'a> {
     pub batch: usize,
     /// Ground sampling distance of the images in millimetres a pixel, if images are resized by it; recorded in `prediction.json`.
     pub pixel_mm: Option<f64>,
+    /// Whether plants are written one by one as well; see [`plants`].
+    pub plants: bool,
     /// Progress callback: receives the number of finished passes, out of [`passes`].
     pub done: &'a (dyn Fn(usize) + Sync),
     /// Set by the caller to stop early.
@@ -43,7 +46,7 @@ pub struct Options<'a> {
 /// Result of [`predict`].
 #[derive(Debug, Default)]
 pub struct Predictions {
-    /// Files written: two per image in the order of the images, then `prediction.json`.
+    /// Files written: two per image (three with plants) in the order of the images, then `plants.json`, `prediction.json`.
     pub paths: Vec<PathBuf>,
     /// Number of images with a prediction.
     pub done: usize,
@@ -105,11 +108,13 @@ fn predict_here(
     let failed = AtomicBool::new(false);
     let mut made = Predictions::default();
     let mut unread = Vec::new();
+    let mut found = BTreeMap::new();
     let (appearance, learnt) = learn(&models, card, pictures, options)?;
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
             (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect::<Result<_>>()?;
-        let begun = (0..workers).map(|_| write(scope, card, out, appearance.as_ref(), &failed));
+        let drawing = Drawing { card, out, appearance: appearance.as_ref(), plants: options.plants };
+        let begun = (0..workers).map(|_| write(scope, drawing, &failed));
         let (writers, handles): (Vec<_>, Vec<_>) = begun.collect::<Result<Vec<_>>>()?.into_iter().unzip();
         let mut batch = Vec::new();
         for number in 0..pictures.len() {
@@ -140,6 +145,9 @@ fn predict_here(
         made.pixels = vec![0; card.classes.len()];
         for (number, drawn) in written {
             made.paths.extend(drawn.paths);
+            if let Some(plants) = drawn.plants {
+                found.insert(pictures[number].identity()?, plants);
+            }
             made.evidence.extend(drawn.evidence.map(|found| (pictures[number].name.clone(), found)));
             for (sum, pixels) in made.pixels.iter_mut().zip(drawn.pixels) {
                 *sum += pixels;
@@ -152,6 +160,10 @@ fn predict_here(
         return Err(Error::stopped(words).help("run the same command again to predict all of them").in_file(out));
     }
     made.appearance = appearance.is_some();
+    if options.plants {
+        plants::write(out, &found, &card.classes.names())?;
+        made.paths.push(out.join(plants::PLANTS));
+    }
     prediction.finish(out, &unread, &made.evidence, made.appearance)?;
     made.paths.push(out.join(PREDICTION));
     Ok(made)
@@ -212,9 +224,20 @@ type Scored<'a> = (usize, PreparedImage<'a>, Scores);
 /// Index of each image and what was written for it.
 type Written = Result<Vec<(usize, Drawn)>>;
 
+/// What the writers draw.
+#[derive(Clone, Copy)]
+struct Drawing<'a> {
+    card: &'a ModelCard,
+    out: &'a Path,
+    appearance: Option<&'a Appearance>,
+    plants: bool,
+}
+
 /// Prediction of an image that was written.
 struct Drawn {
-    paths: [PathBuf; 2],
+    paths: Vec<PathBuf>,
+    /// Plants, if they were asked for.
+    plants: Option<Found>,
     /// Number of pixels of each class.
     pixels: Vec<u64>,
     evidence: Option<Evidence>,
@@ -223,16 +246,14 @@ struct Drawn {
 /// Starts a thread that writes the predictions sent to it; sets `failed` if a file cannot be written.
 fn write<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
-    card: &'a ModelCard,
-    out: &'a Path,
-    appearance: Option<&'s Appearance>,
+    drawing: Drawing<'s>,
     failed: &'s AtomicBool,
 ) -> Result<(SyncSender<Scored<'a>>, ScopedJoinHandle<'s, Written>)> {
     let (sender, receiver) = sync_channel::<Scored<'a>>(AHEAD);
     let work = move || {
         let mut written = Vec::new();
         for (number, ready, mut scores) in receiver {
-            let drawn = supervised(|| draw(card, out, &ready, &mut scores, appearance));
+            let drawn = supervised(|| draw(drawing, &ready, &mut scores));
             match drawn.map_err(|bug| bug.within(&ready.picture.name)).and_then(|drawn| drawn) {
                 Ok(drawn) => written.push((number, drawn)),
                 Err(e) => {
@@ -260,7 +281,7 @@ fn infer<'a>(
         a.1.inputs.as_slice(),
         b.1.inputs.as_slice(),
     ) {
-        ([a], [b]) => models.len() == 1 && a.size == b.size && !refine.appearance,
+        ([a], [b]) => models.len() == 1 && !models[0].has_plants && a.size == b.size && !refine.appearance,
         _ => false,
     };
     let mut all = Vec::new();
@@ -277,6 +298,7 @@ fn infer<'a>(
                     size,
                     finest: None,
                     features: None,
+                    vectors: None,
                     are_logits: true,
                 };
                 all.extend(each.map(whole));
@@ -292,13 +314,8 @@ fn infer<'a>(
 }
 
 /// Refines the scores of one image and writes its class map and overlay.
-fn draw(
-    card: &ModelCard,
-    out: &Path,
-    ready: &PreparedImage<'_>,
-    scores: &mut Scores,
-    appearance: Option<&Appearance>,
-) -> Result<Drawn> {
+fn draw(drawing: Drawing<'_>, ready: &PreparedImage<'_>, scores: &mut Scores) -> Result<Drawn> {
+    let Drawing { card, out, appearance, .. } = drawing;
     let (width, height) = (ready.width, ready.height);
     let evidence = scores.refine(card.refine, &ready.inputs, &card.input.bands, appearance);
     let colors = card.classes.colors();
@@ -311,16 +328,21 @@ fn draw(
         card.weights_sha256,
         card.classes.names().join("; ")
     );
-    let paths = files(&ready.picture.name).map(|file| out.join(file));
+    let numbers = drawing.plants.then(|| scores.plants(&classes, (width, height)));
+    let plants = numbers.as_deref().map(|numbers| Found::of(numbers, &classes, (width, height)));
+    let mut paths = files(&ready.picture.name).map(|file| out.join(file)).to_vec();
     let labels = furrow_output::encode_png(width, height, &Png::Indexed(&classes, &colors), &text)?;
     let over = furrow_output::encode_png(width, height, &Png::Rgb(&over), &text)?;
+    let numbers = numbers.map(|numbers| furrow_output::encode_png(width, height, &Png::Numbers(&numbers), &text));
+    let numbers = numbers.transpose()?;
+    paths.extend(numbers.is_some().then(|| out.join(plants::file(&ready.picture.name))));
     furrow_output::write_together(out, |files| {
-        files.add(&paths[0], &labels)?;
-        files.add(&paths[1], &over)
+        let all = [Some(&labels), Some(&over), numbers.as_ref()].into_iter().flatten();
+        paths.iter().zip(all).try_for_each(|(path, bytes)| files.add(path, bytes))
     })?;
     let mut pixels = vec![0; card.classes.len()];
     for class in &classes {
         pixels[usize::from(*class)] += 1;
     }
-    Ok(Drawn { paths, pixels, evidence })
+    Ok(Drawn { paths, plants, pixels, evidence })
 }

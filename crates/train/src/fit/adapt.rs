@@ -36,7 +36,7 @@ pub(super) fn batch(
 ) -> Result<(Batch, f64)> {
     let (mut labels, sure) = answers(teacher, &views.plain, plan)?;
     keep_surest(&mut labels, &sure, adaptation.keep);
-    let mut photos = Batch { images: rendered.images, pixels: views.changed, labels, crops: Vec::new() };
+    let mut photos = Batch { images: rendered.images, pixels: views.changed, labels, ..Batch::default() };
     paste(rendered, &mut photos, &mut Stream::of(plan.seed, number, Purpose::Training, 4));
     let labelled = photos.labels.iter().filter(|label| **label != IGNORE).count();
     let share = labelled.to_f64() / photos.labels.len().max(1).to_f64();
@@ -56,7 +56,7 @@ fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec
     let images = pixels.chunks_exact(area * bands.len()).zip(probabilities.chunks_exact_mut(area * teacher.classes));
     let (mut labels, mut sure) = (Vec::new(), Vec::new());
     for (pixels, probabilities) in images {
-        refine.apply(&Seen { pixels, size, bands, finest: None, features: None }, probabilities, None);
+        refine.apply(&Seen { pixels, size, bands, finest: None, features: None, vectors: None }, probabilities, None);
         for at in 0..area {
             let each = probabilities.iter().skip(at).step_by(area).enumerate();
             let (class, p) =

@@ -18,10 +18,9 @@ pub struct Gradients {
 }
 
 impl Gradients {
-    /// Returns gradients of no batch yet, for the trainable parameters of the model; without those of the encoder if `encoder` is
-    /// false.
-    pub fn new(model: &Model, encoder: bool) -> Self {
-        let learning = model.trainable().filter(|(p, _)| encoder || !p.is_encoder());
+    /// Returns gradients of no batch yet, for the trainable parameters of the model whose names `learns` accepts.
+    pub fn new(model: &Model, learns: impl Fn(&str) -> bool) -> Self {
+        let learning = model.trainable().filter(|(p, _)| learns(&p.name));
         let parameters = learning.map(|(p, t)| (p.name.clone(), p.is_encoder(), t.shallow_clone())).collect();
         Self { parameters, sums: Vec::new(), batches: 0 }
     }
@@ -87,9 +86,9 @@ mod tests {
             let none: Option<Tensor> = None;
             model.forward(&x, Pass::Inference).cross_entropy_loss(&y, none, Reduction::Mean, 255, 0.0)
         };
-        let mut whole = Gradients::new(&model, true);
+        let mut whole = Gradients::new(&model, |_| true);
         whole.add(&loss(0..3));
-        let mut parts = Gradients::new(&model, true);
+        let mut parts = Gradients::new(&model, |_| true);
         (0..3).for_each(|k| parts.add(&loss(k..k + 1)));
         let (whole, parts) = (whole.mean(), parts.mean());
         assert_eq!(whole.sums.len(), model.trainable().count());

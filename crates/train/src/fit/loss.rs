@@ -1,8 +1,14 @@
 //! Loss functions of training.
 
 use super::hyper::LossFunction;
+use crate::net::plants;
+use furrow_base::math::ToInt;
 use furrow_dataset::model::sample::IGNORE;
 use tch::{Kind, Reduction, Tensor};
+
+/// Error of a vector that does not matter, pixels: the plant decoder has half of the resolution, and plants of few pixels would have
+/// large errors relative to their radius.
+const BLUR: f64 = 4.0;
 
 /// Returns the loss of a batch. `logits` is images × classes × height × width, `labels` images × height × width of integers, and
 /// `weights` one weight per class. At least one pixel must have a label.
@@ -12,6 +18,22 @@ pub(super) fn loss(of: LossFunction, logits: &Tensor, labels: &Tensor, weights: 
         LossFunction::Entropy => entropy,
         LossFunction::Dice => entropy + (1.0 - dice(logits, labels)),
     }
+}
+
+/// Returns the loss of the plant decoder: the weighted mean over plant pixels of the distance between the vectors relative to the
+/// plant's radius and [`BLUR`], and of the difference between the logarithms of the radii. `found` is images × [`plants::CHANNELS`] × height × width;
+/// `targets` has one plane more, the weights. Both are in the units of the decoder. `None` without a plant pixel.
+pub(super) fn plants(found: &Tensor, targets: &Tensor) -> Option<Tensor> {
+    let weights = targets.narrow(1, plants::CHANNELS.to_i64(), 1);
+    let sum = weights.sum(Kind::Float);
+    if sum.double_value(&[]) <= 0.0 {
+        return None;
+    }
+    let difference = found - targets.narrow(1, 0, plants::CHANNELS.to_i64());
+    let radius = (targets.narrow(1, 2, 1).exp() + BLUR) / plants::UNIT;
+    let vectors = difference.narrow(1, 0, 2).abs().sum_dim_intlist(1, true, Kind::Float) / radius;
+    let radii = difference.narrow(1, 2, 1).abs();
+    Some(((vectors + radii) * weights).sum(Kind::Float) / sum)
 }
 
 /// Returns the soft Dice overlap 2 Σ p t / Σ (p + t) over all labelled pixels of a batch, averaged over the classes in its labels.

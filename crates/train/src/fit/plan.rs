@@ -35,6 +35,9 @@ pub struct Plan {
     pub species: Vec<String>,
     /// Time limit, seconds. With a limit, the last step depends on the speed of the machine.
     pub seconds: Option<u64>,
+    /// Input normalization of the trained network, if only a plant decoder is trained, which is added to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plants: Option<Normalization>,
     /// Self-training on photographs without labels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adaptation: Option<Adaptation>,
@@ -86,6 +89,7 @@ impl Default for Plan {
             begin_with: None,
             species: Vec::new(),
             seconds: None,
+            plants: None,
             adaptation: None,
         }
     }

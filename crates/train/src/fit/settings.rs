@@ -154,9 +154,9 @@ pub struct Settings {
     #[schemars(extend("x-example" = "\"480,640,960\""))]
     pub resize: Option<String>,
     /// Refinement of predictions after training, names separated by commas, or none: colour (pixels of similar colour in an image tend
-    /// to be of the same kind, plant or soil), plants (connected plant pixels are of one class), rows (crop rows and plant sizes also
-    /// decide between crop and weed; needs plants), appearance (appearance features also decide, learnt from all images of a field;
-    /// needs rows). The first class must be soil.
+    /// to be of the same kind, plant or soil), plants (connected plant pixels are of one class), separate (plants are those of the plant
+    /// decoder, not connected pixels; needs plants), rows (crop rows and plant sizes also decide between crop and weed; needs plants),
+    /// appearance (appearance features also decide, learnt from all images of a field; needs rows). The first class must be soil.
     #[arg(long, value_name = "NAMES", default_value = default_of("refine"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-example" = "\"colour,plants,rows,appearance\""))]

@@ -10,9 +10,12 @@ use super::log::TrainingLog;
 use super::loss;
 use super::optimiser::Optimiser;
 use super::plan::Plan;
+use crate::data::plants;
 use crate::data::{Batch, BatchSettings, Loader, Naming, Normalization, Photos, PixelSizes, Store, Views, augment};
 use crate::figure::{Figure, Thumbnails, compose};
 use crate::measure::{Confusion, Scores};
+use crate::net::plants::is_of_plants;
+use crate::net::{Extras, is_encoder};
 use crate::torch::{Model, Pass, Placement, classes, failed};
 use crate::weights::Array;
 use furrow_base::math::{ToFloat, ToInt};
@@ -94,15 +97,17 @@ pub fn train(
     callbacks: &Callbacks<'_>,
 ) -> Result<Outcome> {
     let (classes, hyper) = (plan.classes.len(), &plan.hyper);
-    let normalization = match (&plan.adaptation, hyper.normalization) {
-        (Some(adaptation), _) => adaptation.normalization.clone(),
+    let trained = plan.adaptation.as_ref().map(|adaptation| &adaptation.normalization).or(plan.plants.as_ref());
+    let normalization = match (trained, hyper.normalization) {
+        (Some(normalization), _) => normalization.clone(),
         (_, NormalizationMode::Band) => Normalization::Band,
         (_, NormalizationMode::Image) => Normalization::Image,
         (_, NormalizationMode::Fixed) => Normalization::fixed(&data.train)?,
     };
     let mut at = Checkpoint::read(folder, hash)?.unwrap_or_default();
     let (bands, species) = (plan.shape.bands.len(), plan.species.len());
-    let mut model = Model::for_species(plan.network, bands, classes, species, plan.seed, place);
+    let extras = Extras { species, plants: plan.plants.is_some() };
+    let mut model = Model::with_extras(plan.network, bands, classes, extras, plan.seed, place);
     if at.step > 0 {
         model.load(&at.values)?;
     } else if !begin.is_empty() {
@@ -251,21 +256,31 @@ fn step(
 ) -> Result<Option<f64>> {
     let size = plan.crop_size();
     let pass = match (encoder > 0.0, photographs.is_empty()) {
+        _ if plan.plants.is_some() => Pass::Plants,
         (false, _) => Pass::Decoder,
         (true, true) => Pass::Training,
         (true, false) => Pass::Batch,
     };
     let batches = batches.iter().map(|batch| (batch, pass, 1.0));
     let photographs = photographs.iter().map(|(batch, share)| (batch, Pass::Training, *share));
-    let mut gradients = Gradients::new(model, encoder > 0.0);
+    let learns = |name: &str| match plan.plants.is_some() {
+        true => is_of_plants(name),
+        false => !is_of_plants(name) && (encoder > 0.0 || !is_encoder(name)),
+    };
+    let mut gradients = Gradients::new(model, learns);
     let mut losses: Vec<f64> = Vec::new();
     for (batch, pass, weight) in batches.chain(photographs) {
-        if batch.labels.iter().all(|l| *l == IGNORE) {
-            continue;
-        }
         let x = model.images(&batch.pixels, size);
-        let y = labels(model, &batch.labels, batch.images, size);
-        let loss = loss::loss(plan.hyper.loss, &model.forward_named(&x, pass, &batch.crops), &y, weights) * weight;
+        let loss = if plan.plants.is_some() {
+            let targets = planes(model, &batch.plants, batch.images, size);
+            let Some(loss) = loss::plants(&model.forward_plants(&x, pass)?, &targets) else { continue };
+            loss
+        } else if batch.labels.iter().all(|l| *l == IGNORE) {
+            continue;
+        } else {
+            let y = labels(model, &batch.labels, batch.images, size);
+            loss::loss(plan.hyper.loss, &model.forward_named(&x, pass, &batch.crops), &y, weights) * weight
+        };
         gradients.add(&loss);
         losses.push(f64::try_from(loss).map_err(|e| failed(&e))?);
     }
@@ -280,6 +295,12 @@ fn step(
 fn labels(model: &Model, labels: &[u8], images: usize, (width, height): (u32, u32)) -> Tensor {
     let flat = Tensor::from_slice(labels).to_device(model.place.device).to_kind(Kind::Int64);
     flat.view([images.to_i64(), i64::from(height), i64::from(width)])
+}
+
+/// Converts the targets of the plant decoder to a tensor of images × planes × height × width.
+fn planes(model: &Model, values: &[f32], images: usize, (width, height): (u32, u32)) -> Tensor {
+    let flat = Tensor::from_slice(values).to_device(model.place.device);
+    flat.view([images.to_i64(), plants::PLANES.to_i64(), i64::from(height), i64::from(width)])
 }
 
 /// Makes a validation pass: computes the scores of the network on all validation images together, and an image of some

@@ -3,6 +3,7 @@
 use super::bootstrap;
 use super::boundary::{Boundary, TOLERANCE};
 use super::confusion::Confusion;
+use super::instances::Instances;
 use super::report::{BoundaryScores, ClassBoundary, ClassSizes, ImageScores, Report, Seconds};
 use super::scores::{Measures, Scores, mean};
 use super::size::Sizes;
@@ -28,6 +29,8 @@ pub struct Prediction<'a> {
     pub predicted: &'a [u8],
     /// Plant number of each pixel, 0 for none, if the dataset has plant numbers.
     pub plants: Option<&'a [u32]>,
+    /// Predicted plant of each pixel, 0 for none, if the prediction separates plants.
+    pub separated: Option<&'a [u32]>,
     /// Duration of the prediction, seconds.
     pub seconds: Option<f64>,
 }
@@ -43,6 +46,7 @@ pub struct EvaluatedImage {
     pub(super) confusion: Confusion,
     boundaries: Vec<Boundary>,
     sizes: Sizes,
+    instances: Option<Instances>,
 }
 
 /// Evaluation of a set of images in progress.
@@ -81,13 +85,14 @@ impl Evaluation {
     /// Evaluates an image without adding it, so that several threads can evaluate; [`Self::push`] adds it. Images may be added in any
     /// order.
     pub fn evaluate(&self, prediction: &Prediction<'_>) -> Result<EvaluatedImage> {
-        let Prediction { name, width, height, truth, predicted, plants, seconds } = *prediction;
+        let Prediction { name, width, height, truth, predicted, plants, separated, seconds } = *prediction;
         let wrong = |what: String| Error::input(format!("{name}: {what}"));
         let (w, h) = (width.to_usize(), height.to_usize());
         let maps = [
             ("truth", truth.len()),
             ("prediction", predicted.len()),
             ("plant map", plants.map_or(w * h, <[u32]>::len)),
+            ("predicted plant map", separated.map_or(w * h, <[u32]>::len)),
         ];
         if let Some((map, n)) = maps.into_iter().find(|(_, n)| *n != w * h) {
             return Err(wrong(format!("the {map} has {n} pixels, an image of {w} × {h} has {}", w * h)));
@@ -101,6 +106,9 @@ impl Evaluation {
             ignored: truth.len().to_u64() - confusion.total(),
             seconds,
             boundaries: Boundary::of(self.classes.len(), w, h, truth, predicted),
+            instances: plants
+                .zip(separated)
+                .map(|(plants, separated)| Instances::of(plants, separated, |at| truth[at] != IGNORE)),
             sizes: Sizes::of(&self.plants, (w, h), truth, predicted, plants),
             confusion,
         })
@@ -160,6 +168,10 @@ fn report(found: &Evaluation) -> Report {
             .filter(|class| found.plants[*class])
             .map(|class| ClassSizes { class: found.classes[class].clone(), bins: found.sizes.bins(class) })
             .collect(),
+        instances: found.images.iter().filter_map(|image| image.instances).reduce(|mut sum, image| {
+            sum.merge(&image);
+            sum
+        }),
         seconds: seconds(found.images.iter().filter_map(|image| image.seconds).collect()),
         images: found.images.iter().map(|image| image_scores(image, &found.plants)).collect(),
     }

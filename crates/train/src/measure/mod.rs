@@ -9,6 +9,7 @@
 //! | `scores` | GA, CA, I/U, P, R, F1 |
 //! | `boundary` | boundary F-score |
 //! | `components`, `size` | connected components; scores of plants by size |
+//! | `instances` | panoptic quality of separated plants |
 //! | `bootstrap` | confidence intervals of the scores over images |
 //! | `report`, `evaluation` | results and tables of an evaluation; evaluation of a set of images |
 
@@ -17,6 +18,7 @@ pub mod boundary;
 pub mod components;
 pub mod confusion;
 pub mod evaluation;
+pub mod instances;
 pub mod report;
 pub mod scores;
 pub mod size;
@@ -24,5 +26,6 @@ pub mod size;
 pub use bootstrap::Interval;
 pub use confusion::Confusion;
 pub use evaluation::{Evaluation, Prediction};
+pub use instances::Instances;
 pub use report::Report;
 pub use scores::{ClassMeasures, Measures, Scores};

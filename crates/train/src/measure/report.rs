@@ -3,6 +3,7 @@
 use super::bootstrap::Interval;
 use super::boundary::Boundary;
 use super::confusion::Confusion;
+use super::instances::Instances;
 use super::scores::{Measures, Scores};
 use super::size::SizeBin;
 use furrow_report::{Cell, Table};
@@ -27,6 +28,9 @@ pub struct Report {
     pub boundary: BoundaryScores,
     /// Scores by plant size, for each class that is a plant.
     pub sizes: Vec<ClassSizes>,
+    /// Separated plants, if the truth has plant numbers and the prediction separates plants.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instances: Option<Instances>,
     /// Duration of predictions, if known.
     pub seconds: Option<Seconds>,
     /// Scores of each image, sorted by name.
@@ -106,7 +110,19 @@ impl Report {
     pub fn tables(&self) -> Vec<Table> {
         let mut all = vec![self.summary(), self.class_table(), self.confusion_table(), self.boundary_table()];
         all.push(self.size_table());
+        all.extend(self.instance_table());
         all
+    }
+
+    /// Returns the panoptic quality of separated plants, its two factors, and the numbers of plants.
+    pub fn instance_table(&self) -> Option<Table> {
+        let found = self.instances?;
+        let columns = ["panoptic quality (%)", "segmentation", "recognition", "true plants", "predicted", "pairs"];
+        let mut table = Table::new("Separated plants", columns);
+        let shares = [found.panoptic_quality(), found.segmentation_quality(), found.recognition_quality()];
+        let counts = [found.truth, found.predicted, found.pairs].map(Cell::Count);
+        table.push(shares.map(|value| Cell::percent(value, PERCENT)).into_iter().chain(counts));
+        Some(table)
     }
 
     /// Returns GA, CA, mean I/U and the scores of vegetation, each with its interval, as in Tables I and II of Di Cicco et al. 2017.

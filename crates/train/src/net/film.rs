@@ -11,6 +11,7 @@
 //! Source: Perez et al. 2018, "FiLM: visual reasoning with a general conditioning layer"; conditional batch norm is of de Vries et al.
 //! 2017.
 
+use super::plants::is_of_plants;
 use super::{Network, Parameter, Role, parameters};
 use crate::weights::Array;
 use furrow_base::math::ToFloat;
@@ -74,6 +75,7 @@ pub fn folded(network: Network, bands: usize, classes: usize, arrays: &[Array], 
     let list = parameters(network, bands, classes);
     let own = |parameter: &Parameter| get(&parameter.name).cloned();
     let mut plain: Vec<Array> = list.iter().map(own).collect::<Result<_>>()?;
+    plain.extend(arrays.iter().filter(|array| is_of_plants(&array.name)).cloned());
     for (norm, channels) in modulated(&list) {
         let map = &get(&map(&norm))?.values;
         let change = |row: &[f32]| row.iter().zip(&embedding).map(|(a, b)| a * b).sum::<f32>();

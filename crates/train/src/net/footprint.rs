@@ -19,11 +19,11 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Returns the footprint of a network for one image of this width and height.
-    pub fn of(network: Network, bands: usize, classes: usize, (width, height): (u32, u32)) -> Self {
+    /// Returns the footprint of a network, with its plant decoder if `plants` is set, for one image of this width and height.
+    pub fn of(network: Network, bands: usize, classes: usize, plants: bool, (width, height): (u32, u32)) -> Self {
         let tally = Rc::new(Tally::default());
         let image = Map::new(&tally, bands, f64::from(height), f64::from(width));
-        network.walk(&mut Walk, &image, bands, classes);
+        network.walk(&mut Walk { plants, found: None }, &image, bands, classes);
         Self { peak: tally.peak.get(), all: tally.all.get() }
     }
 }
@@ -86,7 +86,12 @@ impl Drop for Map {
 }
 
 /// Implementation of [`Operations`] that only follows sizes.
-struct Walk;
+struct Walk {
+    /// Whether the plant decoder is applied as well.
+    plants: bool,
+    /// Its output, which is held to the end.
+    found: Option<Map>,
+}
 
 impl Operations for Walk {
     type Value = Map;
@@ -171,6 +176,14 @@ impl Operations for Walk {
     fn scale(&mut self, x: &Map, _name: &str, _channels: usize) -> Map {
         x.alike()
     }
+
+    fn wants_plants(&self) -> bool {
+        self.plants
+    }
+
+    fn plants(&mut self, x: Map) {
+        self.found = Some(x);
+    }
 }
 
 #[cfg(test)]
@@ -182,7 +195,7 @@ mod tests {
     #[test]
     fn the_footprint_grows_with_the_image() {
         for network in Network::ALL {
-            let of = |side: u32| Footprint::of(*network, 3, 3, (side, side));
+            let of = |side: u32| Footprint::of(*network, 3, 3, false, (side, side));
             let (small, large) = (of(560), of(1120));
             assert!(small.peak > 6.0 * 560.0 * 560.0 && small.all > small.peak, "{} {small:?}", network.name());
             let ratio = large.peak / small.peak;

@@ -11,6 +11,7 @@ pub mod film;
 mod footprint;
 mod lite_unet;
 mod parameters;
+pub mod plants;
 mod pretrained;
 mod segnet;
 mod tiny_unet;
@@ -21,7 +22,9 @@ pub use footprint::{Footprint, MULTIPLIED_OUT};
 pub use parameters::{Parameter, Role, fitting, is_encoder, matching, parameters};
 pub use pretrained::Pretrained;
 
+use crate::weights::Array;
 use serde::{Deserialize, Serialize};
+use std::borrow::Borrow;
 
 /// Parameters of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,6 +142,12 @@ pub trait Operations {
     fn scale(&mut self, x: &Self::Value, name: &str, channels: usize) -> Self::Value;
     /// Called with the last value of the encoder that is downsampled by 2^`_halvings`: its features at that size.
     fn features(&mut self, _x: &Self::Value, _halvings: usize) {}
+    /// Returns whether the plant decoder is to be applied as well; see [`plants`].
+    fn wants_plants(&self) -> bool {
+        false
+    }
+    /// Called with the output of the plant decoder, if it is wanted.
+    fn plants(&mut self, _x: Self::Value) {}
 }
 
 /// Defines [`Network`] from one line for each network: variant, module, name on the command line, description.
@@ -202,6 +211,30 @@ impl Network {
     }
 }
 
+/// Optional parts of a network, with parameters of their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// Number of species that it takes as the crop; see [`film`].
+    pub species: usize,
+    /// Whether it has a plant decoder; see [`plants`].
+    pub plants: bool,
+}
+
+impl Extras {
+    /// Returns the optional parts that these arrays contain.
+    pub fn of(arrays: &[Array]) -> Self {
+        Self { species: film::species(arrays), plants: plants::has_plants(arrays) }
+    }
+
+    /// Returns all parameters of a network with these parts.
+    pub fn parameters(self, network: Network, bands: usize, classes: usize) -> Vec<Parameter> {
+        let mut all = parameters(network, bands, classes);
+        all.extend(film::film(network, bands, classes, self.species));
+        all.extend(self.plants.then(|| plants::plants(network, bands, classes)).into_iter().flatten());
+        all
+    }
+}
+
 /// Convolution, batch norm and, if `relu`, ReLU, with the parameter names `name.conv` and `name.bn`.
 fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bool) -> O::Value {
     let y = o.conv(x, &format!("{name}.conv"), conv);
@@ -209,28 +242,54 @@ fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bo
     if relu { o.relu(&y) } else { y }
 }
 
-/// Decoder of a U-Net, from the deepest value and its number of channels. Each level of `widths` channels upsamples with the nearest
+/// Decoders of a U-Net, from the deepest value and its number of channels. Each level of `widths` channels upsamples with the nearest
 /// neighbour to the last remaining skip value, concatenates that, and applies two 3 × 3 convolutions. Without a remaining skip value it
 /// upsamples to the size of `x`. A last convolution gives the classes.
+///
+/// The plant decoder has the same levels except the last, if it is wanted.
 fn decode<O: Operations>(
     o: &mut O,
     x: &O::Value,
-    (mut now, mut channels): (O::Value, usize),
-    mut skips: Vec<(O::Value, usize)>,
+    (deepest, channels): (O::Value, usize),
+    skips: Vec<(O::Value, usize)>,
     widths: &[usize],
     classes: usize,
 ) -> O::Value {
-    for (level, outputs) in widths.iter().copied().enumerate() {
-        let (joined, inputs) = match skips.pop() {
-            Some((skip, more)) => {
-                let larger = o.enlarge(&now, &skip);
-                (o.concat(&larger, &skip), channels + more)
-            }
-            None => (o.enlarge(&now, x), channels),
-        };
-        let first = unit(o, &joined, &format!("dec{level}_0"), Conv::new(inputs, outputs, 3), true);
-        now = unit(o, &first, &format!("dec{level}_1"), Conv::new(outputs, outputs, 3), true);
-        channels = outputs;
+    if o.wants_plants() {
+        let kept = skips.iter().rev().map(|(skip, channels)| (skip, *channels));
+        let widths = &widths[..widths.len() - 1];
+        let found = branch(o, x, (&deepest, channels), kept, widths, (plants::PREFIX, plants::CHANNELS));
+        let found = o.enlarge(&found, x);
+        o.plants(found);
     }
-    o.conv(&now, "head.conv", Conv::new(channels, classes, 3).bias())
+    branch(o, x, (deepest, channels), skips.into_iter().rev(), widths, ("", classes))
+}
+
+/// One decoder; its parameter names begin with `prefix`. Values that it owns are freed after their last use.
+fn branch<O: Operations, V: Borrow<O::Value>>(
+    o: &mut O,
+    x: &O::Value,
+    (deepest, mut channels): (V, usize),
+    mut skips: impl Iterator<Item = (V, usize)>,
+    widths: &[usize],
+    (prefix, outputs): (&str, usize),
+) -> O::Value {
+    let mut deepest = Some(deepest);
+    let mut now: Option<O::Value> = None;
+    for (level, width) in widths.iter().copied().enumerate() {
+        let below = now.as_ref().or_else(|| deepest.as_ref().map(Borrow::borrow)).unwrap_or(x);
+        let (joined, inputs) = match skips.next() {
+            Some((skip, more)) => {
+                let larger = o.enlarge(below, skip.borrow());
+                (o.concat(&larger, skip.borrow()), channels + more)
+            }
+            None => (o.enlarge(below, x), channels),
+        };
+        let first = unit(o, &joined, &format!("{prefix}dec{level}_0"), Conv::new(inputs, width, 3), true);
+        now = Some(unit(o, &first, &format!("{prefix}dec{level}_1"), Conv::new(width, width, 3), true));
+        deepest = None;
+        channels = width;
+    }
+    let last = now.as_ref().or_else(|| deepest.as_ref().map(Borrow::borrow)).unwrap_or(x);
+    o.conv(last, &format!("{prefix}head.conv"), Conv::new(channels, outputs, 3).bias())
 }

@@ -80,9 +80,14 @@ pub fn is_encoder(name: &str) -> bool {
 
 /// Returns the parameters of a network, in the order of the forward pass.
 pub fn parameters(network: Network, bands: usize, classes: usize) -> Vec<Parameter> {
-    let mut list = List(Vec::new());
+    list(network, bands, classes, false)
+}
+
+/// Like [`parameters()`], with those of the plant decoder if `plants` is set.
+pub(super) fn list(network: Network, bands: usize, classes: usize, plants: bool) -> Vec<Parameter> {
+    let mut list = List { all: Vec::new(), plants };
     network.walk(&mut list, &(), bands, classes);
-    list.0
+    list.all
 }
 
 /// Finds the values of a network's parameters in `arrays` by name and returns them in the order of [`parameters()`]. Other arrays are
@@ -115,11 +120,15 @@ pub(super) fn parts(name: &str) -> Option<(&str, &str)> {
     [".conv.", ".bn."].iter().find_map(|part| name.find(part).map(|at| (&name[..at], &name[at + 1..])))
 }
 
-struct List(Vec<Parameter>);
+struct List {
+    all: Vec<Parameter>,
+    /// Whether the plant decoder is listed as well.
+    plants: bool,
+}
 
 impl List {
     fn note(&mut self, name: String, shape: &[usize], role: Role) {
-        self.0.push(Parameter { name, shape: shape.to_vec(), role });
+        self.all.push(Parameter { name, shape: shape.to_vec(), role });
     }
 }
 
@@ -179,6 +188,10 @@ impl Operations for List {
 
     fn scale(&mut self, (): &(), name: &str, channels: usize) {
         self.note(format!("{name}.gamma"), &[channels], Role::Gain);
+    }
+
+    fn wants_plants(&self) -> bool {
+        self.plants
     }
 }
 

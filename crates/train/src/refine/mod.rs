@@ -8,6 +8,7 @@
 //! | `colour` | pixels of similar colour tend to be of the same kind, plant or soil |
 //! | `smooth` | the class of a plant pixel follows from the plant pixels around it |
 //! | `plants` | connected plant pixels are of one class |
+//! | `separate` | plants are those that the plant decoder separates, not connected regions |
 //! | `rows` | crop rows and plant sizes also decide which plants are crop and which are weed |
 //! | `appearance` | plants of one field with similar appearance features tend to be of one class |
 //!
@@ -20,6 +21,7 @@ mod evidence;
 mod plants;
 mod rows;
 mod self_training;
+mod separate;
 mod smooth;
 
 use super::data::Band;
@@ -29,6 +31,7 @@ use serde::{Deserialize, Serialize};
 
 pub use appearance::{Appearance, Examples, Features};
 pub use evidence::Evidence;
+pub use separate::{Vectors, fill, instances};
 
 /// Refinement steps to apply, in the order of the table above.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +44,8 @@ pub struct Refine {
     pub smooth: bool,
     /// Connected plant pixels take one class.
     pub plants: bool,
+    /// Plants are those that the plant decoder separates instead of connected regions; needs `plants`. No effect without a plant decoder.
+    pub separate: bool,
     /// Rows and plant sizes decide together with the network which plants are crop and which are weed; needs `plants`.
     pub rows: bool,
     /// Appearance features decide as well. The appearance model is learnt from all images of a field, with labels by rows and plant sizes;
@@ -60,6 +65,8 @@ pub struct Seen<'a> {
     pub finest: Option<&'a [f32]>,
     /// Encoder features, if the step `appearance` is on.
     pub features: Option<&'a Features>,
+    /// Output of the plant decoder, if the network has one.
+    pub vectors: Option<&'a Vectors>,
 }
 
 impl Seen<'_> {
@@ -69,10 +76,10 @@ impl Seen<'_> {
 }
 
 impl Refine {
-    /// Parses `none`, or a comma-separated list of `colour`, `smooth`, `plants`, `rows` and `appearance`. `rows` requires
-    /// `plants`; `appearance` requires `rows`; `smooth` excludes `plants`.
+    /// Parses `none`, or a comma-separated list of `colour`, `smooth`, `plants`, `separate`, `rows` and `appearance`. `rows` and
+    /// `separate` require `plants`; `appearance` requires `rows`; `smooth` excludes `plants`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let help = "write none, or a comma-separated list of colour, smooth, plants, rows and appearance";
+        let help = "write none, or a comma-separated list of colour, smooth, plants, separate, rows and appearance";
         if text.trim() == "none" {
             return Ok(Self::default());
         }
@@ -82,6 +89,7 @@ impl Refine {
                 "colour" => &mut refine.colour,
                 "smooth" => &mut refine.smooth,
                 "plants" => &mut refine.plants,
+                "separate" => &mut refine.separate,
                 "rows" => &mut refine.rows,
                 "appearance" => &mut refine.appearance,
                 _ => return Err(format!("there is no refinement `{name}`: {help}")),
@@ -92,6 +100,9 @@ impl Refine {
         }
         if refine.rows && !refine.plants {
             return Err("rows needs plants: write plants,rows".into());
+        }
+        if refine.separate && !refine.plants {
+            return Err("separate needs plants: write plants,separate".into());
         }
         if refine.appearance && !refine.rows {
             return Err("appearance needs rows: write plants,rows,appearance".into());
@@ -108,6 +119,7 @@ impl Refine {
             (self.colour, "colour"),
             (self.smooth, "smooth"),
             (self.plants, "plants"),
+            (self.separate, "separate"),
             (self.rows, "rows"),
             (self.appearance, "appearance"),
         ];
@@ -165,7 +177,8 @@ impl Refine {
         if !self.plants {
             return None;
         }
-        let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
+        let found =
+            plants::PlantRegions::of(seen.extent(), probabilities, seen.finest, seen.vectors.filter(|_| self.separate));
         if !self.rows {
             let classes = found.voted();
             found.write(probabilities, |_, region| classes[region]);
@@ -186,7 +199,8 @@ impl Refine {
     pub fn examples(self, seen: &Seen<'_>, probabilities: &mut [f32]) -> Option<Examples> {
         let features = seen.features.filter(|_| self.appearance)?;
         self.recolour(seen, probabilities);
-        let found = plants::PlantRegions::of(seen.extent(), probabilities, seen.finest);
+        let found =
+            plants::PlantRegions::of(seen.extent(), probabilities, seen.finest, seen.vectors.filter(|_| self.separate));
         Some(Examples::of(&found.regions, seen.extent(), &found.arranged().0, features))
     }
 
@@ -232,6 +246,8 @@ mod tests {
             "colour,plants,rows",
             "colour,plants,rows,appearance",
             "colour,smooth",
+            "plants,separate",
+            "colour,plants,separate,rows,appearance",
         ] {
             assert_eq!(Refine::parse(text).unwrap().name(), text);
         }
@@ -248,6 +264,7 @@ mod tests {
             "colour,colour",
             "colour,plants,plants",
             "smooth,plants",
+            "colour,separate",
         ] {
             assert!(Refine::parse(bad).is_err(), "{bad}");
         }

@@ -9,6 +9,7 @@
 //! adds a fourth term.
 
 use super::rows::Rows;
+use super::separate::{Vectors, instances};
 use crate::measure::components::Components;
 use furrow_base::math::ToInt;
 
@@ -34,11 +35,16 @@ pub(super) struct PlantRegions {
 
 impl PlantRegions {
     /// Finds the plants of an image. `probabilities` holds one plane per class, soil first, and defines the regions. The sums are
-    /// taken over `finest`, which has the same layout, if it is given.
-    pub(super) fn of(size: (usize, usize), probabilities: &[f32], finest: Option<&[f32]>) -> Self {
+    /// taken over `finest`, which has the same layout, if it is given. `vectors` separate plants that touch.
+    pub(super) fn of(
+        size: (usize, usize),
+        probabilities: &[f32],
+        finest: Option<&[f32]>,
+        vectors: Option<&Vectors>,
+    ) -> Self {
         let n = size.0 * size.1;
         let classes = probabilities.len() / n.max(1);
-        let regions = Components::of(size.0, size.1, |at| (best(at, n, probabilities) > 0).then_some(()));
+        let regions = instances(size, &self::classes(n, probabilities), vectors);
         let mut sums = vec![0.0f64; regions.areas.len() * classes];
         for (at, region) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
             for class in 1..classes {
@@ -117,7 +123,7 @@ mod tests {
 
     /// Refines probabilities by `plants` or, with `rows`, by `plants,rows`.
     fn refine(size: (u32, u32), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
-        let seen = Seen { pixels: &[], size, bands: &[], finest, features: None };
+        let seen = Seen { pixels: &[], size, bands: &[], finest, features: None, vectors: None };
         Refine { plants: true, rows, ..Refine::default() }.apply(&seen, probabilities, None);
     }
 

@@ -1,6 +1,7 @@
 //! Implementation of [`Operations`] that computes a network with libtorch.
 
 use super::device::Precision;
+use crate::net::plants::is_of_plants;
 use crate::net::{Conv, MULTIPLIED_OUT, Norm, Operations, film, is_encoder};
 use furrow_base::math::{ToFloat, ToInt};
 use std::collections::BTreeMap;
@@ -17,6 +18,8 @@ pub enum Pass {
     Decoder,
     /// Statistics of the batch, without updating the running ones.
     Batch,
+    /// Statistics of the batch in the plant decoder, which updates its running ones; running statistics elsewhere.
+    Plants,
 }
 
 /// Forward pass of a network. In bf16, convolutions use rounded copies of their weights; the weights and the statistics of batch norms
@@ -29,6 +32,10 @@ pub(super) struct Compute<'a> {
     pub(super) features: Option<BTreeMap<usize, Tensor>>,
     /// Embedding of the crops of each image, images × width, if they are named; see [`film`].
     pub(super) crops: Option<Tensor>,
+    /// Whether the plant decoder is applied as well.
+    pub(super) wants_plants: bool,
+    /// Its output.
+    pub(super) plants: Option<Tensor>,
 }
 
 impl Compute<'_> {
@@ -73,6 +80,7 @@ impl Operations for Compute<'_> {
             Pass::Inference => false,
             Pass::Training | Pass::Batch => true,
             Pass::Decoder => !is_encoder(name),
+            Pass::Plants => is_of_plants(name),
         };
         let momentum = if self.pass == Pass::Batch { 0.0 } else { 0.1 };
         let y = x.batch_norm(gain, shift, mean, variance, training, momentum, norm.epsilon, true);
@@ -162,6 +170,14 @@ impl Operations for Compute<'_> {
 
     fn scale(&mut self, x: &Tensor, name: &str, channels: usize) -> Tensor {
         x * self.tensors[&format!("{name}.gamma")].view([1, channels.to_i64(), 1, 1])
+    }
+
+    fn wants_plants(&self) -> bool {
+        self.wants_plants
+    }
+
+    fn plants(&mut self, x: Tensor) {
+        self.plants = Some(x);
     }
 
     fn features(&mut self, x: &Tensor, halvings: usize) {

@@ -30,7 +30,7 @@ impl Model {
     }
 
     fn footprint(&self, size: (u32, u32)) -> Footprint {
-        Footprint::of(self.network, self.bands, self.classes, size)
+        Footprint::of(self.network, self.bands, self.classes, self.has_plants, size)
     }
 
     /// Returns the size of a value, bytes.

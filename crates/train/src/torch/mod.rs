@@ -8,7 +8,7 @@ mod guard;
 mod memory;
 pub mod multiscale;
 
-use super::net::{Network, Parameter, film, matching, parameters};
+use super::net::{Extras, Network, Parameter, film, matching};
 use super::refine::Features;
 use super::weights::Array;
 use compute::Compute;
@@ -26,6 +26,25 @@ pub use guard::guarded;
 /// Number of times the finer encoder features are halved: cells of 8 pixels.
 const FINE: usize = 3;
 
+/// Outputs of a network besides the scores.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wanted {
+    /// Encoder features.
+    pub features: bool,
+    /// The plant decoder's, if there is one.
+    pub plants: bool,
+}
+
+/// Outputs of a network for one image.
+pub(super) struct Outputs {
+    /// Logits, 1 × classes × height × width.
+    pub scores: Tensor,
+    /// Encoder features.
+    pub features: Option<Features>,
+    /// Output of the plant decoder, 1 × [`CHANNELS`](crate::net::plants::CHANNELS) × height × width.
+    pub plants: Option<Tensor>,
+}
+
 /// Network with its parameters on a device.
 pub struct Model {
     /// Network.
@@ -34,6 +53,8 @@ pub struct Model {
     pub bands: usize,
     /// Number of classes.
     pub classes: usize,
+    /// Whether it has a plant decoder.
+    pub has_plants: bool,
     /// Device and precision.
     pub place: Placement,
     list: Vec<Parameter>,
@@ -43,29 +64,28 @@ pub struct Model {
 impl Model {
     /// Returns a network with random initial values, which depend only on the seed.
     pub fn new(network: Network, bands: usize, classes: usize, seed: u64, place: Placement) -> Self {
-        Self::for_species(network, bands, classes, 0, seed, place)
+        Self::with_extras(network, bands, classes, Extras::default(), seed, place)
     }
 
-    /// Like [`Self::new`], for a network that takes one of `species` species as the crop; see [`film`].
-    pub fn for_species(
+    /// Like [`Self::new`], for a network with these optional parts.
+    pub fn with_extras(
         network: Network,
         bands: usize,
         classes: usize,
-        species: usize,
+        extras: Extras,
         seed: u64,
         place: Placement,
     ) -> Self {
-        let mut list = parameters(network, bands, classes);
-        list.extend(film::film(network, bands, classes, species));
+        let list = extras.parameters(network, bands, classes);
         let tensors =
             list.iter().enumerate().map(|(i, p)| (p.name.clone(), tensor(p, &p.begin(seed, i), place.device)));
         let tensors = tensors.collect();
-        Self { network, bands, classes, place, list, tensors }
+        Self { network, bands, classes, has_plants: extras.plants, place, list, tensors }
     }
 
-    /// Returns a network with these values, which takes the crop as an input if they do. An error names the array that does not match.
+    /// Returns a network with these values and the optional parts that they contain. An error names the array that does not match.
     pub fn with(network: Network, bands: usize, classes: usize, arrays: &[Array], place: Placement) -> Result<Self> {
-        let mut model = Self::for_species(network, bands, classes, film::species(arrays), 0, place);
+        let mut model = Self::with_extras(network, bands, classes, Extras::of(arrays), 0, place);
         model.load(arrays)?;
         Ok(model)
     }
@@ -128,7 +148,19 @@ impl Model {
     }
 
     fn compute(&self, pass: Pass) -> Compute<'_> {
-        Compute { tensors: &self.tensors, precision: self.place.precision, pass, features: None, crops: None }
+        let (tensors, precision) = (&self.tensors, self.place.precision);
+        Compute { tensors, precision, pass, features: None, crops: None, wants_plants: false, plants: None }
+    }
+
+    /// Applies the plant decoder: images × bands × height × width to images × [`CHANNELS`](crate::net::plants::CHANNELS) × height × width, in single precision.
+    ///
+    /// # Errors
+    /// If the network has no plant decoder.
+    pub fn forward_plants(&self, x: &Tensor, pass: Pass) -> Result<Tensor> {
+        let mut compute = Compute { wants_plants: self.has_plants, ..self.compute(pass) };
+        drop(self.network.walk(&mut compute, x, self.bands, self.classes));
+        let found = compute.plants.ok_or_else(|| Error::failed("this network has no plant decoder"))?;
+        Ok(found.to_kind(Kind::Float))
     }
 
     /// Returns the mean embedding of each image's crops, images × [`film::WIDTH`]; zero for an image without a named crop. `None` if no
@@ -170,19 +202,27 @@ impl Model {
         }))
     }
 
-    /// Returns the logits of one image and the encoder features with cells of 8 and of 16 pixels, both in cells of 8.
-    pub(super) fn scores_and_features(&self, pixels: &[f32], size: (u32, u32)) -> Result<(Tensor, Features)> {
-        let mut compute = Compute { features: Some(BTreeMap::new()), ..self.compute(Pass::Inference) };
+    /// Returns the logits of one image and, of the further outputs, those that are `wanted`.
+    pub(super) fn outputs(&self, pixels: &[f32], size: (u32, u32), wanted: Wanted) -> Result<Outputs> {
+        let mut compute = self.compute(Pass::Inference);
+        compute.features = wanted.features.then(BTreeMap::new);
+        compute.wants_plants = wanted.plants && self.has_plants;
         let x = self.input(pixels, size)?;
         let scores = tch::no_grad(|| self.network.walk(&mut compute, &x, self.bands, self.classes));
-        let features = compute.features.unwrap_or_default();
+        let features = compute.features.map(|features| self.features(&features)).transpose()?;
+        let plants = compute.plants.map(|plants| plants.to_kind(Kind::Float));
+        Ok(Outputs { scores: scores.to_kind(Kind::Float), features, plants })
+    }
+
+    /// Joins encoder features with cells of 8 and of 16 pixels, both in cells of 8.
+    fn features(&self, features: &BTreeMap<usize, Tensor>) -> Result<Features> {
         let (Some(fine), Some(coarse)) = (features.get(&FINE), features.get(&(FINE + 1))) else {
             return Err(Error::failed(format!("{} gives no features of its encoder", self.network.name())));
         };
         let (height, width) = (fine.size()[2], fine.size()[3]);
         let all = tch::no_grad(|| Tensor::cat(&[fine, &coarse.upsample_nearest2d([height, width], None, None)], 1));
         let planes = values(&all)?.chunks_exact((width * height).to_usize()).map(<[f32]>::to_vec).collect();
-        Ok((scores.to_kind(Kind::Float), Features { size: (width.to_usize(), height.to_usize()), planes }))
+        Ok(Features { size: (width.to_usize(), height.to_usize()), planes })
     }
 
     /// Predicts the class of each pixel like [`Self::predict`], and returns its probability as well.
@@ -261,12 +301,14 @@ mod tests {
         let place = Placement { device: Device::Cpu, precision: Precision::Single };
         let (size, channels) = ((96u32, 64u32), [64 + 64, 512 + 512, 40 + 112, 128 + 256, 384 + 384]);
         let pixels: Vec<f32> = (0..96 * 64 * 3).map(|i| (i % 17).to_f32() / 17.0).collect();
-        let shallow = Model::new(Network::TinyUnet, 3, 3, 1, place).scores_and_features(&pixels, size);
+        let wanted = Wanted { features: true, plants: false };
+        let shallow = Model::new(Network::TinyUnet, 3, 3, 1, place).outputs(&pixels, size, wanted);
         assert!(shallow.is_err_and(|error| error.to_string().contains("gives no features of its encoder")));
         let deep = Network::ALL.iter().filter(|network| **network != Network::TinyUnet);
         for (network, channels) in deep.zip(channels) {
             let model = Model::new(*network, 3, 3, 1, place);
-            let (scores, features) = model.scores_and_features(&pixels, size).unwrap();
+            let found = model.outputs(&pixels, size, wanted).unwrap();
+            let (scores, features) = (found.scores, found.features.unwrap());
             assert_eq!((features.size, features.planes.len()), ((12, 8), channels), "{}", network.name());
             assert!(features.planes.iter().all(|plane| plane.len() == 96));
             assert_eq!(values(&scores).unwrap(), model.scores(&pixels, size).unwrap(), "{}", network.name());
@@ -279,7 +321,7 @@ mod tests {
     fn a_folded_network_answers_as_the_one_with_the_crop_as_an_input() {
         let place = Placement { device: Device::Cpu, precision: Precision::Single };
         let (network, size) = (Network::TinyUnet, (16u32, 12u32));
-        let model = Model::for_species(network, 3, 3, 4, 1, place);
+        let model = Model::with_extras(network, 3, 3, Extras { species: 4, plants: false }, 1, place);
         let mut arrays = model.arrays().unwrap();
         let maps = arrays.iter_mut().filter(|a| a.name.starts_with("film.") && a.name != film::EMBEDDING);
         for (k, value) in maps.flat_map(|map| &mut map.values).enumerate() {

@@ -1,15 +1,20 @@
 //! Multi-scale inference: averages the probabilities of one or more networks over several sizes of an image.
 
-use super::{Model, values};
+use super::{Model, Outputs, Wanted, values};
 use crate::data::Band;
+use crate::data::example::nearest;
 use crate::data::resize::Input;
-use crate::refine::{Appearance, Evidence, Examples, Features, Refine, Seen};
+use crate::enlarge::classes_at;
+use crate::net::plants::UNIT;
+use crate::refine::{Appearance, Evidence, Examples, Features, Refine, Seen, Vectors, fill, instances};
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
-use tch::Kind;
+use tch::{Kind, Tensor};
 
 /// Largest number of images that the appearance model of a field is learnt from.
 const LEARNT: usize = 64;
+/// Largest logarithm of a plant's radius that is used: 8,000 pixels.
+const LARGEST: f32 = 9.0;
 
 /// Scores of the classes for one image.
 pub struct Scores {
@@ -21,6 +26,8 @@ pub struct Scores {
     pub finest: Option<Vec<f32>>,
     /// Encoder features of the first network for the largest input, if requested.
     pub features: Option<Features>,
+    /// Vectors of the plant decoder at this size, if the first network has one: the mean over the inputs.
+    pub vectors: Option<Vectors>,
     /// `true` if the values are logits (one network and one input); otherwise they are sums of probabilities.
     pub are_logits: bool,
 }
@@ -56,6 +63,17 @@ impl Scores {
         Some(refine.apply(&seen, probabilities, appearance))
     }
 
+    /// Returns the plant of each pixel of the image at the size `to`, numbered from 1, 0 for none: those that the plant decoder separates, or
+    /// connected regions without one. `predicted` holds the class of each pixel, 0 for soil.
+    pub fn plants(&self, predicted: &[u8], to: (u32, u32)) -> Vec<u32> {
+        let extent = (self.size.0.to_usize(), self.size.1.to_usize());
+        let own = classes_at(&self.values, self.size, self.size);
+        let found = instances(extent, &own, self.vectors.as_ref());
+        let mut plants = nearest(self.size, &found.labels, to);
+        fill(&mut plants, predicted, to);
+        plants
+    }
+
     /// Returns the plants of the image as examples for the appearance model of its field.
     fn examples(mut self, refine: Refine, inputs: &[Input], bands: &[Band]) -> Option<Examples> {
         let input = inputs.iter().find(|input| input.size == self.size)?;
@@ -66,8 +84,8 @@ impl Scores {
 
     /// Returns the input of refinement: the image at the largest size, and the values to refine.
     fn seen<'a>(&'a mut self, input: &'a Input, bands: &'a [Band]) -> (Seen<'a>, &'a mut [f32]) {
-        let (finest, features) = (self.finest.as_deref(), self.features.as_ref());
-        (Seen { pixels: &input.pixels, size: self.size, bands, finest, features }, &mut self.values)
+        let (finest, features, vectors) = (self.finest.as_deref(), self.features.as_ref(), self.vectors.as_ref());
+        (Seen { pixels: &input.pixels, size: self.size, bands, finest, features, vectors }, &mut self.values)
     }
 }
 
@@ -100,27 +118,24 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
     let largest = inputs.iter().map(|input| input.size).max_by_key(|(w, h)| u64::from(*w) * u64::from(*h));
     let size = largest.ok_or_else(|| Error::failed("the image has no input sizes"))?;
     if let ([model], [input]) = (models, inputs) {
-        let (values, features) = if refine.appearance {
-            let (scores, features) = model.scores_and_features(&input.pixels, size)?;
-            (values(&scores)?, Some(features))
-        } else {
-            (model.scores(&input.pixels, size)?, None)
-        };
-        return Ok(Scores { values, size, finest: None, features, are_logits: true });
+        let wanted = Wanted { features: refine.appearance, plants: true };
+        let Outputs { scores, features, plants } = model.outputs(&input.pixels, size, wanted)?;
+        let vectors = plants.map(|plants| vectors(&plants, size, size)).transpose()?;
+        return Ok(Scores { values: values(&scores)?, size, finest: None, features, vectors, are_logits: true });
     }
     let mut sums: Vec<f32> = Vec::new();
-    let (mut finest, mut features) = (None, None);
+    let (mut finest, mut features, mut summed) = (None, None, None::<Vectors>);
     for input in inputs {
         let mut mean: Vec<f32> = Vec::new();
-        for model in models {
-            let found = if refine.appearance && input.size == size && features.is_none() {
-                let (scores, found) = model.scores_and_features(&input.pixels, size)?;
-                features = Some(found);
-                values(&scores.softmax(1, Kind::Float))?
-            } else {
-                model.probabilities(&input.pixels, input.size, size)?
-            };
-            add(&mut mean, found);
+        for (k, model) in models.iter().enumerate() {
+            let first = refine.appearance && input.size == size && features.is_none();
+            let found = model.outputs(&input.pixels, input.size, Wanted { features: first, plants: k == 0 })?;
+            features = features.or(found.features);
+            if let Some(plants) = &found.plants {
+                let found = vectors(plants, input.size, size)?;
+                summed = Some(summed.map_or_else(|| found.clone(), |sum| sum.plus(&found)));
+            }
+            add(&mut mean, values(&resized(&found.scores.softmax(1, Kind::Float), input.size, size))?);
         }
         for sum in &mut mean {
             *sum /= models.len().to_f32();
@@ -130,7 +145,27 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
         }
         add(&mut sums, mean);
     }
-    Ok(Scores { values: sums, size, finest, features, are_logits: false })
+    let vectors = summed.map(|sum| sum.times(1.0 / inputs.len().to_f32()));
+    Ok(Scores { values: sums, size, finest, features, vectors, are_logits: false })
+}
+
+/// Converts the output of the plant decoder for an input of the size `from` to pixels of the size `to`.
+fn vectors(plants: &Tensor, from: (u32, u32), to: (u32, u32)) -> Result<Vectors> {
+    let n = to.0.to_usize() * to.1.to_usize();
+    let mut planes = values(&resized(plants, from, to))?;
+    let scale = to.0.to_f32() / from.0.to_f32();
+    let (directions, radii) = planes.split_at_mut(2 * n);
+    directions.iter_mut().for_each(|v| *v *= UNIT.to_f32() * scale);
+    radii.iter_mut().for_each(|v| *v = v.clamp(0.0, LARGEST).exp() * scale);
+    Ok(Vectors { planes })
+}
+
+/// Resizes maps bilinearly; sample points are pixel centres.
+fn resized(maps: &Tensor, from: (u32, u32), to: (u32, u32)) -> Tensor {
+    if from == to {
+        return maps.shallow_clone();
+    }
+    tch::no_grad(|| maps.upsample_bilinear2d([i64::from(to.1), i64::from(to.0)], false, None, None))
 }
 
 /// Adds values to sums; empty sums are replaced by the values.

@@ -1,0 +1,137 @@
+//! Plants of predictions, one by one: a map of plant numbers for each image, and `plants.json` in COCO's format.
+
+use crate::run;
+use furrow_base::math::ToInt;
+use furrow_base::{Error, Result};
+use furrow_dataset::model::rle::{Box2, Rle};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Name of the file in COCO's format.
+pub const PLANTS: &str = "plants.json";
+
+/// Returns the file name of the plant map of an image.
+pub fn file(name: &str) -> String {
+    format!("{name}.plants.png")
+}
+
+/// A predicted plant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plant {
+    id: u64,
+    image_id: u64,
+    category_id: u64,
+    segmentation: Rle,
+    area: u64,
+    bbox: Box2,
+    iscrowd: u8,
+    /// Number of the plant in the plant map.
+    plant: u32,
+}
+
+/// An image with predicted plants.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Image {
+    id: u64,
+    file_name: String,
+    width: u32,
+    height: u32,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Category {
+    id: u64,
+    name: String,
+}
+
+/// Contents of `plants.json`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Coco {
+    images: Vec<Image>,
+    annotations: Vec<Plant>,
+    categories: Vec<Category>,
+}
+
+/// Plants of one image, from its plant map and its classes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    size: (u32, u32),
+    plants: Vec<Plant>,
+}
+
+impl Found {
+    /// Lists the plants of a map; the category of a plant is the class of most of its pixels.
+    pub fn of(plants: &[u32], classes: &[u8], size: (u32, u32)) -> Self {
+        let width = size.0;
+        let mut all: BTreeMap<u32, (Box2, BTreeMap<u8, u64>)> = BTreeMap::new();
+        for (at, (plant, class)) in plants.iter().zip(classes).enumerate().filter(|(_, (plant, _))| **plant > 0) {
+            let (x, y) = (at.to_u32() % width, at.to_u32() / width);
+            let (bounds, counts) = all.entry(*plant).or_insert_with(|| (Box2::of(x, y), BTreeMap::new()));
+            bounds.add(x, y);
+            *counts.entry(*class).or_default() += 1;
+        }
+        let plant = |(plant, (bounds, counts)): (u32, (Box2, BTreeMap<u8, u64>))| {
+            let most = counts.iter().max_by(|a, b| a.1.cmp(b.1).then(b.0.cmp(a.0))).map_or(0, |(class, _)| *class);
+            let inside = |x: u32, y: u32| plants[(y * width + x).to_usize()] == plant;
+            Plant {
+                id: 0,
+                image_id: 0,
+                category_id: most.into(),
+                segmentation: Rle::encode(size.0, size.1, bounds, inside),
+                area: counts.values().sum(),
+                bbox: bounds,
+                iscrowd: 0,
+                plant,
+            }
+        };
+        Self { size, plants: all.into_iter().map(plant).collect() }
+    }
+
+    /// Returns the number of plants.
+    pub fn len(&self) -> usize {
+        self.plants.len()
+    }
+
+    /// Returns whether there are no plants.
+    pub fn is_empty(&self) -> bool {
+        self.plants.is_empty()
+    }
+}
+
+/// Writes the plants of these images, by the path of the image, to the `plants.json` of a folder of predictions, beside those of other
+/// images in it. `classes` holds the names of the classes, soil first.
+///
+/// # Errors
+/// If the file exists and is not one of these.
+pub fn write(folder: &Path, found: &BTreeMap<String, Found>, classes: &[String]) -> Result<()> {
+    let path = folder.join(PLANTS);
+    let before: Coco = if path.exists() {
+        run::read_json(&path).map_err(|e: Error| e.help("restore it, or predict again with another --out"))?
+    } else {
+        Coco::default()
+    };
+    let others = before.images.iter().filter(|image| !found.contains_key(&image.file_name));
+    let kept: BTreeMap<&str, &Image> = others.map(|image| (image.file_name.as_str(), image)).collect();
+    let names: BTreeSet<&str> = kept.keys().copied().chain(found.keys().map(String::as_str)).collect();
+    let mut coco = Coco::default();
+    for (k, name) in names.into_iter().enumerate() {
+        let id = k.to_u64() + 1;
+        let (size, plants): (_, Vec<&Plant>) = match (kept.get(name), found.get(name)) {
+            (Some(image), _) => {
+                let own = before.annotations.iter().filter(|plant| plant.image_id == image.id);
+                ((image.width, image.height), own.collect())
+            }
+            (None, Some(found)) => (found.size, found.plants.iter().collect()),
+            (None, None) => continue,
+        };
+        coco.images.push(Image { id, file_name: name.to_owned(), width: size.0, height: size.1 });
+        for plant in plants {
+            let number = coco.annotations.len().to_u64() + 1;
+            coco.annotations.push(Plant { id: number, image_id: id, ..plant.clone() });
+        }
+    }
+    let category = |(id, name): (usize, &String)| Category { id: id.to_u64(), name: name.clone() };
+    coco.categories = classes.iter().enumerate().skip(1).map(category).collect();
+    run::write_json(&path, &coco)
+}
