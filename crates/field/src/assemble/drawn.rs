@@ -3,7 +3,7 @@
 use super::detail::MeshDetail;
 use super::extent::PLANT_MARGIN;
 use super::field_day::FieldDay;
-use super::illumination::{DrawnLights, LightAddress};
+use super::illumination::{DrawnLights, LightAddress, LightsWanted};
 use super::options::Options;
 use super::season::Season;
 use super::{lidar, rig, seed_rows};
@@ -69,12 +69,14 @@ pub(super) fn day(
 }
 
 impl<'a> Drawn<'a> {
-    /// Draws season, day, crops, the field's own lights, cameras and LiDAR. Also returns warnings about them.
+    /// Draws season, day, crops, the field's own lights, cameras and LiDAR. Also returns warnings about them. With
+    /// [`LightsWanted::ForExposure`] the lights are empty unless a camera needs them.
     pub(super) fn draw(
         page: &'a RonFile,
         desc: &'a FieldDesc,
         options: &'a Options,
         library: &mut Library,
+        wanted: LightsWanted,
     ) -> Result<(Self, DrawnLights, Vec<String>)> {
         library.counted.begin(options.memory);
         if let Some(horizon) = &desc.horizon {
@@ -86,12 +88,19 @@ impl<'a> Drawn<'a> {
         let (season, sown) = grown_on(page, desc, (seed, index))?;
         let today = FieldDay::of((page, desc), library, options.day, (sown.clone(), season.place()))?;
         let at = LightAddress { seed, index, light: 0 };
-        let lit = DrawnLights::draw(page, desc, library, at, today.as_ref())?;
+        let mut lit = match wanted {
+            LightsWanted::All => DrawnLights::draw(page, desc, library, at, today.as_ref())?,
+            LightsWanted::ForExposure => DrawnLights::check(page, desc, library, at, today.as_ref())?,
+        };
         // A LiDAR is its own light source.
-        let warnings = lit.warning().filter(|_| options.scan.is_none()).into_iter().collect();
+        let dark = lit.warning().filter(|_| wanted == LightsWanted::All && options.scan.is_none());
+        let warnings = dark.into_iter().collect();
         let mut captures = rig::captures(page, desc, library, &camera, sown.clone(), &|purpose, k| {
             Stream::of(seed, index, purpose, k)
         })?;
+        if wanted == LightsWanted::ForExposure && captures.iter().any(|capture| capture.camera.blurs()) {
+            lit = DrawnLights::draw(page, desc, library, at, today.as_ref())?;
+        }
         lit.expose(&desc.sensor, at, &mut captures);
         let scanners = lidar::at_frames(page, desc, options.scan.as_ref(), (&camera, &captures), (seed, index))?;
         let detail = MeshDetail::of(desc, options.scan.is_some(), &captures);

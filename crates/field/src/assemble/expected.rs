@@ -1,6 +1,7 @@
 //! Queries that need no built field: warnings, cameras, and the number of plants expected in view, computed from densities.
 
 use super::drawn::{Asked, Drawn};
+use super::illumination::LightsWanted;
 use super::{Options, Source, estimate, ground, known, model_spots, models, plausibility, sight};
 use crate::desc::ModelDesc;
 use crate::library::Library;
@@ -20,18 +21,18 @@ impl Source {
 
     /// Returns the warnings of field `options.index` that can be found without building it.
     pub fn expected_warnings(&self, options: &Options) -> Result<Vec<String>> {
-        self.query(options, |asked| self.warnings(asked))
+        self.query_with(LightsWanted::All, options, |asked| self.warnings(asked))
     }
 
     /// Checks everything about field `options.index` that can be checked without building it. Returns the same warnings as
     /// [`Self::expected_warnings`].
     pub fn check(&self, options: &Options) -> Result<Vec<String>> {
-        self.query(options, |asked| self.checked(asked))
+        self.query_with(LightsWanted::All, options, |asked| self.checked(asked))
     }
 
     /// Like [`Self::check`] for one reading of several: the error is about the first mistake. Also returns the files that were read.
     pub(super) fn tried(&self, options: &Options) -> (Result<Vec<String>>, Library) {
-        self.asked(options, |asked| self.checked(asked))
+        self.asked(LightsWanted::All, options, |asked| self.checked(asked))
     }
 
     fn warnings(&self, Asked { drawn, library, warnings }: Asked<'_>) -> Result<Vec<String>> {
@@ -65,9 +66,18 @@ impl Source {
         self.query(options, |asked| Ok(asked.drawn.captures.iter().map(|capture| capture.camera.record()).collect()))
     }
 
-    /// Answers a query about a field without building it.
+    /// Answers a query about a field without building it, and without its lights.
     pub(super) fn query<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> Result<T> {
-        let (answer, library) = self.asked(options, question);
+        self.query_with(LightsWanted::ForExposure, options, question)
+    }
+
+    fn query_with<T>(
+        &self,
+        lights: LightsWanted,
+        options: &Options,
+        question: impl FnOnce(Asked<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let (answer, library) = self.asked(lights, options, question);
         let answer = self.located(answer, &library, options)?;
         // Keep the files that were read for the next field.
         *self.library.lock().unwrap_or_else(PoisonError::into_inner) = library;
@@ -75,9 +85,14 @@ impl Source {
     }
 
     /// Answers a query. Also returns the files that were read for it.
-    fn asked<T>(&self, options: &Options, question: impl FnOnce(Asked<'_>) -> Result<T>) -> (Result<T>, Library) {
+    fn asked<T>(
+        &self,
+        lights: LightsWanted,
+        options: &Options,
+        question: impl FnOnce(Asked<'_>) -> Result<T>,
+    ) -> (Result<T>, Library) {
         let mut library = self.library.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let drawn = Drawn::draw(self.page(), &self.desc, options, &mut library);
+        let drawn = Drawn::draw(self.page(), &self.desc, options, &mut library, lights);
         let answer = drawn.and_then(|(drawn, _, mut warnings)| {
             question(Asked { drawn: &drawn, library: &mut library, warnings: &mut warnings })
         });
@@ -115,4 +130,34 @@ fn expected_plants(Asked { drawn, library, warnings }: Asked<'_>) -> Result<f64>
         _ => sight.view.area.area(),
     };
     Ok(placed + per_m2 * f64::from(area))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rationale: a dataset asks for 64 fields before its first image, and computing their skies would take longer than the answers.
+    /// Expected: plants are counted although the environment map is damaged, which shows that it was not read; a sun below the horizon is
+    /// still an error; a moving camera needs the light for its exposure time, and then the map is an error as well.
+    #[test]
+    fn plants_are_counted_without_computing_lights() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("sky.hdr"), "no image").unwrap();
+        let counted = |lights: &str, motion: &str| {
+            let text = format!(
+                "Field(camera: Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1){motion}), \
+                 lights: [{lights}], weeds: [(species: \"fat hen\", growth: AgeDays(9), spread: (per_m2: 30))])"
+            );
+            let source = Source::of_text(&folder.path().join("page.ron"), &text).unwrap();
+            source.expected_plants(&Options::default()).map_err(|e| e.to_string())
+        };
+        let damaged = "EnvironmentMap(file: \"sky.hdr\")";
+        let moving = ", motion: (speed_m_s: 1)";
+        let night = "Daylight(sun: At(latitude_deg: 50.6, longitude_deg: 7, utc: \"2016-05-27T23:30:00Z\"))";
+        let plants = counted("Constant(radiance: (1, 1, 1, 1))", "");
+        assert!(plants.as_ref().is_ok_and(|plants| *plants > 1.0), "{plants:?}");
+        assert_eq!(counted(damaged, ""), plants);
+        assert!(counted(damaged, moving).unwrap_err().contains("sky.hdr"));
+        assert!(counted(night, "").unwrap_err().contains("below the horizon"));
+    }
 }

@@ -43,13 +43,29 @@ impl LightAddress {
         if self.light == 0 { stream } else { stream.child(Purpose::Relight, self.light) }
     }
 
+    /// Returns the stream for an address under this light, on a day if the field has days.
+    fn daily(self, today: Option<&FieldDay>, address: u64) -> Stream {
+        let stream = Stream::of(self.seed, self.index, Purpose::Page, address);
+        self.relit(today.map_or_else(|| stream.clone(), |today| today.stream(&stream)))
+    }
+
     /// Draws the sensor.
     pub(super) fn sensor(self, desc: &SensorDesc) -> Sensor {
         desc.build(&mut self.stream(Purpose::Sensor, 0))
     }
 }
 
+/// Lights that a caller needs of a field.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum LightsWanted {
+    /// All lights with their records.
+    All,
+    /// Those that determine exposure times of moving cameras, or none. The sky of a daylight takes 40 ms of computing.
+    ForExposure,
+}
+
 /// The lights that a field draws.
+#[derive(Default)]
 pub(super) struct DrawnLights {
     pub(super) lights: Vec<Light>,
     pub(super) records: Vec<LightRecord>,
@@ -65,12 +81,43 @@ impl DrawnLights {
         at: LightAddress,
         today: Option<&FieldDay>,
     ) -> Result<Self> {
-        let daily = |address| {
-            let stream = Stream::of(at.seed, at.index, Purpose::Page, address);
-            at.relit(today.map_or_else(|| stream.clone(), |today| today.stream(&stream)))
-        };
         let (mut lights, mut records) = (Vec::new(), Vec::new());
-        let lists = |place: usize| daily(LIGHTING + place.to_u64());
+        let (lighting, listed) = Self::listed(page, desc, library, at, today)?;
+        for (i, SceneLight { desc: light, at: place }) in listed.into_iter().enumerate() {
+            let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
+            let drawn = light.draw(&mut at.daily(today, 1 + i.to_u64()), &mut open);
+            let (record, drawn) = drawn.map_err(|e| page.blame(&place, e))?;
+            records.push(record);
+            lights.extend(drawn);
+        }
+        Ok(Self { lights, records, lighting })
+    }
+
+    /// Returns the errors of [`Self::draw`] that are found without computing a sky or decoding an environment map, and otherwise no
+    /// lights.
+    pub(super) fn check(
+        page: &RonFile,
+        desc: &FieldDesc,
+        library: &mut Library,
+        at: LightAddress,
+        today: Option<&FieldDay>,
+    ) -> Result<Self> {
+        let (_, listed) = Self::listed(page, desc, library, at, today)?;
+        for (i, SceneLight { desc: light, at: place }) in listed.into_iter().enumerate() {
+            light.check(&mut at.daily(today, 1 + i.to_u64())).map_err(|e| page.blame(&place, e))?;
+        }
+        Ok(Self::default())
+    }
+
+    /// Draws the lists of lights, and notes the files of all lists.
+    fn listed<'a>(
+        page: &RonFile,
+        desc: &'a FieldDesc,
+        library: &mut Library,
+        at: LightAddress,
+        today: Option<&FieldDay>,
+    ) -> Result<(Vec<Lighting>, Vec<SceneLight<'a>>)> {
+        let lists = |place: usize| at.daily(today, LIGHTING + place.to_u64());
         let (lighting, listed) = Lighting::draw(page, &desc.lights, lists)?;
         if listed.len() > MOST_LIGHTS {
             let fault = Error::input(format!("{} lights: a field may have at most {MOST_LIGHTS}", listed.len()))
@@ -81,14 +128,7 @@ impl DrawnLights {
         for file in desc.lights.iter().flat_map(LightDesc::files) {
             library.environment_map_file(page, file)?;
         }
-        for (i, SceneLight { desc: light, at }) in listed.into_iter().enumerate() {
-            let mut open = |file: &str, infrared| library.environment_map(page, file, infrared);
-            let drawn = light.draw(&mut daily(1 + i.to_u64()), &mut open);
-            let (record, drawn) = drawn.map_err(|e| page.blame(&at, e))?;
-            records.push(record);
-            lights.extend(drawn);
-        }
-        Ok(Self { lights, records, lighting })
+        Ok((lighting, listed))
     }
 
     /// Returns the warning about a field without light.

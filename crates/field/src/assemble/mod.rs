@@ -58,7 +58,7 @@ use furrow_base::input::Scope;
 use furrow_base::math::{RoundTo, ToInt};
 use furrow_base::ron_file::{Assignment, RonFile, Spliced, Step};
 use furrow_render::scene::Scene;
-use illumination::LightAddress;
+use illumination::{LightAddress, LightsWanted};
 pub use lighting::Lighting;
 pub use options::{Options, Scanner};
 pub use plausibility::is_about_role;
@@ -221,7 +221,7 @@ impl Source {
 fn build(page: &RonFile, desc: &FieldDesc, options: &Options, library: &mut Library) -> Result<Field> {
     let profiler = &options.profiler;
     profiler.enter(Phase::Other);
-    let (drawn, lit, mut warnings) = Drawn::draw(page, desc, options, library)?;
+    let (drawn, lit, mut warnings) = Drawn::draw(page, desc, options, library, LightsWanted::All)?;
     options.progress.enter(Stage::Estimate);
     profiler.enter(Phase::Estimate);
     let sight = sight::sight(&drawn, &mut warnings)?;

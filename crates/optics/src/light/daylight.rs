@@ -176,6 +176,10 @@ impl Described for DaylightDesc {
         Ok((record, (sun, sky.map(Box::new))))
     }
 
+    fn check(&self, stream: &mut Stream) -> Result<()> {
+        self.sun.draw(stream).map(drop)
+    }
+
     fn examples() -> Vec<(&'static str, Self::Sources)> {
         let mut all = Vec::new();
         for (sun_name, sky_name, elevation, azimuth, turbidity, cloud) in [

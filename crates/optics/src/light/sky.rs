@@ -19,6 +19,7 @@ use super::sample::{Emitter, LampHit, LightSample};
 use furrow_base::math::{RoundTo, Spectrum, ToFloat, Vec3, vec3};
 use furrow_base::sampling::distribution::Distribution2D;
 use rayon::prelude::*;
+use std::sync::LazyLock;
 
 /// Cells along a side of the square.
 const SIDE: usize = 128;
@@ -65,7 +66,7 @@ impl Dome {
             .map(|cell| {
                 let mut sum = Spectrum::ZERO;
                 let mut weight = 0.0;
-                for (dir, solid_angle) in points(cell) {
+                for (dir, solid_angle) in GRID[cell].points {
                     sum += shape.radiance(dir) * solid_angle;
                     weight += solid_angle;
                 }
@@ -121,9 +122,8 @@ impl Dome {
     pub fn irradiance(&self) -> Spectrum {
         let mut sum = [0.0_f64; Spectrum::BANDS];
         for (cell, radiance) in self.cells.iter().enumerate() {
-            let cosine: f32 = points(cell).map(|(dir, solid_angle)| dir.z * solid_angle).sum();
             for (sum, l) in sum.iter_mut().zip(radiance.to_array()) {
-                *sum += f64::from(l) * f64::from(cosine);
+                *sum += f64::from(l) * GRID[cell].cosine;
             }
         }
         Spectrum::from(sum.map(ToFloat::to_f32))
@@ -147,14 +147,12 @@ impl Sky {
         let mut weights = Vec::with_capacity(SIDE * SIDE);
         for (cell, radiance) in dome.cells.iter().enumerate() {
             let mean = radiance.mean();
-            let mut worth = 0.0;
-            for (d, solid_angle) in points(cell) {
-                worth += solid_angle * (1.0 - BY_COSINE + BY_COSINE * d.z);
+            for (d, solid_angle) in GRID[cell].points {
                 for (face, cos) in faces.iter_mut().zip([d.x, -d.x, d.y, -d.y, d.z]) {
                     *face += mean * cos.max(0.0) * solid_angle;
                 }
             }
-            weights.push(mean * worth);
+            weights.push(mean * GRID[cell].worth);
         }
         let distribution = Distribution2D::new(&weights, SIDE)?;
         Some(Self { irradiance: dome.irradiance(), dome, distribution, faces })
@@ -244,13 +242,29 @@ fn cell_of([s, t]: [f32; 2]) -> usize {
     index(t) * SIDE + index(s)
 }
 
-/// Returns the points over which a cell is averaged, with their solid angles.
-fn points(cell: usize) -> impl Iterator<Item = (Vec3, f32)> {
-    let n = (SIDE * SUB).to_f32();
-    let (row, column) = (cell / SIDE * SUB, cell % SIDE * SUB);
-    (0..SUB * SUB).map(move |k| {
-        let st = [((column + k % SUB).to_f32() + 0.5) / n, ((row + k / SUB).to_f32() + 0.5) / n];
-        let d = to_direction(st);
-        (d, 1.0 / (inverse_stretch(d) * n * n))
-    })
+/// Geometry of a cell, which is the same for all skies.
+struct Cell {
+    /// Points over which the cell is averaged: unit directions with their solid angles.
+    points: [(Vec3, f32); SUB * SUB],
+    /// Sum of solid angle × cosine to the zenith.
+    cosine: f64,
+    /// Sum of solid angle × (1 − w + w cos θ).
+    worth: f32,
 }
+
+impl Cell {
+    fn of(cell: usize) -> Self {
+        let n = (SIDE * SUB).to_f32();
+        let (row, column) = (cell / SIDE * SUB, cell % SIDE * SUB);
+        let points = std::array::from_fn(|k| {
+            let st = [((column + k % SUB).to_f32() + 0.5) / n, ((row + k / SUB).to_f32() + 0.5) / n];
+            let d = to_direction(st);
+            (d, 1.0 / (inverse_stretch(d) * n * n))
+        });
+        let sum = |of: fn(Vec3) -> f32| points.iter().map(|(d, solid_angle)| of(*d) * solid_angle).sum::<f32>();
+        Self { points, cosine: f64::from(sum(|d| d.z)), worth: sum(|d| 1.0 - BY_COSINE + BY_COSINE * d.z) }
+    }
+}
+
+/// Cells of the table.
+static GRID: LazyLock<Vec<Cell>> = LazyLock::new(|| (0..SIDE * SIDE).map(Cell::of).collect());

@@ -144,6 +144,14 @@ macro_rules! lights {
                 }
             }
 
+            /// Returns the errors of [`LightDesc::draw`] that need neither a sky nor an environment map.
+            pub fn check(&self, stream: &mut Stream) -> Result<()> {
+                match self {
+                    $(Self::$keyword(desc) => desc.check(stream),)*
+                    Self::OneOf(_) => Err(one_of_inside()),
+                }
+            }
+
             /// Samples the lights as [`LightDesc::build`] does and also returns a record of the sampled values. `open`
             /// loads a file named in the scene file. Returns a [`Kind::Input`](furrow_base::error::Kind::Input) error
             /// for a [`LightDesc::OneOf`], which must be resolved once per scene before.
