@@ -72,6 +72,17 @@ pub fn learn_with(set: &Path, out: &Path, plan: Plan, hyper: Hyperparameters) ->
     TrainedModel::open(out).expect("a trained model")
 }
 
+/// Returns a network with random weights as by [`stirred`], which needs no training of it: the rest of its card is that of a small
+/// network, trained on [`SET`] for these bands.
+pub fn random(network: Network, bands: &'static str, normalization: NormalizationMode, seed: u64) -> TrainedModel {
+    let mut small = learnt(Network::TinyUnet, bands, normalization);
+    let card = &mut small.card;
+    let all = parameters(network, card.input.bands.len(), card.classes.len());
+    card.parameters = all.iter().filter(|p| p.role.is_trainable()).map(|p| p.len()).sum();
+    card.network = network;
+    stirred(&small, seed)
+}
+
 /// Returns the same network with random weights: initial weights, but biases, gains, shifts and statistics away from
 /// their usual initial values.
 pub fn stirred(learnt: &TrainedModel, seed: u64) -> TrainedModel {
