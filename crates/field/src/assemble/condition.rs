@@ -19,6 +19,11 @@ const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
 /// Days after which a leaf has all the damage that the scene file describes: leaves are eaten for about three weeks, until they are tough.
 const MARKED_DAYS: f32 = 21.0;
 
+/// Progress of senescence by which a stalk is behind its blade.
+const STALK_LATER: f32 = 0.15;
+/// Relative increase of a dead leaf's roughness.
+const DULL: f32 = 0.8;
+
 /// A plant's condition, drawn from its description.
 pub(super) struct PlantCondition<'a> {
     desc: &'a ConditionDesc,
@@ -47,6 +52,49 @@ pub(super) struct HealthyOrgan<'a> {
     pub(super) ground: f32,
     /// Number of the plant's last leaf.
     pub(super) last: u16,
+    /// Progress of the leaf's senescence: 0 green, 1 dead.
+    pub(super) senescence: f32,
+}
+
+impl HealthyOrgan<'_> {
+    /// Returns `true` for the flat part of a leaf.
+    fn flat(&self) -> bool {
+        matches!(self.kind, OrganKind::Blade | OrganKind::Cotyledon)
+    }
+
+    /// Adds the senescence of the organ to `marks`.
+    fn aged(&self, marks: Marks) -> Marks {
+        let whole = !self.flat();
+        // A stalk yellows after its blade.
+        let senescence = if whole { (self.senescence - STALK_LATER).max(0.0) } else { self.senescence };
+        Marks { senescence, whole, ..marks }
+    }
+
+    /// Returns the factor on the roughness of the surface: a dry leaf is dull.
+    fn dull(&self) -> f32 {
+        1.0 + DULL * self.senescence
+    }
+}
+
+/// Gives an organ of a plant without a condition the tissue of its senescence; `plant` is the plant's random stream.
+pub(super) fn fade(grown: GrownOrgan, bare: &HealthyOrgan<'_>, plant: &Stream) -> GrownOrgan {
+    if bare.senescence <= 0.0 {
+        return grown;
+    }
+    let image = grown.part.mesh.image_size().filter(|_| bare.flat() && bare.choice.pictured);
+    let marks = Marks {
+        image_mm: image.map_or(NO_IMAGE_MM, |size| (size * 1e3).max(Vec2::splat(0.1))),
+        seed: leaf_stream(plant, grown.part.tag.leaf).child(Purpose::Condition, 30).seed32(),
+        margin: bare.choice.margin.clone().filter(|_| image.is_some()),
+        ..Marks::default()
+    };
+    let optics = ConditionOptics::new(
+        (bare.pigments, bare.choice.tones(bare.pigments)),
+        Some(bare.aged(marks)),
+        0.0,
+        Spectrum::ZERO,
+    );
+    GrownOrgan { material: grown.material.worn(optics, bare.dull()), own: true, ..grown }
 }
 
 impl<'a> PlantCondition<'a> {
@@ -87,10 +135,10 @@ impl<'a> PlantCondition<'a> {
         };
         let stream = leaf_stream(self.stream, leaf);
         let green = if leaf == 0 { self.drawn.greenness } else { self.desc.green(&self.drawn, age, &stream) };
-        let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) };
+        let gloss = if leaf == 0 { 1.0 } else { self.desc.gloss(&stream) * bare.dull() };
         let base = bare.pigments.chlorophyll.f32();
         let own = bare.material.with_chlorophyll(base, bare.green * green);
-        let blade = matches!(bare.kind, OrganKind::Blade | OrganKind::Cotyledon);
+        let blade = bare.flat();
         // Leaflets share an image but have separate holes.
         let pieces = match grown.part.mesh.image_size() {
             Some(_) if blade && bare.choice.pictured => grown.part.mesh.pieces(),
@@ -101,6 +149,13 @@ impl<'a> PlantCondition<'a> {
         for (k, mesh) in pieces.into_iter().enumerate() {
             let of_piece = stream.child(Purpose::Condition, 100 + k.to_u64());
             let marks = blade.then(|| self.marks(leaf, &mesh, (age, share), bare, &of_piece));
+            let old = bare.senescence > 0.0;
+            let bearing = || Marks {
+                image_mm: NO_IMAGE_MM,
+                seed: of_piece.child(Purpose::Condition, 30).seed32(),
+                ..Marks::default()
+            };
+            let marks = if old { Some(bare.aged(marks.unwrap_or_else(bearing))) } else { marks };
             let chlorophyll = base * bare.green * green;
             let mut one = GrownOrgan { chlorophyll, material: own.clone(), ..grown.with(mesh) };
             if let Some(marks) = marks.as_ref().filter(|m| m.cuts()) {

@@ -1,6 +1,6 @@
 //! A plant to be grown, and its growth at its position.
 
-use super::condition::{HealthyOrgan, PlantCondition};
+use super::condition::{self, HealthyOrgan, PlantCondition};
 use super::field_day::{FieldDay, emerging};
 use super::grown::GrownOrgan;
 use super::individual::Individual;
@@ -142,8 +142,16 @@ pub(super) fn grow(
         let cut = matches!(organ.kind, OrganKind::Blade | OrganKind::Cotyledon);
         let age = plant.ages.get(&organ.leaf).filter(|_| cut);
         let material = aged(&chosen.material, pigments, age);
-        let bare =
-            HealthyOrgan { kind: organ.kind, material: &material, choice: chosen, pigments, green, ground: z, last };
+        let bare = HealthyOrgan {
+            kind: organ.kind,
+            material: &material,
+            choice: chosen,
+            pigments,
+            green,
+            ground: z,
+            last,
+            senescence: organ.senescence,
+        };
         let grown = GrownOrgan {
             part: Part {
                 mesh: Arc::new(mesh),
@@ -161,7 +169,7 @@ pub(super) fn grow(
         };
         match &ailing {
             Some(ailing) => ailing.dress(&grown, &bare),
-            None => vec![grown],
+            None => vec![condition::fade(grown, &bare, shape)],
         }
     });
     let organs = organs.collect();

@@ -2,7 +2,7 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::growth::{Growth, growth};
-use super::stage::BUD;
+use super::stage::{BUD, StageDesc};
 use super::stems;
 use furrow_base::math::lerp;
 use furrow_base::sampling::Stream;
@@ -37,7 +37,8 @@ pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
     let mut ages = BTreeMap::new();
     for leaf in growth.leaves.iter().rev() {
         younger = younger.max(leaf.blade);
-        let days = (growth.age_days - born(growth, leaf.layer)).max(0.0);
+        let born = born(&growth.desc.stages, leaf.layer).unwrap_or(growth.age_days);
+        let days = (growth.age_days - born).max(0.0);
         ages.insert(leaf.number, LeafAge { unfolded: younger / longest, days });
     }
     for stem in stems::others(growth) {
@@ -48,14 +49,14 @@ pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
     ages
 }
 
-/// Returns the age in days at which a layer could first be seen: half-way to the first stage that has it.
-fn born(growth: &Growth<'_>, layer: usize) -> f32 {
-    let stages = &growth.desc.stages;
-    let Some(first) = stages.iter().position(|s| s.layers.len() > layer) else { return growth.age_days };
-    match first.checked_sub(1) {
+/// Returns the age in days at which a layer could first be seen: half-way to the first stage that has it. `None` if no
+/// stage has it.
+pub(super) fn born(stages: &[StageDesc], layer: usize) -> Option<f32> {
+    let first = stages.iter().position(|s| s.layers.len() > layer)?;
+    Some(match first.checked_sub(1) {
         Some(before) => 0.5 * (stages[before].days.f32() + stages[first].days.f32()),
         None => 0.0,
-    }
+    })
 }
 
 /// Returns, by leaf number, when each leaf of the plant of `stream` appears and how large it becomes, with all sizes

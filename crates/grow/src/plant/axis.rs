@@ -148,7 +148,16 @@ pub(super) fn stem(
     let material = material(&growth.desc.stem_material);
     let on = if stemless {
         let carried = vec![StemVertices { corners: mesh.positions.len(), line: foot.line, at: Some(foot.at) }];
-        organs.push(Organ { kind: OrganKind::Stem, leaf: 0, material, mesh, axis: None, lines: Vec::new(), carried });
+        organs.push(Organ {
+            kind: OrganKind::Stem,
+            leaf: 0,
+            material,
+            senescence: 0.0,
+            mesh,
+            axis: None,
+            lines: Vec::new(),
+            carried,
+        });
         vec![foot; nodes.len()]
     } else {
         let number = organ::next_line(organs);

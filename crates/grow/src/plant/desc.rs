@@ -3,6 +3,7 @@
 use super::flower_desc::FlowerDesc;
 use super::inflorescence_check;
 use super::kind::LeafKind;
+use super::senescence::SenescenceDesc;
 use super::stage::{MOST_SHOOTS, StageDesc, Tilt};
 use super::twine::TwineDesc;
 use furrow_base::math::ToFloat;
@@ -116,6 +117,10 @@ pub struct PlantDesc {
     #[schemars(default)]
     #[schemars(extend("x-example" = "(share: 0.6, radius_mm: Uniform(2, 4), pitch_mm: Uniform(25, 45), height_mm: Uniform(80, 160))"))]
     pub twine: Option<TwineDesc>,
+    /// How old leaves yellow, dry and fall.
+    #[serde(skip_serializing_if = "SenescenceDesc::is_default")]
+    #[schemars(default, extend("x-example" = "(days: Uniform(14, 20))"))]
+    pub senescence: SenescenceDesc,
     /// Material of the hypocotyl; if empty, `"stalk"`.
     #[schemars(default)]
     #[schemars(extend("x-example" = "\"leaf\""))]
@@ -152,6 +157,8 @@ struct Written {
     lies_at: (Num<Positive<1000>>, Num<Positive<1000>>),
     #[serde(default)]
     twine: Option<TwineDesc>,
+    #[serde(default)]
+    senescence: SenescenceDesc,
     #[serde(default)]
     hypocotyl_material: String,
     #[serde(default)]
@@ -206,6 +213,7 @@ impl<'de> Deserialize<'de> for PlantDesc {
                 lean_deg: w.lean_deg,
                 lies_at: w.lies_at,
                 twine: w.twine,
+                senescence: w.senescence,
                 hypocotyl_material: w.hypocotyl_material,
                 stem_material: w.stem_material,
             };

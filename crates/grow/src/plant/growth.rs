@@ -6,6 +6,7 @@
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
 use super::numbers::Numbers;
+use super::senescence::End;
 use super::stage::{BUD, MOST_SHOOTS, StageDesc};
 use furrow_base::math::{RoundTo, ToFloat, ToInt, lerp};
 use furrow_base::ron_file::{Bound, NonNegative, Vary};
@@ -37,6 +38,12 @@ pub(super) struct LeafState<'a> {
     pub(super) twist: f32,
     /// Arch of the stalk in addition to the kind's.
     pub(super) arch: f32,
+    /// Curl of each half in addition to the kind's.
+    pub(super) curl: f32,
+    /// Amplitude of waves and blisters in addition to the kind's, as a fraction of the length.
+    pub(super) crumple: f32,
+    /// Progress of senescence: 0 green, 1 dead.
+    pub(super) senescence: f32,
     /// Shortest cell of its mesh, metres.
     pub(super) cell: f32,
     /// Whether its meshes keep the skin weights.
@@ -213,6 +220,10 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
     let (tillers, branches) = (whole_at(4, |s| &s.tillers), whole_at(5, |s| &s.branches));
     let (mut leaves, mut rise, mut height, mut number) = (Vec::new(), Vec::new(), 0.0, 0);
     let mut axils = Vec::new();
+    let days = match stage {
+        Stage::Age(days) => days.min(to.days.f32()),
+        Stage::Bbch(_) => lerp(from.days.f32(), to.days.f32(), u),
+    };
     for (k, layer) in to.layers.iter().enumerate() {
         let before = from.layers.get(k);
         let ends = (before, layer);
@@ -221,6 +232,12 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         rise.push(height);
         let alpha = between.draw(ends, None, &shared, 1, |l| &l.alpha);
         let n = layer.leaves.get().trunc_to::<u32>();
+        let end = End::of(desc, k);
+        // A leaf that falls keeps the size and the posture that it had.
+        let ends = match before {
+            Some(before) if end.before(to) => (Some(before), before),
+            _ => ends,
+        };
         for i in 0..n {
             number += 1;
             let plant = stream;
@@ -231,7 +248,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
             let Some((name, kind)) = desc.kinds.get_key_value(&layer.kind) else { continue };
             let azimuth = spin + PI * (2.0 * i.to_f32() / n.to_f32() + alpha) + jitter;
             axils.push((k, azimuth));
-            if blade < BUD {
+            let senescence = desc.senescence.progress(&end, kind.organ, days, &stream);
+            if blade < BUD || senescence >= 1.0 {
                 continue;
             }
             let grown = before.map_or(u, |_| 1.0);
@@ -252,6 +270,9 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 fold: lerp(fold.max(0.9), fold, grown),
                 twist: 0.0,
                 arch: 0.0,
+                curl: 0.0,
+                crumple: 0.0,
+                senescence,
                 cell: CELL,
                 rigged: false,
                 stream,

@@ -119,7 +119,8 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lo
         on: seat.on,
         bearer: None,
     };
-    organs.push(Organ::of_leaf(kind, leaf.number, material, mesh, Some(axis)));
+    let senescence = leaf.senescence;
+    organs.push(Organ { senescence, ..Organ::of_leaf(kind, leaf.number, material, mesh, Some(axis)) });
     let mut rest = stalk(leaf, &skeleton, &relief, lower, &mut stream);
     let ringed = rest.positions.len();
     rest.append(spined);
@@ -133,7 +134,7 @@ pub(super) fn grow(organs: &mut Vec<Organ>, leaf: &LeafState<'_>, seat: Seat, lo
         mesh.append(&skin::skin(stipules, &motions, leaf.rigged));
     }
     let kind = if lower == Lower::Petiole { OrganKind::Petiole } else { OrganKind::Sheath };
-    organs.push(Organ::of_leaf(kind, leaf.number, &leaf.kind.stalk_material, mesh, None));
+    organs.push(Organ { senescence, ..Organ::of_leaf(kind, leaf.number, &leaf.kind.stalk_material, mesh, None) });
 }
 
 /// Returns the number of vertices around the stalk.
@@ -271,10 +272,10 @@ fn relief(leaf: &LeafState<'_>, stream: &mut Stream) -> BladeRelief {
     let relief = BladeRelief {
         fold: leaf.fold,
         fold_tip: 0.6 * leaf.fold,
-        curl: kind.curl_deg.draw32(stream).to_radians(),
-        wave: kind.wave.draw32(stream),
+        curl: kind.curl_deg.draw32(stream).to_radians() + leaf.curl,
+        wave: kind.wave.draw32(stream) + leaf.crumple,
         period: kind.wave_period.draw32(stream),
-        quilt: kind.quilt.draw32(stream),
+        quilt: kind.quilt.draw32(stream) + 0.5 * leaf.crumple,
         pairs: kind.vein_pairs.f32(),
         slant: if angle > 0.1 { angle.tan().recip() } else { 0.0 },
         asymmetry: kind.asymmetry.draw32(stream),

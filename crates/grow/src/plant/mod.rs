@@ -26,7 +26,8 @@
 //! | `twine` | twining shoots |
 //! | `rig`, `stem_rig` | joints of leaves and stems, exported for animation |
 //! | `stems` | several main stems of one plant |
-//! | `condition` | senescence, health and damage of a plant and its leaves |
+//! | `senescence` | yellowing, drying and fall of old leaves |
+//! | `condition` | health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
 //! To add a growth form, write a file with a `grow(&Growth) -> Vec<Organ>` and add one line to `forms!` (`desc.rs`).
@@ -57,6 +58,7 @@ mod ribbons;
 mod rig;
 mod rosette;
 mod runner;
+mod senescence;
 pub mod skeleton;
 pub mod skin;
 mod spines;
@@ -79,6 +81,7 @@ pub use inflorescence_desc::{FlowersDesc, InflorescenceDesc, Seat, StemLeafDesc}
 pub use kind::{LeafKind, Shape, Spines, Stipules};
 pub use organ::{LeafAxis, LeafSize, Organ, OrganKind, StemLine, StemPosition, StemVertices};
 pub use rig::RigJoint;
+pub use senescence::SenescenceDesc;
 pub use skeleton::PlacedJoint;
 pub use stage::{BUD, LayerDesc, StageDesc};
 pub use twine::TwineDesc;
@@ -175,6 +178,7 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     if let Some((desc, condition)) = options.condition {
         condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
     }
+    growth.leaves.iter_mut().for_each(senescence::wither);
     for leaf in &mut growth.leaves {
         leaf.cell = options.cell.max(leaf.cell);
         leaf.rigged = options.rigged;

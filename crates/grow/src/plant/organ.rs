@@ -153,6 +153,8 @@ pub struct Organ {
     pub leaf: u16,
     /// Key in the species file's `materials`.
     pub material: String,
+    /// Progress of the leaf's senescence: 0 green, 1 dead.
+    pub senescence: f32,
     /// Mesh in plant coordinates: metres, growth axis +z, origin where the stem meets the soil.
     pub mesh: Mesh,
     /// Keypoints, size and joints of the leaf in the same coordinates; present for blades only.
@@ -166,13 +168,22 @@ pub struct Organ {
 impl Organ {
     /// Builds an organ of a leaf.
     pub(super) fn of_leaf(kind: OrganKind, leaf: u16, material: &str, mesh: Mesh, axis: Option<LeafAxis>) -> Self {
-        Self { kind, leaf, material: material.to_owned(), mesh, axis, lines: Vec::new(), carried: Vec::new() }
+        Self {
+            kind,
+            leaf,
+            material: material.to_owned(),
+            senescence: 0.0,
+            mesh,
+            axis,
+            lines: Vec::new(),
+            carried: Vec::new(),
+        }
     }
 
     /// Builds a stem along a line.
     pub(super) fn stem(kind: OrganKind, material: String, mesh: Mesh, line: StemLine) -> Self {
         let carried = vec![StemVertices { corners: mesh.positions.len(), line: line.number, at: None }];
-        Self { kind, leaf: 0, material, mesh, axis: None, lines: vec![line], carried }
+        Self { kind, leaf: 0, material, senescence: 0.0, mesh, axis: None, lines: vec![line], carried }
     }
 
     /// Returns the tip of the last stem in the mesh, or the attachment of the last appendage.

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 
 mod build;
+mod senescence;
 mod sizes;
 
 /// Material; only its roughness is read.

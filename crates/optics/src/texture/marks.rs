@@ -144,6 +144,10 @@ pub struct Marks {
     pub dust: f32,
     /// Expected number of specks of soil in a square of side [`SPECK_MM`].
     pub splash: f32,
+    /// Progress of senescence: 0 green, 1 dead. Tip and margin yellow and brown first.
+    pub senescence: f32,
+    /// Whether it proceeds everywhere at once, as in a stalk.
+    pub whole: bool,
     /// Distances to the margin; `None` if the texture covers the leaf entirely.
     pub margin: Option<Arc<Margin>>,
 }
@@ -161,7 +165,7 @@ impl Marks {
 
     /// Returns `true` if the leaf is complete, healthy and clean.
     pub fn nothing(&self) -> bool {
-        let none = [self.chlorosis, self.scorch_mm, self.dust, self.splash].iter().all(|x| *x <= 0.0);
+        let none = [self.chlorosis, self.scorch_mm, self.dust, self.splash, self.senescence].iter().all(|x| *x <= 0.0);
         none && !self.cuts() && self.blotches.is_empty() && self.spots.is_empty()
     }
 
@@ -238,6 +242,11 @@ impl Marks {
             t.brown = t.brown.max(smoothstep(width + soft, 0.7 * width, inward) * (width / 0.3).min(1.0));
             t.yellow = t.yellow.max(0.8 * smoothstep(3.0 * width + soft, width, inward) * (width / 0.6).min(1.0));
         }
+        if self.senescence > 0.0 {
+            let (yellow, brown) = self.senescent(uv, n(11.0, 17.3));
+            t.yellow = t.yellow.max(yellow);
+            t.brown = t.brown.max(brown);
+        }
         if self.dust > 0.0 {
             // Dust forms patches of a few mm with fine grain.
             t.soil = (self.dust * (1.0 + 0.8 * n(5.0, 11.0) + 0.6 * n(0.7, 23.0))).clamp(0.0, 0.95);
@@ -249,6 +258,18 @@ impl Marks {
             t.shade = 1.0 + 0.3 * n(0.9, 31.0) + 0.15 * n(0.3, 5.0);
         }
         t
+    }
+
+    /// Returns yellowness and dead fraction of a senescent leaf at `uv`. Two fronts run from tip and margin to the base:
+    /// yellow first, brown after it. `noise` displaces them.
+    fn senescent(&self, uv: Vec2, noise: f32) -> (f32, f32) {
+        let half_mm = (0.45 * self.image_mm.x).max(1e-3);
+        let inward = self.margin.as_ref().map_or(uv.y, |margin| margin.at(uv) * self.image_mm.y / half_mm);
+        let late = if self.whole { 0.6 } else { 0.7 * uv.y.clamp(0.0, 1.0) + 0.3 * inward.clamp(0.0, 1.0) };
+        let place = (late + 0.14 * noise).clamp(0.0, 1.1);
+        let [yellow, brown] = [0.36 * place, 0.42 + 0.34 * place];
+        let s = self.senescence;
+        (smoothstep(yellow, yellow + 0.24, s), smoothstep(brown, brown + 0.2, s))
     }
 
     /// Returns `true` if a point of the remaining leaf is within the dead rim of a hole, a bite or a tear. `noise` is
@@ -303,5 +324,26 @@ mod tests {
             let share = held.count().to_f32() * 0.05 * 0.05 / (std::f32::consts::PI * patch.radius * patch.radius);
             assert!((share - 1.0).abs() < 0.2, "{stretch}: {share}");
         }
+    }
+
+    /// Rationale: a leaf does not fade as a whole. Expected: its tip yellows before its base and browns before it, the
+    /// tissue is first yellow and then brown, a dead leaf is dead everywhere, and a stalk changes everywhere at once.
+    /// Source: Botany 87 (2009), 1036–1053 (from apex to base).
+    #[test]
+    fn a_leaf_yellows_and_browns_from_its_tip() {
+        let noise = Perlin::new(3);
+        let mean = |senescence: f32, whole: bool, v: f32| {
+            let marks = Marks { senescence, whole, image_mm: vec2(20.0, 60.0), ..Marks::default() };
+            let points = (0..40).map(|i| marks.tissue(vec2((i.to_f32() + 0.5) / 40.0, v), &noise));
+            let sums = points.fold((0.0, 0.0), |sum, t| (sum.0 + t.yellow, sum.1 + t.brown));
+            (sums.0 / 40.0, sums.1 / 40.0)
+        };
+        let [tip, base] = [0.1, 0.9];
+        assert!(mean(0.2, false, tip).0 > 0.5 && mean(0.2, false, base).0 < 0.1);
+        assert!(mean(0.5, false, base).0 > 0.5 && mean(0.5, false, base).1 < 0.05);
+        assert!(mean(0.6, false, tip).1 > 0.5 && mean(0.6, false, base).1 < 0.1);
+        assert!([tip, base].iter().all(|v| mean(1.0, false, *v).1 > 0.95));
+        assert!((mean(0.5, true, tip).0 - mean(0.5, true, base).0).abs() < 0.1);
+        assert_eq!(mean(0.0, false, tip), (0.0, 0.0));
     }
 }

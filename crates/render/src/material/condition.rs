@@ -306,6 +306,30 @@ mod tests {
         assert!(g < 0.8 * g0 && r > 0.75 * r0 && (nir - nir0).abs() < 0.01, "{r} {g} {nir}");
     }
 
+    /// Rationale: withering cotyledons must show the colours of senescence in all bands. Expected: green, then yellow and
+    /// brighter in red than in green, then brown and darker than yellow; NDVI falls all the way, within the ranges of
+    /// measured leaves: green 0.65–0.92, yellow 0.2–0.65, dead 0.1–0.32.
+    #[test]
+    fn a_senescent_leaf_turns_from_green_to_yellow_to_brown() {
+        let leaf = LeafOptics::new(&Pigments::default()).plain();
+        let at = |senescence: f32| {
+            let of = optics(Marks { senescence, whole: true, ..Marks::default() }, 0.0);
+            of.at(leaf, vec2(0.5, 0.5), None).upper
+        };
+        let [green, yellow, brown] = [0.0, 0.46, 1.0].map(at);
+        let rgb = |leaf: Leaf| leaf.reflectance.0.truncate();
+        assert!(
+            rgb(green).y > 1.4 * rgb(green).x && rgb(yellow).x > rgb(yellow).y && rgb(brown).x > 1.2 * rgb(brown).y
+        );
+        let luminance = [green, yellow, brown].map(|leaf| leaf.reflectance.luminance());
+        assert!(luminance[1] > 1.6 * luminance[0] && luminance[2] < 0.95 * luminance[1], "{luminance:?}");
+        let ndvi = [green, yellow, brown].map(ndvi);
+        assert!((0.65..0.92).contains(&ndvi[0]) && (0.2..0.65).contains(&ndvi[1]), "{ndvi:?}");
+        assert!((0.1..0.32).contains(&ndvi[2]), "{ndvi:?}");
+        // Dead tissue without water transmits less than yellow tissue.
+        assert!(brown.transmittance.luminance() < yellow.transmittance.luminance());
+    }
+
     proptest! {
         #[test]
         fn no_worn_leaf_returns_more_than_it_receives(

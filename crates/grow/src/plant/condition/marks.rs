@@ -95,6 +95,8 @@ impl Bearer<'_> {
             dust,
             splash,
             margin: self.margin.cloned(),
+            senescence: 0.0,
+            whole: false,
         };
         match self.met {
             Some(share) => until::until(marks, share, stream),

@@ -10,7 +10,7 @@ mod marks;
 mod posture;
 
 pub use marks::Bearer;
-pub(super) use posture::Posture;
+pub(super) use posture::{Posture, droop};
 
 use furrow_base::math::ToFloat;
 use furrow_base::ron_file::{Bound, Fraction, NonNegative, Num, Positive, Vary};

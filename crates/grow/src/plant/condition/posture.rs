@@ -46,7 +46,8 @@ impl<'a> Posture<'a> {
     }
 }
 
-fn droop(leaf: &mut LeafState<'_>, wilt: f32) {
+/// Lets a leaf hang as at a wilt of `wilt`, 0–1.
+pub(in crate::plant) fn droop(leaf: &mut LeafState<'_>, wilt: f32) {
     let [angle, arch, nod, hang, sink] = LIMP_DEG.map(f32::to_radians);
     leaf.angle += (angle - leaf.angle).max(0.0) * 0.7 * wilt;
     leaf.arch += arch * wilt;

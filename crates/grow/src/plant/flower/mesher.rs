@@ -126,7 +126,8 @@ impl FlowerMesher {
             organ.carried.push(carried);
         } else {
             let (material, mesh, lines) = (material.to_owned(), mesh.clone(), line.into_iter().collect());
-            self.organs.push(Organ { kind, leaf: 0, material, mesh, axis: None, lines, carried: vec![carried] });
+            let carried = vec![carried];
+            self.organs.push(Organ { kind, leaf: 0, material, senescence: 0.0, mesh, axis: None, lines, carried });
         }
     }
 
