@@ -104,7 +104,7 @@ pub(super) fn bank(drawn: &Drawn<'_>, seedlings: &[Seedling], dust: Spectrum) ->
         drawn.options.wanted()?;
         let stream = drawn.stream(Purpose::Plant, member.population).child(BANK, member.number);
         let own = Seedling { position: Vec2::ZERO, turn: 0.0, member: None, stream, ..(*like).clone() };
-        let place = PlantSite { height: 0.0, normal: Vec3::Z, dust, cell: member.cell(), rigged: false };
+        let place = PlantSite { height: 0.0, normal: Vec3::Z, rise: 0.0, dust, cell: member.cell(), rigged: false };
         let (record, organs) = grow(&own, &place, |_| true)?;
         Ok((*member, Arc::new(Model { record, organs, green: greenness(&own) })))
     };

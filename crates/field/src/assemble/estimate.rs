@@ -193,7 +193,7 @@ fn size(seedling: &Seedling, cell: f32) -> Result<(f64, f64)> {
     }
     // Holes and spots are expensive to compute and do not change the triangles.
     let healthy = Seedling { condition: None, ..seedling.clone() };
-    let place = PlantSite { height: 0.0, normal: Vec3::Z, dust: LOESS, cell, rigged: false };
+    let place = PlantSite { height: 0.0, normal: Vec3::Z, rise: 0.0, dust: LOESS, cell, rigged: false };
     let (_, organs) = grow(&healthy, &place, |_| true)?;
     let organs = organs.unwrap_or_default();
     let triangles = organs.iter().map(|organ| organ.part.mesh.triangles.len()).sum::<usize>();

@@ -67,6 +67,8 @@ pub(super) struct PlantSite {
     pub(super) height: f32,
     /// Normal of the ground around the plant.
     pub(super) normal: Vec3,
+    /// Height of the highest crumb or plate around the foot above the plane of the ground, metres.
+    pub(super) rise: f32,
     /// Reflectance of the dry soil that covers leaves as dust.
     pub(super) dust: Spectrum,
     /// Minimum cell length of the mesh, metres.
@@ -82,7 +84,7 @@ pub(super) fn grow(
     place: &PlantSite,
     wanted: impl FnOnce(&PlantRecord) -> bool,
 ) -> Result<(PlantRecord, Option<Vec<GrownOrgan>>)> {
-    let PlantSite { height: z, normal, dust, cell, rigged } = *place;
+    let PlantSite { height: z, normal, rise, dust, cell, rigged } = *place;
     let desc: &SpeciesDesc = &s.species.desc;
     let mut stream = s.stream.clone();
     let (drawn, green) = begun(s, &mut stream);
@@ -99,7 +101,8 @@ pub(super) fn grow(
         }
         vigour *= emerging(&desc.plant, days);
     }
-    let options = GrowOptions { vigour, condition: ailing.as_ref().map(PlantCondition::posture), cell, rigged };
+    let condition = ailing.as_ref().map(PlantCondition::posture);
+    let options = GrowOptions { vigour, condition, cell, rigged, rise };
     let plant = match &s.individual {
         Some(individual) => individual.plant(desc, stage, &stream, &options),
         None => plant::grow_with(&desc.plant, stage, &stream, &options),

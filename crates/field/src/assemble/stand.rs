@@ -27,6 +27,9 @@ use std::sync::Arc;
 /// Maximum shadow length considered, in plant heights: for a sun 20° above the horizon.
 pub(super) const SHADOW: f32 = 2.75;
 
+/// Radius around a plant's foot within which the ground's crumbs and plates hold up its leaves, metres.
+const NEAR: f32 = 0.02;
+
 /// A placed plant.
 enum PlacedPlant {
     /// A plant with its own meshes.
@@ -71,7 +74,8 @@ pub(super) fn plant(
             let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
             return Ok(PlacedPlant::Shared(Box::new(record), member, own));
         }
-        let place = PlantSite { height, normal, dust, cell: cell(seedling.position), rigged: options.rigged };
+        let rise = floor.map_or(0.0, |f| if f.flat { 0.0 } else { f.ground.rise(f.maps, x, y, NEAR) });
+        let place = PlantSite { height, normal, rise, dust, cell: cell(seedling.position), rigged: options.rigged };
         let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
         let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));
         if let Some(known) = known {

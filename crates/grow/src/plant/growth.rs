@@ -44,6 +44,8 @@ pub(super) struct LeafState<'a> {
     pub(super) crumple: f32,
     /// Progress of senescence: 0 green, 1 dead.
     pub(super) senescence: f32,
+    /// Height of the ground's crumbs around the plant, metres.
+    pub(super) rise: f32,
     /// Shortest cell of its mesh, metres.
     pub(super) cell: f32,
     /// Whether its meshes keep the skin weights.
@@ -273,6 +275,7 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
                 curl: 0.0,
                 crumple: 0.0,
                 senescence,
+                rise: 0.0,
                 cell: CELL,
                 rigged: false,
                 stream,

@@ -222,7 +222,9 @@ fn pose(skeleton: &mut Skeleton, leaf: &LeafState<'_>, root: Pose, lower: Lower,
         .collect();
     let total: f32 = sag.iter().sum::<f32>().max(1e-6);
     let mut height = root.origin.z;
-    let (near, far) = (0.5 * height, LYING.min(0.2 * leaf.blade) + LYING_WIDTH * leaf.width);
+    let far = LYING.min(0.2 * leaf.blade) + LYING_WIDTH * leaf.width + leaf.rise;
+    // Where the stem is short, the ground around it lifts the base of the leaf too.
+    let near = (0.5 * height).max(leaf.rise.min(height));
     let (start, whole) = (along[0], along[along.len() - 1] - along[0]);
     let mut elevation = root.rotation.col(0).z.clamp(-1.0, 1.0).asin();
     for k in 0..along.len() - 1 {

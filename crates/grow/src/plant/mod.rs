@@ -145,6 +145,9 @@ pub struct GrowOptions<'a> {
     /// Shortest cell of a blade's mesh, metres. A coarser mesh changes no random number and moves a leaf by less than
     /// one cell.
     pub cell: f32,
+    /// Height of the crumbs or plates of the ground around the foot, metres: leaves that lie on the ground lie this much
+    /// higher.
+    pub rise: f32,
     /// Whether to export the joints of leaves and stems ([`LeafAxis::rig`], [`Plant::rig`]) and the skin weights of the
     /// vertices.
     pub rigged: bool,
@@ -153,9 +156,12 @@ pub struct GrowOptions<'a> {
 impl Default for GrowOptions<'_> {
     /// Returns unit vigour, no condition, no rig, and the mesh resolution of field cameras.
     fn default() -> Self {
-        Self { vigour: 1.0, condition: None, cell: growth::CELL, rigged: false }
+        Self { vigour: 1.0, condition: None, cell: growth::CELL, rise: 0.0, rigged: false }
     }
 }
+
+/// Largest height of the ground around a plant that lifts its leaves, metres.
+const MOST_RISE: f32 = 0.012;
 
 /// Grows one plant with default options.
 pub fn grow(desc: &PlantDesc, stage: Stage, stream: &Stream) -> Plant {
@@ -182,6 +188,7 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     for leaf in &mut growth.leaves {
         leaf.cell = options.cell.max(leaf.cell);
         leaf.rigged = options.rigged;
+        leaf.rise = options.rise.clamp(0.0, MOST_RISE);
     }
     growth.rigged = options.rigged;
     let mut organs = organs_of(desc.form, &growth);

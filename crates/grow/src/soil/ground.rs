@@ -101,20 +101,39 @@ pub struct Ground {
     look: OnceLock<Appearance>,
 }
 
-/// Returns the unit normal of the plane fitted to heights within `radius` of a point.
-fn plane(x: f32, y: f32, radius: f32, height: impl Fn(f32, f32) -> f32) -> Vec3 {
-    let mut slope = Vec2::ZERO;
+/// Plane fitted to the ground around a point.
+struct Plane {
+    /// Height at the point, metres.
+    level: f32,
+    slope: Vec2,
+    /// Height of the highest sample above the plane, metres.
+    rise: f32,
+}
+
+/// Returns the plane fitted to heights within `radius` of a point.
+fn plane(x: f32, y: f32, radius: f32, height: impl Fn(f32, f32) -> f32) -> Plane {
+    const RINGS: u8 = 3;
+    const POINTS: u8 = 12;
+    let mut heights = [[0.0; POINTS as usize]; RINGS as usize];
+    let reach = |ring: usize| radius * (ring + 1).to_f32() / f32::from(RINGS);
+    let place =
+        |ring: usize, k: usize| Vec2::from_angle(k.to_f32() * std::f32::consts::TAU / f32::from(POINTS)) * reach(ring);
+    let (mut slope, mut weight, mut level) = (Vec2::ZERO, 0.0, 0.0);
     // Opposite points on three rings: Σ h·d is the least-squares slope times Σ d²/2.
-    let mut weight = 0.0;
-    for ring in 1..=3u8 {
-        let r = radius * f32::from(ring) / 3.0;
-        for k in 0..12u8 {
-            let d = Vec2::from_angle(f32::from(k) * std::f32::consts::TAU / 12.0) * r;
-            slope += d * height(x + d.x, y + d.y);
-            weight += 0.5 * r * r;
+    for (ring, row) in heights.iter_mut().enumerate() {
+        for (k, h) in row.iter_mut().enumerate() {
+            let d = place(ring, k);
+            *h = height(x + d.x, y + d.y);
+            slope += d * *h;
+            weight += 0.5 * reach(ring) * reach(ring);
+            level += *h;
         }
     }
-    up(if weight > 0.0 { slope / weight } else { Vec2::ZERO })
+    let slope = if weight > 0.0 { slope / weight } else { Vec2::ZERO };
+    let level = level / f32::from(RINGS * POINTS);
+    let above = |ring: usize, k: usize| heights[ring][k] - level - slope.dot(place(ring, k));
+    let rise = (0..heights.len()).flat_map(|ring| (0..heights[ring].len()).map(move |k| (ring, k)));
+    Plane { level, slope, rise: rise.map(|(ring, k)| above(ring, k)).fold(0.0, f32::max) }
 }
 
 impl Ground {
@@ -402,14 +421,27 @@ impl Ground {
         up(row(k).lerp(row(k + self.grid.columns()), ty))
     }
 
-    /// Returns the height, metres, and the unit normal of the plane fitted to the ground within `radius` of a point, on
-    /// which a plant stands. If clods are part of the heights, they are left out and the cells are [`FULL_CELL_M`]
+    /// Returns the height, metres, at which a plant stands, and the unit normal of the plane fitted to the ground within
+    /// `radius` of it. A shoot that emerges in a crack or between crumbs grows to the surface around it, so the height
+    /// is at least the plane's. If clods are part of the heights, they are left out and the cells are [`FULL_CELL_M`]
     /// whatever the grid, so that plants stand as they do at full detail.
     pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
+        let (height, plane) = self.around(maps, x, y, radius);
+        (height.max(plane.level), up(plane.slope))
+    }
+
+    /// Returns the height of the highest crumb or plate within `radius` of a point above the plane of
+    /// [`Ground::stance`], metres. A leaf that lies on the ground lies on it.
+    pub fn rise<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> f32 {
+        self.around(maps, x, y, radius).1.rise
+    }
+
+    /// Returns the height at a point without clods and the plane fitted around it.
+    fn around<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Plane) {
         let Sizes { drawn, .. } = self.sizes;
         // Beyond the fine grid, use the mesh as it is: cells as long as a row's width do not resolve its profile.
         if drawn.0 >= drawn.1 || !self.area().contains(vec2(x, y)) {
-            return (self.height(x, y), self.trend(x, y, radius));
+            return (self.height(x, y), plane(x, y, radius, |x, y| self.height(x, y)));
         }
         let height = |x: f32, y: f32| {
             let p = vec2(x, y);
@@ -425,7 +457,7 @@ impl Ground {
 
     /// Returns the unit normal of the plane fitted to the ground within `radius` of a point.
     pub fn trend(&self, x: f32, y: f32, radius: f32) -> Vec3 {
-        plane(x, y, radius, |x, y| self.height(x, y))
+        up(plane(x, y, radius, |x, y| self.height(x, y)).slope)
     }
 
     /// Returns the area of the fine grid: the requested one, widened to whole steps.

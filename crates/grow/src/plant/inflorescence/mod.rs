@@ -269,6 +269,7 @@ impl<'a> AxisBuilder<'a, '_> {
                 curl: 0.0,
                 crumple: 0.0,
                 senescence: 0.0,
+                rise: 0.0,
                 cell: self.pen.cell,
                 rigged: self.growth.rigged,
                 stream: own,
