@@ -117,8 +117,9 @@ fn leaf(path: &Path) -> (draw::LeafRecipe, Texture) {
 }
 
 /// Rationale: the renderer uses texels as reflectances. Expected: the mean of every leaf is in the range of measured
-/// leaves, and green is the strongest band. Source: LOPEX93 band means of soybean, maize, lettuce: R 0.06–0.11, G
-/// 0.09–0.14, B 0.05–0.08 of the camera, whose blue band is wider than the eye's.
+/// leaves, and green is the strongest band. Source: LOPEX93 band means of tomato, soybean, maize, lettuce and bindweed:
+/// R 0.053–0.114, G 0.09–0.14, B 0.05–0.08 of the camera, whose red band reaches further into the dark red and whose
+/// blue band is wider than the eye's. By the leaf model, R of 0.053–0.114 is 0.052–0.132 in the bands of textures.
 #[test]
 fn leaves_reflect_what_leaves_reflect() {
     for path in recipes("leaf") {
@@ -135,7 +136,7 @@ fn leaves_reflect_what_leaves_reflect() {
             }
         }
         let [r, g, b] = sum.map(|s| s / weight);
-        let ok = (0.04..0.16).contains(&r) && (0.08..0.20).contains(&g) && (0.02..0.10).contains(&b) && g > 1.15 * r;
+        let ok = (0.05..0.132).contains(&r) && (0.08..0.20).contains(&g) && (0.02..0.10).contains(&b) && g > 1.15 * r;
         assert!(ok && largest < 0.6, "{}: {r:.3} {g:.3} {b:.3}, at most {largest}", path.display());
     }
 }
