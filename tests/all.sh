@@ -4,6 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bash tests/peers.sh build
+# A fresh clone compiles everything once: data for later compilations would take a fifth more CPU time and gigabytes of disk. Where
+# such data exist, what was compiled with them is used.
+[ -d target/debug/incremental ] || export CARGO_INCREMENTAL=0
 # Downloads while the processor compiles.
 bash tests/peers.sh libtorch & libtorch=$!
 bash tests/peers.sh packages python & peers=$!
