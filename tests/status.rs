@@ -5,8 +5,8 @@
 //! exact, the estimated bytes and memory are within 30 %, and no file is left behind. Source: the files themselves,
 //! counted and measured here.
 
-use crate::common::dataset::{SIZE, fail, made, make, path, same, succeed, tree, verb};
-use crate::common::program::{SMALL, names, scratch, small_text, trace};
+use crate::common::dataset::{SIZE, fail, made, make, make_plants, path, same, succeed, tree, verb};
+use crate::common::program::{PLANT, SMALL, names, scratch, small_text, trace};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -94,7 +94,7 @@ fn a_dataset_that_is_done_says_so() {
 #[test]
 fn images_whose_files_are_gone_are_missing() {
     let (_keep, data) = scratch();
-    succeed(make(&data, 6, &[]));
+    succeed(make_plants(&data, 6, &[]));
     fs::remove_file(data.join("images/000000/plants.png")).unwrap();
     fs::remove_file(data.join("imagefolder/train/masks/000002.png")).unwrap();
     fs::File::options().write(true).open(data.join("images/000003/rgb.png")).unwrap().set_len(9).unwrap();
@@ -109,7 +109,7 @@ fn images_whose_files_are_gone_are_missing() {
     assert!((number(&found, "left_s") / expected - 1.0).abs() < 1e-6, "{found}");
     let words = reported(&data, &[]);
     assert!(words.contains("2 of 6 images") && words.contains("left") && !words.contains("all done"), "{words}");
-    succeed(make(&data, 6, &[]));
+    succeed(make_plants(&data, 6, &[]));
     assert_eq!(number(&status(&data, &[]), "done"), 6.0);
 }
 
@@ -134,7 +134,7 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
     for (signal, state) in [("-USR1", "stopped"), ("-KILL", "working")] {
         let (_keep, data) = scratch();
         let mut child =
-            make(&data, 500, &["--at-once", "2"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            make_plants(&data, 4000, &["--at-once", "2"]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         some_images(&data, &mut child);
         let running = status(&data, &[]);
         assert_eq!((number(&running, "working"), &running["shards"][0]["state"]), (1.0, &Value::from("working")));
@@ -146,7 +146,7 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
         assert_eq!(found["shards"][0]["state"], *state, "{signal}");
         let sealed = names(&data.join("seals")).iter().filter(|name| !name.starts_with('.')).count();
         assert_eq!(number(&found, "done") as usize, sealed, "{signal}");
-        assert!(sealed < 500, "{signal}: the run finished before the signal");
+        assert!(sealed < 4000, "{signal}: the run finished before the signal");
         assert_eq!(found["left_s"].as_f64().map(|left| left > 0.0), Some(true), "{signal}");
         if signal == "-KILL" {
             // The time of the last row, moved back by an hour.
@@ -175,7 +175,7 @@ fn a_run_that_is_stopped_or_killed_leaves_its_status() {
 #[test]
 fn watching_ends_with_a_signal() {
     let (_keep, data) = scratch();
-    succeed(trace(&[&["dataset", "plan", "--scene", SMALL, "--count", "3", "--out", path(&data)], &SIZE[..]].concat()));
+    succeed(trace(&[&["dataset", "plan", "--scene", PLANT, "--count", "3", "--out", path(&data)], &SIZE[..]].concat()));
     let before = tree(&data);
     let mut child =
         verb("status", &data, &["--watch", "--json"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
@@ -232,7 +232,7 @@ fn failed_images_are_listed_with_their_errors() {
 #[test]
 fn shards_are_reported_separately() {
     let (_keep, data) = scratch();
-    succeed(trace(&[&["dataset", "plan", "--scene", SMALL, "--count", "5", "--out", path(&data)], &SIZE[..]].concat()));
+    succeed(trace(&[&["dataset", "plan", "--scene", PLANT, "--count", "5", "--out", path(&data)], &SIZE[..]].concat()));
     succeed(verb("render", &data, &["--shard", "1/2", "--quiet"]));
     let found = status(&data, &[]);
     let shards = found["shards"].as_array().unwrap();
@@ -419,16 +419,16 @@ fn a_dry_run_refuses_what_the_run_refuses() {
         command
     };
     let begun = ["--keep", "none", "--format", "coco"];
-    succeed(order(&data, SMALL, "1", &[&["--count", "2"][..], &begun].concat()));
+    succeed(order(&data, PLANT, "1", &[&["--count", "2"][..], &begun].concat()));
     let before = tree(keep.path());
     for (out, scene, spp, more, reported) in [
         (&data, "scenes/01-one-leaf.ron", "1", &["--count", "2"][..], "another dataset is in this folder: "),
-        (&data, SMALL, "2", &["--count", "2"], "spp 1 there, 2 here"),
-        (&data, SMALL, "1", &["--count", "2", "--seed", "7"], "seed 3 there, 7 here"),
-        (&data, SMALL, "1", &["--count", "2", "--keep", "depth"], "maps of --keep [] there"),
-        (&data, SMALL, "1", &["--count", "2", "--format", "ply"], "--format ply holds "),
-        (&data, SMALL, "1", &["--count", "1"], "it has 2 images, more than 1"),
-        (&full, SMALL, "1", &["--count", "2"], "this folder contains other files, such as notes.txt"),
+        (&data, PLANT, "2", &["--count", "2"], "spp 1 there, 2 here"),
+        (&data, PLANT, "1", &["--count", "2", "--seed", "7"], "seed 3 there, 7 here"),
+        (&data, PLANT, "1", &["--count", "2", "--keep", "depth"], "maps of --keep [] there"),
+        (&data, PLANT, "1", &["--count", "2", "--format", "ply"], "--format ply holds "),
+        (&data, PLANT, "1", &["--count", "1"], "it has 2 images, more than 1"),
+        (&full, PLANT, "1", &["--count", "2"], "this folder contains other files, such as notes.txt"),
     ] {
         let words = [&["--dry-run"][..], &[]].map(|dry| fail(order(out, scene, spp, &[more, dry].concat()), 2));
         assert!(words[0] == words[1] && words[0].contains(reported), "{more:?}: {words:?}");
@@ -436,8 +436,8 @@ fn a_dry_run_refuses_what_the_run_refuses() {
     }
     let longer = ["--count", "3", "--dry-run"];
     let [goes_on, anew] = [
-        order(&data, SMALL, "1", &longer),
-        order(&keep.path().join("new"), SMALL, "1", &[&longer[..], &begun].concat()),
+        order(&data, PLANT, "1", &longer),
+        order(&keep.path().join("new"), PLANT, "1", &[&longer[..], &begun].concat()),
     ]
     .map(|command| rows(command)["files"].clone());
     assert_eq!(goes_on, anew);
