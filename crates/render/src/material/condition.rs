@@ -307,8 +307,8 @@ mod tests {
     }
 
     /// Rationale: withering cotyledons must show the colours of senescence in all bands. Expected: green, then yellow and
-    /// brighter in red than in green, then brown and darker than yellow; NDVI falls all the way, within the ranges of
-    /// measured leaves: green 0.65–0.92, yellow 0.2–0.65, dead 0.1–0.32.
+    /// brighter in red than in green, then brown and darker than yellow; NDVI as of measured leaves: green 0.65–0.92,
+    /// yellow 0.15–0.4 (the leaf model with 6 µg/cm² of chlorophyll has 0.2 to 0.3), dead 0.1–0.32.
     #[test]
     fn a_senescent_leaf_turns_from_green_to_yellow_to_brown() {
         let leaf = LeafOptics::new(&Pigments::default()).plain();
@@ -324,7 +324,7 @@ mod tests {
         let luminance = [green, yellow, brown].map(|leaf| leaf.reflectance.luminance());
         assert!(luminance[1] > 1.6 * luminance[0] && luminance[2] < 0.95 * luminance[1], "{luminance:?}");
         let ndvi = [green, yellow, brown].map(ndvi);
-        assert!((0.65..0.92).contains(&ndvi[0]) && (0.2..0.65).contains(&ndvi[1]), "{ndvi:?}");
+        assert!((0.65..0.92).contains(&ndvi[0]) && (0.15..0.4).contains(&ndvi[1]), "{ndvi:?}");
         assert!((0.1..0.32).contains(&ndvi[2]), "{ndvi:?}");
         // Dead tissue without water transmits less than yellow tissue.
         assert!(brown.transmittance.luminance() < yellow.transmittance.luminance());
