@@ -366,7 +366,8 @@ fn buried(field: &Field) -> BTreeMap<u32, f32> {
 fn seedlings_stand_on_rough_and_on_crusted_ground() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/species");
     let files = std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
-    let mut species: Vec<String> = files.filter(|name| name.ends_with(".ron")).collect();
+    let mut species: Vec<String> =
+        files.filter(|name| Path::new(name).extension().is_some_and(|ending| ending == "ron")).collect();
     species.sort();
     let plants: Vec<String> = (10..=12)
         .flat_map(|bbch| species.iter().map(move |name| (bbch, name)))

@@ -7,7 +7,7 @@ use furrow_dataset::model::classes::Classes;
 use furrow_train::data::{Band, Pick, Selection, Shape};
 use furrow_train::fit::hyper::NormalizationMode;
 use furrow_train::fit::{Callbacks, Hyperparameters, Plan, log};
-use furrow_train::net::{Network, Role, parameters};
+use furrow_train::net::{Network, Parameter, Role, parameters};
 use furrow_train::run::TrainedModel;
 use furrow_train::session::{self, Machine};
 use furrow_train::weights;
@@ -78,7 +78,7 @@ pub fn random(network: Network, bands: &'static str, normalization: Normalizatio
     let mut small = learnt(Network::TinyUnet, bands, normalization);
     let card = &mut small.card;
     let all = parameters(network, card.input.bands.len(), card.classes.len());
-    card.parameters = all.iter().filter(|p| p.role.is_trainable()).map(|p| p.len()).sum();
+    card.parameters = all.iter().filter(|p| p.role.is_trainable()).map(Parameter::len).sum();
     card.network = network;
     stirred(&small, seed)
 }

@@ -10,6 +10,7 @@ use super::fit::logits;
 use super::fit::warnings::warnings;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
+use super::net::plants::is_of_plants;
 use super::net::{Extras, Parameter, film, fitting, plants};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
@@ -219,7 +220,11 @@ pub(super) fn train(
         if plan.hyper.logit_adjustment > 0.0 {
             logits::adjust(&mut outcome.values, &data.train, plan.classes.len(), plan.hyper.logit_adjustment)?;
         }
-        let extras = Extras { species: plan.species.len(), plants: plan.plants.is_some() };
+        if plan.plants.is_none() {
+            // The plant decoder of the run that the training starts from; it goes on reading the encoder.
+            outcome.values.extend(begin.iter().filter(|array| is_of_plants(&array.name)).cloned());
+        }
+        let extras = Extras::of(&outcome.values);
         let list = extras.parameters(plan.network, bands, classes);
         let card = ModelCard {
             furrow: env!("CARGO_PKG_VERSION").into(),
@@ -233,7 +238,7 @@ pub(super) fn train(
             classes: plan.classes.clone(),
             crops: crops.to_vec(),
             species: plan.species.clone(),
-            plants: plan.plants.is_some(),
+            plants: extras.plants,
             weights: run::WEIGHTS.into(),
             weights_sha256: weights::hash(&outcome.values),
             plan_sha256: hash,

@@ -2,7 +2,7 @@
 
 use super::desc::{PlantDesc, Stage};
 use super::growth::{Growth, growth};
-use super::stage::{BUD, StageDesc};
+use super::stage::{BUD, born};
 use super::stems;
 use furrow_base::math::lerp;
 use furrow_base::sampling::Stream;
@@ -47,16 +47,6 @@ pub(super) fn ages(growth: &Growth<'_>) -> BTreeMap<u16, LeafAge> {
         ages.extend(own);
     }
     ages
-}
-
-/// Returns the age in days at which a layer could first be seen: half-way to the first stage that has it. `None` if no
-/// stage has it.
-pub(super) fn born(stages: &[StageDesc], layer: usize) -> Option<f32> {
-    let first = stages.iter().position(|s| s.layers.len() > layer)?;
-    Some(match first.checked_sub(1) {
-        Some(before) => 0.5 * (stages[before].days.f32() + stages[first].days.f32()),
-        None => 0.0,
-    })
 }
 
 /// Returns, by leaf number, when each leaf of the plant of `stream` appears and how large it becomes, with all sizes

@@ -6,6 +6,7 @@
 use super::desc::{PlantDesc, Stage};
 use super::kind::LeafKind;
 use super::numbers::Numbers;
+use super::organ::OrganKind;
 use super::senescence::End;
 use super::stage::{BUD, MOST_SHOOTS, StageDesc};
 use furrow_base::math::{RoundTo, ToFloat, ToInt, lerp};
@@ -234,7 +235,8 @@ pub(super) fn growth<'a>(desc: &'a PlantDesc, stage: Stage, stream: &'a Stream, 
         rise.push(height);
         let alpha = between.draw(ends, None, &shared, 1, |l| &l.alpha);
         let n = layer.leaves.get().trunc_to::<u32>();
-        let end = End::of(desc, k);
+        let is_blade = |kind: &str| desc.kinds.get(kind).is_some_and(|kind| kind.organ == OrganKind::Blade);
+        let end = End::of(&desc.senescence, &desc.stages, is_blade, k);
         // A leaf that falls keeps the size and the posture that it had.
         let ends = match before {
             Some(before) if end.before(to) => (Some(before), before),

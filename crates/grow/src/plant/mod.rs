@@ -26,7 +26,7 @@
 //! | `twine` | twining shoots |
 //! | `rig`, `stem_rig` | joints of leaves and stems, exported for animation |
 //! | `stems` | several main stems of one plant |
-//! | `senescence` | yellowing, drying and fall of old leaves |
+//! | `senescence`, `wither` | when old leaves yellow, dry and fall; their posture and shape |
 //! | `condition` | health and damage of a plant and its leaves |
 //! | `rosette`, `whorl`, `erect`, `dissected`, `tuft`, `cane`, `runner` | growth forms |
 //!
@@ -71,6 +71,7 @@ mod tube;
 mod tuft;
 mod twine;
 mod whorl;
+mod wither;
 
 pub use age::{LeafAge, LeafLife};
 pub use bound::most_triangles;
@@ -184,7 +185,7 @@ pub fn grow_with(desc: &PlantDesc, stage: Stage, stream: &Stream, options: &Grow
     if let Some((desc, condition)) = options.condition {
         condition::Posture::new(desc, condition, stream).apply(&mut growth.leaves);
     }
-    growth.leaves.iter_mut().for_each(senescence::wither);
+    growth.leaves.iter_mut().for_each(wither::wither);
     for leaf in &mut growth.leaves {
         leaf.cell = options.cell.max(leaf.cell);
         leaf.rigged = options.rigged;

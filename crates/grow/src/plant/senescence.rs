@@ -25,13 +25,9 @@
 //! - lower leaves of maize: Borrás, Maddonni & Otegui 2003, Field Crops Research 82, 13–26 (abstract);
 //! - durations and angles: estimates.
 
-use super::age;
-use super::condition::droop;
-use super::desc::PlantDesc;
-use super::growth::LeafState;
 use super::organ::OrganKind;
-use super::stage::StageDesc;
-use furrow_base::math::{RoundTo, ToFloat, lerp, smoothstep};
+use super::stage::{StageDesc, born};
+use furrow_base::math::{RoundTo, ToFloat, lerp};
 use furrow_base::ron_file::{Fraction, Num, Positive, Vary};
 use furrow_base::sampling::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
@@ -40,20 +36,10 @@ use serde::{Deserialize, Serialize};
 const SLOWER: f32 = 1.5;
 /// Earliest position of the fall between the last stage with the leaf and the first without it.
 const EARLIEST: f32 = 0.7;
-/// Wilt of a limp leaf, see [`droop`].
-const LIMP: f32 = 0.85;
-/// Fractions of its length and of its width that a dry leaf has lost.
-const SHRUNK: (f32, f32) = (0.05, 0.2);
-/// Curl of each half of a dry leaf, radians: range drawn from.
-const ROLLED: (f32, f32) = (1.0, 2.3);
-/// Fraction of the leaves whose margins roll up rather than down.
-const ROLLED_UP: f64 = 0.75;
-/// Amplitude of the folds of a dry blade, as a fraction of its length.
-const CRUMPLED: f32 = 0.022;
 /// Largest progress of a leaf that stays on the plant.
 const STAYS: f32 = 0.98;
 /// First address of the leaf's random streams for senescence.
-const ADDRESS: u64 = 110;
+pub(super) const ADDRESS: u64 = 110;
 
 /// Senescence of the leaves of a species.
 ///
@@ -125,19 +111,24 @@ pub(super) struct End<'a> {
 }
 
 impl<'a> End<'a> {
-    /// Returns the end of a layer's leaves.
-    pub(super) fn of(desc: &'a PlantDesc, layer: usize) -> Self {
-        let fall = Fall::of(&desc.stages, layer);
-        let oldest = desc.senescence.oldest.f32();
+    /// Returns the end of a layer's leaves. `is_blade` says whether the leaves of a kind are blades, not cotyledons.
+    pub(super) fn of(
+        desc: &SenescenceDesc,
+        stages: &'a [StageDesc],
+        is_blade: impl Fn(&str) -> bool,
+        layer: usize,
+    ) -> Self {
+        let fall = Fall::of(stages, layer);
+        let oldest = desc.oldest.f32();
         if oldest == 0.0 {
             return Self { fall, old_from: None };
         }
-        let layers = desc.stages.last().map_or(&[][..], |stage| &stage.layers);
-        let blade = |k: &usize| desc.kinds.get(&layers[*k].kind).is_some_and(|kind| kind.organ == OrganKind::Blade);
+        let layers = stages.last().map_or(&[][..], |stage| &stage.layers);
+        let blade = |k: &usize| is_blade(&layers[*k].kind);
         let count = (0..layers.len()).filter(blade).count();
         let rank = (0..layer.min(layers.len())).filter(blade).count();
         let old = layer < layers.len() && blade(&layer) && rank < (oldest * count.to_f32()).round_to::<usize>();
-        Self { fall, old_from: age::born(&desc.stages, layer).filter(|_| old) }
+        Self { fall, old_from: born(stages, layer).filter(|_| old) }
     }
 
     /// Returns `true` if `stage` is the first without the leaves.
@@ -160,23 +151,4 @@ impl<'a> Fall<'a> {
         let pair = stages.windows(2).find(|pair| there(&pair[0]) && !there(&pair[1]))?;
         Some(Self { with: &pair[0], without: &pair[1] })
     }
-}
-
-/// Changes posture and shape of a leaf according to its senescence.
-pub(super) fn wither(leaf: &mut LeafState<'_>) {
-    let s = leaf.senescence;
-    if s <= 0.0 {
-        return;
-    }
-    let (limp, dry) = (smoothstep(0.1, 0.75, s), smoothstep(0.5, 1.0, s));
-    let mut stream = leaf.stream.child(Purpose::Leaf, ADDRESS + 2);
-    let rolled = stream.range32(ROLLED.0, ROLLED.1);
-    let side = if stream.chance(ROLLED_UP) { 1.0 } else { -1.0 };
-    droop(leaf, LIMP * limp * stream.range32(0.8, 1.1));
-    leaf.blade *= 1.0 - SHRUNK.0 * dry;
-    leaf.width *= 1.0 - SHRUNK.1 * dry;
-    leaf.curl = side * rolled * dry;
-    leaf.crumple = CRUMPLED * dry;
-    // The fold of a turgid leaf opens, or closes as its halves roll.
-    leaf.fold *= lerp(1.0, 0.5, dry);
 }

@@ -143,3 +143,13 @@ fn is_none(share: &Num<Fraction>) -> bool {
 fn vary<B: Bound>() -> Vary<B> {
     Vary::fixed(0.0)
 }
+
+/// Returns the age in days at which a layer could first be seen: half-way to the first stage that has it. `None` if no
+/// stage has it.
+pub(super) fn born(stages: &[StageDesc], layer: usize) -> Option<f32> {
+    let first = stages.iter().position(|s| s.layers.len() > layer)?;
+    Some(match first.checked_sub(1) {
+        Some(before) => 0.5 * (stages[before].days.f32() + stages[first].days.f32()),
+        None => 0.0,
+    })
+}

@@ -4,7 +4,7 @@
 //! edges; labels are taken from the nearest pixel. Every image at every step has its own random stream, so neither threads nor
 //! restarts change the samples.
 
-use super::crop::{self, Crop, GeometricAugmentation, Placement};
+use super::crop::{self, Augmented, Crop, GeometricAugmentation, Placement};
 use super::erase;
 use super::example::Example;
 use super::normalise::{self, Normalization};
@@ -143,12 +143,11 @@ impl Augment {
         let anywhere = size == image || rare == 0.0 || !stream.chance(rare);
         let about = if anywhere { None } else { crop::rare_pixel(&example.labels, image, stream) };
         let placement = Placement::draw(self.moves(), crop, about, stream);
-        let Augmented { mut pixels, mut labels, mut plants } = match &placement {
-            Some(placement) => placement.read(example, crop),
-            None => {
-                let (labels, plants) = (example.labels.clone(), example.plants.clone());
-                Augmented { pixels: interleave(example, 1), labels, plants }
-            }
+        let Augmented { mut pixels, mut labels, mut plants } = if let Some(placement) = &placement {
+            placement.read(example, crop)
+        } else {
+            let (labels, plants) = (example.labels.clone(), example.plants.clone());
+            Augmented { pixels: interleave(example, 1), labels, plants }
         };
         if self.erase {
             erase::erase(&mut pixels, &mut labels, size, stream);
@@ -190,17 +189,6 @@ impl Augment {
         normalise::scale(&mut pixels, &scales);
         Augmented { pixels, labels, plants }
     }
-}
-
-/// Crop of a training image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Augmented {
-    /// Pixels, bands interleaved.
-    pub pixels: Vec<f32>,
-    /// Class of each pixel; 255 for no label.
-    pub labels: Vec<u8>,
-    /// Plant number of each pixel, 0 for none; empty unless the example has them.
-    pub plants: Vec<u32>,
 }
 
 /// Every `THINNED`-th pixel is used for mean and standard deviation of a whole image. The step is prime, so that the sampled columns

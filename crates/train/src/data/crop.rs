@@ -1,6 +1,5 @@
 //! Random crops of training images.
 
-use super::augment::Augmented;
 use super::example::Example;
 use super::ground::Ground;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
@@ -20,6 +19,17 @@ pub struct Crop {
     pub rare: f64,
     /// Pixel sizes on the ground for scaling; `None` to scale by 1/1.5 to 1.5.
     pub ground: Option<Ground>,
+}
+
+/// Crop of a training image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Augmented {
+    /// Pixels, bands interleaved.
+    pub pixels: Vec<f32>,
+    /// Class of each pixel; 255 for no label.
+    pub labels: Vec<u8>,
+    /// Plant number of each pixel, 0 for none; empty unless the example has them.
+    pub plants: Vec<u32>,
 }
 
 /// Largest number of sample points across a pixel of a reduced crop.

@@ -40,9 +40,9 @@ pub mod resize;
 pub mod select;
 pub mod store;
 
-pub use augment::{Augment, Augmented};
+pub use augment::Augment;
 pub use bands::Band;
-pub use crop::Crop;
+pub use crop::{Augmented, Crop};
 pub use example::{Example, Shape, Wanted};
 pub use ground::{AugmentScale, Ground, PixelSizes};
 pub use loader::{Batch, Loader};

@@ -2,10 +2,11 @@
 //!
 //! Plants are those of the crop that a step is trained on: one that the crop cuts is the part inside it, as in photographs.
 
-use crate::net::plants::UNIT;
 use furrow_base::math::ToFloat;
 use std::collections::BTreeMap;
 
+/// Length of a vector of 1, pixels.
+pub const UNIT: f64 = 32.0;
 /// Number of planes of the targets: the channels of the plant decoder, then the weight of the pixel.
 pub const PLANES: usize = 4;
 /// Smallest area of a plant that is learnt, pixels.

@@ -27,7 +27,8 @@ pub struct Plant {
     bbox: Box2,
     iscrowd: u8,
     /// Number of the plant in the plant map.
-    plant: u32,
+    #[serde(rename = "plant")]
+    number: u32,
 }
 
 /// An image with predicted plants.
@@ -82,7 +83,7 @@ impl Found {
                 area: counts.values().sum(),
                 bbox: bounds,
                 iscrowd: 0,
-                plant,
+                number: plant,
             }
         };
         Self { size, plants: all.into_iter().map(plant).collect() }

@@ -263,9 +263,9 @@ fn step(
     };
     let batches = batches.iter().map(|batch| (batch, pass, 1.0));
     let photographs = photographs.iter().map(|(batch, share)| (batch, Pass::Training, *share));
-    let learns = |name: &str| match plan.plants.is_some() {
-        true => is_of_plants(name),
-        false => !is_of_plants(name) && (encoder > 0.0 || !is_encoder(name)),
+    let learns = |name: &str| {
+        let of_plants = is_of_plants(name);
+        if plan.plants.is_some() { of_plants } else { !of_plants && (encoder > 0.0 || !is_encoder(name)) }
     };
     let mut gradients = Gradients::new(model, learns);
     let mut losses: Vec<f64> = Vec::new();

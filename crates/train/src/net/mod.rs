@@ -7,6 +7,7 @@
 //! To add a network, add one file and one line in the table below.
 
 mod basic_segnet;
+mod extras;
 pub mod film;
 mod footprint;
 mod lite_unet;
@@ -18,11 +19,11 @@ mod tiny_unet;
 mod unet;
 mod vit_unet;
 
+pub use extras::Extras;
 pub use footprint::{Footprint, MULTIPLIED_OUT};
 pub use parameters::{Parameter, Role, fitting, is_encoder, matching, parameters};
 pub use pretrained::Pretrained;
 
-use crate::weights::Array;
 use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
 
@@ -211,36 +212,17 @@ impl Network {
     }
 }
 
-/// Optional parts of a network, with parameters of their own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Extras {
-    /// Number of species that it takes as the crop; see [`film`].
-    pub species: usize,
-    /// Whether it has a plant decoder; see [`plants`].
-    pub plants: bool,
-}
-
-impl Extras {
-    /// Returns the optional parts that these arrays contain.
-    pub fn of(arrays: &[Array]) -> Self {
-        Self { species: film::species(arrays), plants: plants::has_plants(arrays) }
-    }
-
-    /// Returns all parameters of a network with these parts.
-    pub fn parameters(self, network: Network, bands: usize, classes: usize) -> Vec<Parameter> {
-        let mut all = parameters(network, bands, classes);
-        all.extend(film::film(network, bands, classes, self.species));
-        all.extend(self.plants.then(|| plants::plants(network, bands, classes)).into_iter().flatten());
-        all
-    }
-}
-
 /// Convolution, batch norm and, if `relu`, ReLU, with the parameter names `name.conv` and `name.bn`.
 fn unit<O: Operations>(o: &mut O, x: &O::Value, name: &str, conv: Conv, relu: bool) -> O::Value {
     let y = o.conv(x, &format!("{name}.conv"), conv);
     let y = o.norm(&y, &format!("{name}.bn"), Norm { channels: conv.outputs, epsilon: 1e-5 });
     if relu { o.relu(&y) } else { y }
 }
+
+/// Prefix of the names of the plant decoder's parameters.
+const PLANTS: &str = "plants.";
+/// Number of channels of the plant decoder.
+const PLANT_CHANNELS: usize = 3;
 
 /// Decoders of a U-Net, from the deepest value and its number of channels. Each level of `widths` channels upsamples with the nearest
 /// neighbour to the last remaining skip value, concatenates that, and applies two 3 × 3 convolutions. Without a remaining skip value it
@@ -258,7 +240,7 @@ fn decode<O: Operations>(
     if o.wants_plants() {
         let kept = skips.iter().rev().map(|(skip, channels)| (skip, *channels));
         let widths = &widths[..widths.len() - 1];
-        let found = branch(o, x, (&deepest, channels), kept, widths, (plants::PREFIX, plants::CHANNELS));
+        let found = branch(o, x, (&deepest, channels), kept, widths, (PLANTS, PLANT_CHANNELS));
         let found = o.enlarge(&found, x);
         o.plants(found);
     }

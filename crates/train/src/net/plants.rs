@@ -14,14 +14,13 @@
 
 use super::parameters::list;
 use super::{Network, Parameter};
+pub use crate::data::plants::UNIT;
 use crate::weights::Array;
 
 /// Prefix of the names of the decoder's parameters.
-pub const PREFIX: &str = "plants.";
+pub const PREFIX: &str = super::PLANTS;
 /// Number of channels: two components of the vector, x to the right and y downwards, and the logarithm of the radius.
-pub const CHANNELS: usize = 3;
-/// Length of a vector of 1, pixels.
-pub const UNIT: f64 = 32.0;
+pub const CHANNELS: usize = super::PLANT_CHANNELS;
 
 /// Returns whether a parameter or layer of this name belongs to the plant decoder.
 pub fn is_of_plants(name: &str) -> bool {

@@ -28,20 +28,6 @@ pub struct Vectors {
 }
 
 impl Vectors {
-    /// Returns the sum of both.
-    #[must_use]
-    pub fn plus(mut self, other: &Self) -> Self {
-        self.planes.iter_mut().zip(&other.planes).for_each(|(a, b)| *a += b);
-        self
-    }
-
-    /// Returns all values times a factor.
-    #[must_use]
-    pub fn times(mut self, factor: f32) -> Self {
-        self.planes.iter_mut().for_each(|v| *v *= factor);
-        self
-    }
-
     /// Returns vector and radius of a pixel of `n`.
     fn of(&self, at: usize, n: usize) -> [f32; 3] {
         [0, 1, 2].map(|plane| self.planes[plane * n + at])
@@ -91,7 +77,9 @@ impl Votes {
         let place = |vote: &Vote| cell(vote.y) * columns + cell(vote.x);
         list.sort_by_key(place);
         let mut starts = vec![0; columns * rows + 1];
-        list.iter().for_each(|vote| starts[place(vote) + 1] += 1);
+        for vote in &list {
+            starts[place(vote) + 1] += 1;
+        }
         (1..starts.len()).for_each(|k| starts[k] += starts[k - 1]);
         Self { columns, rows, starts, list }
     }
@@ -193,7 +181,9 @@ pub fn instances(size: (usize, usize), own: &[u8], vectors: Option<&Vectors>) ->
             continue;
         }
         plants.push(mean);
-        taken.iter().for_each(|k| votes.list[*k].plant = plants.len().to_u32());
+        for k in taken {
+            votes.list[k].plant = plants.len().to_u32();
+        }
     }
     let mut labels = vec![0u32; own.len()];
     for vote in &votes.list {

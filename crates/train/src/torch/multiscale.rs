@@ -5,7 +5,7 @@ use crate::data::Band;
 use crate::data::example::nearest;
 use crate::data::resize::Input;
 use crate::enlarge::classes_at;
-use crate::net::plants::UNIT;
+use crate::net::plants::{CHANNELS, UNIT};
 use crate::refine::{Appearance, Evidence, Examples, Features, Refine, Seen, Vectors, fill, instances};
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
@@ -15,6 +15,8 @@ use tch::{Kind, Tensor};
 const LEARNT: usize = 64;
 /// Largest logarithm of a plant's radius that is used: 8,000 pixels.
 const LARGEST: f32 = 9.0;
+/// Radius at which the vectors of an input have half of the weight, pixels of the input.
+const RELIABLE: f32 = 40.0;
 
 /// Scores of the classes for one image.
 pub struct Scores {
@@ -120,11 +122,16 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
     if let ([model], [input]) = (models, inputs) {
         let wanted = Wanted { features: refine.appearance, plants: true };
         let Outputs { scores, features, plants } = model.outputs(&input.pixels, size, wanted)?;
-        let vectors = plants.map(|plants| vectors(&plants, size, size)).transpose()?;
+        let vectors = plants.map(|plants| -> Result<_> {
+            let mut sum = WeightedSum::new(size);
+            sum.add(&plants, size, size)?;
+            Ok(sum.mean())
+        });
+        let vectors = vectors.transpose()?;
         return Ok(Scores { values: values(&scores)?, size, finest: None, features, vectors, are_logits: true });
     }
     let mut sums: Vec<f32> = Vec::new();
-    let (mut finest, mut features, mut summed) = (None, None, None::<Vectors>);
+    let (mut finest, mut features, mut summed) = (None, None, None::<WeightedSum>);
     for input in inputs {
         let mut mean: Vec<f32> = Vec::new();
         for (k, model) in models.iter().enumerate() {
@@ -132,8 +139,7 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
             let found = model.outputs(&input.pixels, input.size, Wanted { features: first, plants: k == 0 })?;
             features = features.or(found.features);
             if let Some(plants) = &found.plants {
-                let found = vectors(plants, input.size, size)?;
-                summed = Some(summed.map_or_else(|| found.clone(), |sum| sum.plus(&found)));
+                summed.get_or_insert_with(|| WeightedSum::new(size)).add(plants, input.size, size)?;
             }
             add(&mut mean, values(&resized(&found.scores.softmax(1, Kind::Float), input.size, size))?);
         }
@@ -145,19 +151,45 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
         }
         add(&mut sums, mean);
     }
-    let vectors = summed.map(|sum| sum.times(1.0 / inputs.len().to_f32()));
+    let vectors = summed.map(WeightedSum::mean);
     Ok(Scores { values: sums, size, finest, features, vectors, are_logits: false })
 }
 
-/// Converts the output of the plant decoder for an input of the size `from` to pixels of the size `to`.
-fn vectors(plants: &Tensor, from: (u32, u32), to: (u32, u32)) -> Result<Vectors> {
-    let n = to.0.to_usize() * to.1.to_usize();
-    let mut planes = values(&resized(plants, from, to))?;
-    let scale = to.0.to_f32() / from.0.to_f32();
-    let (directions, radii) = planes.split_at_mut(2 * n);
-    directions.iter_mut().for_each(|v| *v *= UNIT.to_f32() * scale);
-    radii.iter_mut().for_each(|v| *v = v.clamp(0.0, LARGEST).exp() * scale);
-    Ok(Vectors { planes })
+/// Weighted sum of the plant decoder's outputs for inputs of several sizes. The weight falls with the radius of the plant in the pixels
+/// of the input: training crops contain few plants that are much larger than [`RELIABLE`], and vectors across them are too short.
+struct WeightedSum {
+    planes: Vec<f32>,
+    weights: Vec<f32>,
+}
+
+impl WeightedSum {
+    fn new(size: (u32, u32)) -> Self {
+        let n = size.0.to_usize() * size.1.to_usize();
+        Self { planes: vec![0.0; CHANNELS * n], weights: vec![0.0; n] }
+    }
+
+    /// Adds the output for an input of the size `from`, converted to pixels of the size `to`.
+    fn add(&mut self, plants: &Tensor, from: (u32, u32), to: (u32, u32)) -> Result<()> {
+        let n = self.weights.len();
+        let found = values(&resized(plants, from, to))?;
+        let scale = to.0.to_f32() / from.0.to_f32();
+        for at in 0..n {
+            let radius = found[2 * n + at].clamp(0.0, LARGEST).exp();
+            let weight = 1.0 / (1.0 + (radius / RELIABLE).powi(4));
+            self.weights[at] += weight;
+            self.planes[at] += weight * UNIT.to_f32() * scale * found[at];
+            self.planes[n + at] += weight * UNIT.to_f32() * scale * found[n + at];
+            self.planes[2 * n + at] += weight * radius * scale;
+        }
+        Ok(())
+    }
+
+    fn mean(mut self) -> Vectors {
+        for plane in self.planes.chunks_exact_mut(self.weights.len().max(1)) {
+            plane.iter_mut().zip(&self.weights).for_each(|(sum, weight)| *sum /= weight);
+        }
+        Vectors { planes: self.planes }
+    }
 }
 
 /// Resizes maps bilinearly; sample points are pixel centres.
