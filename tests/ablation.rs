@@ -214,15 +214,18 @@ fn edits_do_what_their_names_say() {
     let ground: Vec<&Part> = flat.scene.parts.iter().filter(|p| is_ground(&flat, p)).collect();
     assert_eq!(ground.len(), 1, "clods");
     assert!(ground[0].mesh.positions.iter().all(|p| p.z == 0.0));
-    // The same plants, moved down to the flat ground.
+    // The same plants, moved down to the flat ground. Leaves that lie on crumbs there lie lower by their height, at most 12 mm.
     assert_eq!(flat.plants.len(), full.plants.len());
+    let mut exact = [0, 0];
     for (is, was) in plant_parts(&flat).zip(plant_parts(&full)) {
         assert_eq!(is.tag, was.tag);
         let foot = full.plants.iter().find(|p| p.number == is.tag.plant).unwrap().position;
         let down = |(is, was): (&Vec3, &Vec3)| (*was - *is - Vec3::new(0.0, 0.0, foot.z)).length();
         let far = is.mesh.positions.iter().zip(&was.mesh.positions).map(down).fold(0.0, f32::max);
-        assert!(far < 1e-5, "plant {}: {far}", is.tag.plant);
+        assert!(far < 0.012, "plant {}: {far}", is.tag.plant);
+        exact[usize::from(far < 1e-5)] += 1;
     }
+    assert!(exact[1] > exact[0], "{exact:?}");
 
     // Almost all of a flat blade faces one way; it bends only where it leaves the petiole.
     let flat = named("flat-leaves");

@@ -176,4 +176,31 @@ fn what_has_no_decoder_is_refused() {
         out.display()
     ));
     assert!(words.contains("separate needs plants"), "{words}");
+    // Without the decoder, the step would do nothing.
+    let evaluation = format!("eval {} --set {}@all --out {}", run.display(), set.display(), out.display());
+    let words = refused(&format!("{evaluation} --refine plants,separate"));
+    assert!(words.contains("this network has no plant decoder"), "{words}");
+    // Images whose labels are classes alone.
+    let masks = at("masks");
+    let (images, labels) =
+        (set.parent().unwrap().join("source/train/images"), set.parent().unwrap().join("source/train/semantics"));
+    let mut import = Command::new(env!("CARGO_BIN_EXE_trace"));
+    import.args(["dataset", "import", "--format", "masks", "--images"]).arg(images).arg("--masks").arg(labels);
+    assert!(import.arg("--out").arg(&masks).output().unwrap().status.success());
+    let words = refused(&format!("plants {} --set {}@all --out {}", run.display(), masks.display(), out.display()));
+    assert!(words.contains("the training images have no plant numbers"), "{words}");
+    // Files of others, and damaged ones, are kept.
+    let predictions = at("predictions");
+    fs::create_dir_all(&predictions).unwrap();
+    let predict = format!("predict {} {}@0..1 --plants --out {}", run.display(), set.display(), predictions.display());
+    let own = predictions.join("000000.plants.png");
+    fs::write(&own, "mine").unwrap();
+    assert!(refused(&predict).contains("would be overwritten by a plant map"));
+    assert_eq!(fs::read_to_string(&own).unwrap(), "mine");
+    fs::remove_file(&own).unwrap();
+    succeed(&predict);
+    fs::write(predictions.join("plants.json"), "{").unwrap();
+    let output = train(&predict).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && words.contains("plants.json"), "{words}");
 }

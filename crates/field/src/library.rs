@@ -301,6 +301,13 @@ impl Library {
         if self.files.contains_key(&full) { Ok(()) } else { self.note(&full).map(drop) }
     }
 
+    /// Returns an error if the environment map that `page` names is too large for the memory, by its header; it is not decoded.
+    pub(super) fn check_environment_map(&mut self, page: &RonFile, path: &str) -> Result<()> {
+        self.environment_map_file(page, path)?;
+        let full = self.need(page, path)?;
+        self.counted.check_panorama(&full).map_err(|error| at_its_place(page, path, IMAGE_HELP, error))
+    }
+
     /// Returns the environment map that `page` names.
     pub(super) fn environment_map(&mut self, page: &RonFile, path: &str, infrared: Infrared) -> Result<Arc<Table>> {
         let full = self.need(page, path)?;

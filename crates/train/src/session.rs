@@ -92,6 +92,17 @@ fn begun(plan: &Plan, run: &Path) -> Result<TrainedModel> {
     Ok(TrainedModel { card, values })
 }
 
+/// Returns an error if no image of the store has plant numbers.
+fn check_plants(train: &Store) -> Result<()> {
+    for place in 0..train.len() {
+        if train.get(place)?.plants.iter().any(|plant| *plant > 0) {
+            return Ok(());
+        }
+    }
+    Err(Error::misuse("the training images have no plant numbers, only classes")
+        .help("name rendered images with --set, or imported ones that number their plants (PhenoBench, COCO)"))
+}
+
 /// Returns the species that the network of a plan takes as the crop: those of the run that it starts from, then the others of its
 /// training set. None for an ordinary network.
 fn species(plan: &Plan, train: &Store, begin: Option<&TrainedModel>) -> Result<Vec<String>> {
@@ -190,6 +201,9 @@ pub(super) fn train(
         let identity = Identity::of(&plan, &train, &val)?;
         // Reads one image, so that missing bands are reported before the folder is claimed.
         train.get(0)?;
+        if plan.plants.is_some() {
+            check_plants(&train)?;
+        }
         if !val.is_empty() {
             val.get(0)?;
         }

@@ -42,6 +42,10 @@ impl InferenceArgs {
                 Error::misuse(format!("--refine {}: {what}", refine.name())).help("use --refine none with this network")
             })?;
         }
+        if card.refine.separate && !card.plants && self.refine.is_some() {
+            return Err(Error::misuse("--refine separate: this network has no plant decoder")
+                .help("leave separate out, or add a decoder: train plants RUN --set DIR --out NET"));
+        }
         let Some(mm) = self.pixel_mm else { return Ok(()) };
         let trained = card.pixel_mm.ok_or_else(|| {
             Error::misuse("--pixel-mm: the network's training images do not record their ground sampling distance")

@@ -142,7 +142,9 @@ mod tests {
     #[test]
     fn plants_are_counted_without_computing_lights() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("sky.hdr"), "no image").unwrap();
+        // A header without pixels.
+        let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+        std::fs::write(folder.path().join("sky.hdr"), header).unwrap();
         let counted = |lights: &str, motion: &str| {
             let text = format!(
                 "Field(camera: Pinhole(size: (8, 8), intrinsics: FieldOfView(horizontal_deg: 40), pose: Nadir(height_m: 1){motion}), \

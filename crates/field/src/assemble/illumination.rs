@@ -105,6 +105,9 @@ impl DrawnLights {
         let (_, listed) = Self::listed(page, desc, library, at, today)?;
         for (i, SceneLight { desc: light, at: place }) in listed.into_iter().enumerate() {
             light.check(&mut at.daily(today, 1 + i.to_u64())).map_err(|e| page.blame(&place, e))?;
+            for file in light.files() {
+                library.check_environment_map(page, file)?;
+            }
         }
         Ok(Self::default())
     }

@@ -74,7 +74,9 @@ pub(super) fn plant(
             let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
             return Ok(PlacedPlant::Shared(Box::new(record), member, own));
         }
-        let rise = floor.map_or(0.0, |f| if f.flat { 0.0 } else { f.ground.rise(f.maps, x, y, NEAR) });
+        // Plants that are alike have one mesh, whatever is below them.
+        let rough = floor.filter(|f| !f.flat && seedling.individual.is_none());
+        let rise = rough.map_or(0.0, |f| f.ground.rise(f.maps, x, y, NEAR));
         let place = PlantSite { height, normal, rise, dust, cell: cell(seedling.position), rigged: options.rigged };
         let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
         let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));

@@ -18,8 +18,8 @@
 //! (`oldest`), and stay on the plant: in maize the lower leaves die from about 500 °C d before silking on.
 //!
 //! Sources:
-//! - order of events: Lim, Kim & Nam 2007, "Leaf Senescence", Annual Review of Plant Biology 58; Hörtensteiner 2006,
-//!   "Chlorophyll degradation during senescence", Annual Review of Plant Biology 57 (both quoted from memory);
+//! - yellow as chlorophyll is lost and carotenoids partly remain, brown with the oxidation of phenolics in dead cells:
+//!   Matile 2000, "Biochemistry of Indian summer", Experimental Gerontology 35, 145–158 (abstract);
 //! - from tip to base, water and chlorophyll lost one after the other: abstract of "Senescence of maize plants: evolution
 //!   of flowering to harvest", Botany 87 (2009), 1036–1053, doi 10.1139/B09-066;
 //! - lower leaves of maize: Borrás, Maddonni & Otegui 2003, Field Crops Research 82, 13–26 (abstract);

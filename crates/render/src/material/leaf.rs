@@ -225,6 +225,11 @@ impl LeafMaterial {
         self.optics.plain().reflectance.0.truncate()
     }
 
+    /// Returns whether the leaf has a condition: damage, dust or senescence.
+    pub fn has_condition(&self) -> bool {
+        self.condition.is_some()
+    }
+
     /// Tissue at `uv` with the leaf's condition applied.
     fn worn_at(&self, leaf: Leaf, uv: Vec2) -> DamagedTissue {
         match &self.condition {

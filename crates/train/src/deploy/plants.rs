@@ -48,7 +48,7 @@ struct Category {
 
 /// Contents of `plants.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Coco {
+pub struct Coco {
     images: Vec<Image>,
     annotations: Vec<Plant>,
     categories: Vec<Category>,
@@ -100,18 +100,36 @@ impl Found {
     }
 }
 
-/// Writes the plants of these images, by the path of the image, to the `plants.json` of a folder of predictions, beside those of other
-/// images in it. `classes` holds the names of the classes, soil first.
+/// Reads the `plants.json` of a folder of predictions before images of these names are predicted into it; empty without the file.
 ///
 /// # Errors
-/// If the file exists and is not one of these.
-pub fn write(folder: &Path, found: &BTreeMap<String, Found>, classes: &[String]) -> Result<()> {
+/// If the file is not one of these, if a plant map would overwrite another file, or if two images would share a file.
+pub fn claim<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<Coco> {
     let path = folder.join(PLANTS);
-    let before: Coco = if path.exists() {
-        run::read_json(&path).map_err(|e: Error| e.help("restore it, or predict again with another --out"))?
-    } else {
-        Coco::default()
-    };
+    let names: BTreeSet<&str> = names.collect();
+    for name in &names {
+        let map = folder.join(file(name));
+        if names.contains(format!("{name}.plants").as_str()) {
+            return Err(Error::misuse(format!(
+                "the plant map of {name} and a prediction would both be {}",
+                file(name)
+            ))
+            .help("predict them one after the other, each with its own --out"));
+        }
+        if map.exists() && !path.exists() {
+            let what = "this file is not a prediction and would be overwritten by a plant map";
+            return Err(Error::misuse(what).help("give another --out").in_file(map));
+        }
+    }
+    if !path.exists() {
+        return Ok(Coco::default());
+    }
+    run::read_json(&path).map_err(|e: Error| e.help("restore it, or predict again with another --out"))
+}
+
+/// Writes the plants of these images, by the path of the image, to the `plants.json` of a folder of predictions, beside those of other
+/// images in `before`, its contents until now. `classes` holds the names of the classes, soil first.
+pub fn write(folder: &Path, before: &Coco, found: &BTreeMap<String, Found>, classes: &[String]) -> Result<()> {
     let others = before.images.iter().filter(|image| !found.contains_key(&image.file_name));
     let kept: BTreeMap<&str, &Image> = others.map(|image| (image.file_name.as_str(), image)).collect();
     let names: BTreeSet<&str> = kept.keys().copied().chain(found.keys().map(String::as_str)).collect();
@@ -134,5 +152,5 @@ pub fn write(folder: &Path, found: &BTreeMap<String, Found>, classes: &[String])
     }
     let category = |(id, name): (usize, &String)| Category { id: id.to_u64(), name: name.clone() };
     coco.categories = classes.iter().enumerate().skip(1).map(category).collect();
-    run::write_json(&path, &coco)
+    run::write_json(&folder.join(PLANTS), &coco)
 }

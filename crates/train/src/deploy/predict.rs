@@ -103,6 +103,8 @@ fn predict_here(
     let place = machine.place(options.precision)?;
     device::set_threads(options.threads);
     let models = trained.models(place)?;
+    let names = pictures.iter().map(|picture| picture.name.as_str());
+    let before = options.plants.then(|| plants::claim(out, names)).transpose()?;
     let prediction = Prediction::claim(out, card, options.pixel_mm, pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
@@ -160,8 +162,8 @@ fn predict_here(
         return Err(Error::stopped(words).help("run the same command again to predict all of them").in_file(out));
     }
     made.appearance = appearance.is_some();
-    if options.plants {
-        plants::write(out, &found, &card.classes.names())?;
+    if let Some(before) = before {
+        plants::write(out, &before, &found, &card.classes.names())?;
         made.paths.push(out.join(plants::PLANTS));
     }
     prediction.finish(out, &unread, &made.evidence, made.appearance)?;

@@ -1,8 +1,9 @@
 //! Groups plant pixels to plants by the vectors of the plant decoder; see [`crate::net::plants`].
 //!
 //! Each plant pixel votes for the place that its vector points to. The places with most votes, relative to the squared radius that the
-//! votes agree on, become plants one after the other: each takes all votes within its radius. Votes that are left belong to the nearest
-//! plant, if it is within twice its radius, and otherwise are plants of their own, one for each connected region.
+//! votes agree on, become plants one after the other: each takes all votes within 1.25 radii. Then each vote belongs to the plant that is
+//! nearest relative to its radius, within twice that. Pixels whose votes are farther away are plants of their own, one for each connected
+//! region.
 
 use crate::measure::components::Components;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
@@ -14,8 +15,8 @@ const CELL: f32 = 2.0;
 /// Reach of the votes that are counted for a place, in radii.
 const CORE: f32 = 0.5;
 /// Reach of the votes that a plant takes, in radii.
-const REACH: f32 = 1.0;
-/// Reach within which votes that are left belong to the nearest plant, in radii.
+const REACH: f32 = 1.25;
+/// Reach within which votes belong to the nearest plant, in radii.
 const FAR: f32 = 2.0;
 /// Smallest number of votes of a plant, in squared radii. A disc has 2π, sparse leaves a tenth of that.
 const LEAST: f32 = 0.6;
@@ -54,7 +55,7 @@ struct Vote {
     plant: u32,
 }
 
-/// What the votes within a reach of a place agree on.
+/// Mean of the votes within a reach of a place.
 #[derive(Clone, Copy, Default)]
 struct Mean {
     count: f32,
@@ -115,7 +116,7 @@ impl Votes {
         Mean { count: sum.count, x: sum.x / n, y: sum.y / n, radius: sum.radius / n }
     }
 
-    /// Returns what the free votes of a cell and around it agree on; `None` without any.
+    /// Returns the candidate of a cell: the mean of its free votes and those around; `None` without any.
     fn candidate(&self, cell: usize) -> Option<Candidate> {
         let free = self.list[self.starts[cell]..self.starts[cell + 1]].iter().filter(|vote| vote.plant == 0);
         let (count, sum) = free
@@ -187,9 +188,9 @@ pub fn instances(size: (usize, usize), own: &[u8], vectors: Option<&Vectors>) ->
     }
     let mut labels = vec![0u32; own.len()];
     for vote in &votes.list {
-        labels[vote.at] = if vote.plant > 0 { vote.plant } else { nearest(vote, &plants) };
+        labels[vote.at] = nearest(vote, &plants);
     }
-    // What belongs to no plant.
+    // Pixels of no plant.
     let rest = Components::of(width, height, |at| (own[at] > 0 && labels[at] == 0).then_some(()));
     let first = plants.len().to_u32();
     labels.iter_mut().zip(&rest.labels).filter(|(_, rest)| **rest > 0).for_each(|(label, rest)| *label = first + rest);
