@@ -198,8 +198,15 @@ fn what_has_no_decoder_is_refused() {
     assert!(refused(&predict).contains("would be overwritten by a plant map"));
     assert_eq!(fs::read_to_string(&own).unwrap(), "mine");
     fs::remove_file(&own).unwrap();
+    let coco = predictions.join("plants.json");
+    fs::write(&coco, r#"{"images": [], "annotations": [], "categories": []}"#).unwrap();
+    assert!(refused(&predict).contains("this file is not of a prediction"));
+    fs::remove_file(&coco).unwrap();
     succeed(&predict);
-    fs::write(predictions.join("plants.json"), "{").unwrap();
+    let good = fs::read_to_string(&coco).unwrap();
+    fs::write(&coco, good.replacen("\"image_id\": 1", "\"image_id\": 7", 1)).unwrap();
+    assert!(refused(&predict).contains("is of the image 7, which is not in the file"));
+    fs::write(&coco, "{").unwrap();
     let output = train(&predict).output().unwrap();
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(2) && words.contains("plants.json"), "{words}");

@@ -305,7 +305,8 @@ impl TrainedModel {
         }
         if plants != card.plants {
             let what = format!("{MODEL} and these weights differ on whether the network has a plant decoder");
-            return Err(Error::damaged(what).in_file(path));
+            let help = "restore both files or train again, with another --out";
+            return Err(Error::damaged(what).help(help).in_file(path));
         }
         if let Some(array) = values.iter().find(|a| !a.values.iter().all(|v| v.is_finite())) {
             let what = format!("`{}` contains values that are not finite", array.name);

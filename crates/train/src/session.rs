@@ -10,7 +10,7 @@ use super::fit::logits;
 use super::fit::warnings::warnings;
 use super::fit::{self, Callbacks, Data, Plan};
 use super::measure::{Evaluation, Prediction, Report};
-use super::net::plants::is_of_plants;
+use super::net::plants::{has_plants, is_of_plants};
 use super::net::{Extras, Parameter, film, fitting, plants};
 use super::run::{self, Identity, ModelCard, Results, TrainedModel};
 use super::torch::{Model, Placement, Precision, device, guarded, multiscale};
@@ -224,6 +224,11 @@ pub(super) fn train(
         let hash = identity.hash()?;
         for words in warnings(&plan, train.distinct(), pixels.as_ref()) {
             (callbacks.warn)(&words);
+        }
+        if plan.plants.is_none() && has_plants(&begin) {
+            (callbacks.warn)(
+                "the plant decoder of the initial network is kept as it is; `train plants` trains it for the new network",
+            );
         }
         let data = Data { train: Arc::new(train), val, photos: photos.map(Arc::new), pixels, loaders: machine.loaders };
         let mut outcome = fit::train(&plan, &hash, &data, &begin, place, folder, callbacks)?;

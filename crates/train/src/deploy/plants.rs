@@ -1,5 +1,6 @@
 //! Plants of predictions, one by one: a map of plant numbers for each image, and `plants.json` in COCO's format.
 
+use super::input_images::PREDICTION;
 use crate::run;
 use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
@@ -18,6 +19,7 @@ pub fn file(name: &str) -> String {
 
 /// A predicted plant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Plant {
     id: u64,
     image_id: u64,
@@ -33,6 +35,7 @@ pub struct Plant {
 
 /// An image with predicted plants.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Image {
     id: u64,
     file_name: String,
@@ -41,6 +44,7 @@ struct Image {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Category {
     id: u64,
     name: String,
@@ -48,6 +52,7 @@ struct Category {
 
 /// Contents of `plants.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Coco {
     images: Vec<Image>,
     annotations: Vec<Plant>,
@@ -124,7 +129,18 @@ pub fn claim<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<
     if !path.exists() {
         return Ok(Coco::default());
     }
-    run::read_json(&path).map_err(|e: Error| e.help("restore it, or predict again with another --out"))
+    if !folder.join(PREDICTION).exists() {
+        let what = "this file is not of a prediction and would be overwritten";
+        return Err(Error::misuse(what).help("give another --out").in_file(path));
+    }
+    let help = "restore it, or predict again with another --out";
+    let coco: Coco = run::read_json(&path).map_err(|e: Error| e.help(help))?;
+    let images: BTreeSet<u64> = coco.images.iter().map(|image| image.id).collect();
+    if let Some(plant) = coco.annotations.iter().find(|plant| !images.contains(&plant.image_id)) {
+        let what = format!("annotation {} is of the image {}, which is not in the file", plant.id, plant.image_id);
+        return Err(Error::input(what).help(help).in_file(path));
+    }
+    Ok(coco)
 }
 
 /// Writes the plants of these images, by the path of the image, to the `plants.json` of a folder of predictions, beside those of other
