@@ -352,12 +352,13 @@ pub fn evaluate(
         for place in 0..store.len() {
             let (size, example, inputs) = open(place)?;
             let begun = Instant::now();
-            let mut scores = multiscale::scores(&models, refine, &inputs)?;
+            let numbered = example.plants.iter().any(|plant| *plant > 0);
+            let mut scores = multiscale::scores(&models, refine, numbered, &inputs)?;
             scores.refine(refine, &inputs, bands, appearance.as_ref());
             let seconds = Some(begun.elapsed().as_secs_f64());
             let predicted = classes_at(&scores.values, scores.size, size);
             let (width, height) = size;
-            let plants = example.plants.iter().any(|p| *p > 0).then_some(example.plants.as_slice());
+            let plants = numbered.then_some(example.plants.as_slice());
             let (name, truth) = (example.name.as_str(), example.labels.as_slice());
             let separated = plants.map(|_| scores.plants(&predicted, size));
             let separated = separated.as_deref();

@@ -9,7 +9,7 @@ use furrow_cli::cli::signal::Signals;
 use furrow_train::adapt::AdaptOptions;
 use furrow_train::data::Selection;
 use furrow_train::deploy::input_images;
-use furrow_train::run::{self, TrainedModel};
+use furrow_train::run::TrainedModel;
 use furrow_train::torch::{Precision, device};
 use std::path::PathBuf;
 
@@ -75,10 +75,5 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let results = fit::shown(args.steps, args.quiet, signals, |callbacks| {
         asked.adapt(&pictures, &args.machine.machine(), &args.out, callbacks)
     })?;
-    if !args.quiet {
-        furrow_cli::message!("{}: {}", args.out.display(), fit::in_words(&results));
-    }
-    let mut paths = [run::WEIGHTS, run::MODEL].map(|file| args.out.join(file)).to_vec();
-    paths.extend(fit::write_page(&args.out)?);
-    Ok(paths)
+    fit::written(&args.out, args.quiet, &results)
 }

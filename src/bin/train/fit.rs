@@ -91,12 +91,18 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         let folder = if args.seed.len() == 1 { args.out.clone() } else { args.out.join(format!("seed-{seed}")) };
         let plan = args.plan(*seed, &folder)?;
         let results = fit(&plan, args.init.as_deref(), &args.machine, &folder, args.quiet, signals)?;
-        if !args.quiet {
-            furrow_cli::message!("{}: {}", folder.display(), in_words(&results));
-        }
-        paths.extend([folder.join(run::WEIGHTS), folder.join(run::MODEL)]);
-        paths.extend(write_page(&folder)?);
+        paths.extend(written(&folder, args.quiet, &results)?);
     }
+    Ok(paths)
+}
+
+/// Prints the results of a training and writes its page. Returns the paths of the files of the run.
+pub(crate) fn written(folder: &Path, quiet: bool, results: &Results) -> Result<Vec<PathBuf>> {
+    if !quiet {
+        furrow_cli::message!("{}: {}", folder.display(), in_words(results));
+    }
+    let mut paths = [run::WEIGHTS, run::MODEL].map(|file| folder.join(file)).to_vec();
+    paths.extend(write_page(folder)?);
     Ok(paths)
 }
 

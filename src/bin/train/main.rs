@@ -71,7 +71,7 @@ enum Verb {
     Predict(predict::Args),
     /// Continue training on photographs without labels (self-training).
     Adapt(adapt::Args),
-    /// Add a decoder to a trained network that separates plants one by one; class scores stay the same.
+    /// Add a decoder to a trained network that separates plants one by one (instance segmentation); class scores stay the same.
     Plants(plants::Args),
     /// Calibrate the class biases of a trained network against over- and under-prediction, on images with labels.
     Calibrate(calibrate::Args),

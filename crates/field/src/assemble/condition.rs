@@ -19,7 +19,7 @@ const NO_IMAGE_MM: Vec2 = Vec2::splat(30.0);
 /// Days after which a leaf has all the damage that the scene file describes: leaves are eaten for about three weeks, until they are tough.
 const MARKED_DAYS: f32 = 21.0;
 
-/// Progress of senescence by which a stalk is behind its blade.
+/// Delay of a stalk's senescence relative to its blade's, in progress of senescence.
 const STALK_LATER: f32 = 0.15;
 /// Relative increase of a dead leaf's roughness.
 const DULL: f32 = 0.8;

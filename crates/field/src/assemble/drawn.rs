@@ -13,11 +13,11 @@ use crate::estimate::usual_memory;
 use crate::layer::Layer;
 use crate::library::Library;
 use furrow_base::Result;
-use furrow_base::math::{Vec2, Vec3};
+use furrow_base::math::Vec2;
 use furrow_base::ron_file::RonFile;
 use furrow_base::sampling::{Purpose, Stream};
 use furrow_grow::plant::GrowOptions;
-use furrow_grow::soil::{Envelope, Ground, SeedRows};
+use furrow_grow::soil::{Envelope, Ground, SeedRows, Stance};
 use furrow_optics::sensor::{Camera, Lidar};
 use std::ops::Range;
 use std::sync::Arc;
@@ -207,10 +207,10 @@ impl Floor<'_> {
         if self.flat { 0.0 } else { self.ground.height(x, y) }
     }
 
-    /// Returns the height of a plant's foot, metres, and the normal of the ground around it.
-    pub(super) fn stance(&self, x: f32, y: f32) -> (f32, Vec3) {
-        let (height, normal) = self.ground.stance(self.maps, x, y, STANCE);
-        (if self.flat { 0.0 } else { height }, normal)
+    /// Returns height and orientation of the ground below a plant.
+    pub(super) fn stance(&self, x: f32, y: f32) -> Stance {
+        let stance = self.ground.stance(self.maps, x, y, STANCE);
+        if self.flat { Stance { height: 0.0, rise: 0.0, ..stance } } else { stance }
     }
 }
 

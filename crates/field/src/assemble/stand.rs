@@ -14,7 +14,7 @@ use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::Placement;
 use furrow_base::math::{Spectrum, Vec2, Vec3};
 use furrow_base::{Error, Result};
-use furrow_grow::soil::Rect;
+use furrow_grow::soil::{Rect, Stance};
 use furrow_optics::optics::soil::LOESS;
 use furrow_render::material::Material;
 use furrow_render::scene::tag::Tag;
@@ -26,9 +26,6 @@ use std::sync::Arc;
 
 /// Maximum shadow length considered, in plant heights: for a sun 20° above the horizon.
 pub(super) const SHADOW: f32 = 2.75;
-
-/// Radius around a plant's foot within which the ground's crumbs and plates hold up its leaves, metres.
-const NEAR: f32 = 0.02;
 
 /// A placed plant.
 enum PlacedPlant {
@@ -69,14 +66,14 @@ pub(super) fn plant(
     let stand = |seedling: &Seedling| {
         options.wanted()?;
         let Vec2 { x, y } = seedling.position;
-        let (height, normal) = floor.map_or((0.0, Vec3::Z), |f| f.stance(x, y));
+        let level = Stance { height: 0.0, normal: Vec3::Z, rise: 0.0 };
+        let Stance { height, normal, rise } = floor.map_or(level, |f| f.stance(x, y));
         if let Some(member) = seedling.member {
             let (record, own) = bank[&member].stand(seedling, seedling.position.extend(height), normal);
             return Ok(PlacedPlant::Shared(Box::new(record), member, own));
         }
         // Plants that are alike have one mesh, whatever is below them.
-        let rough = floor.filter(|f| !f.flat && seedling.individual.is_none());
-        let rise = rough.map_or(0.0, |f| f.ground.rise(f.maps, x, y, NEAR));
+        let rise = if seedling.individual.is_some() { 0.0 } else { rise };
         let place = PlantSite { height, normal, rise, dust, cell: cell(seedling.position), rigged: options.rigged };
         let known = options.preview.as_ref().and_then(|preview| preview.plant(seedling, &place));
         let known = known.filter(|known| known.organs.is_some() || !reaches(&known.record));

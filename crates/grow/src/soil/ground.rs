@@ -101,6 +101,17 @@ pub struct Ground {
     look: OnceLock<Appearance>,
 }
 
+/// Ground below a plant.
+#[derive(Clone, Copy, Debug)]
+pub struct Stance {
+    /// Height of the plant's foot, metres.
+    pub height: f32,
+    /// Unit normal of the plane fitted to the ground.
+    pub normal: Vec3,
+    /// Height of the highest crumb or plate above that plane, metres: a leaf that lies on the ground lies on it.
+    pub rise: f32,
+}
+
 /// Plane fitted to the ground around a point.
 struct Plane {
     /// Height at the point, metres.
@@ -421,19 +432,12 @@ impl Ground {
         up(row(k).lerp(row(k + self.grid.columns()), ty))
     }
 
-    /// Returns the height, metres, at which a plant stands, and the unit normal of the plane fitted to the ground within
-    /// `radius` of it. A shoot that emerges in a crack or between crumbs grows to the surface around it, so the height
+    /// Returns height and orientation of the ground below a plant, from the plane fitted within `radius` of it. A shoot that emerges in a crack or between crumbs grows to the surface around it, so the height
     /// is at least the plane's. If clods are part of the heights, they are left out and the cells are [`FULL_CELL_M`]
     /// whatever the grid, so that plants stand as they do at full detail.
-    pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> (f32, Vec3) {
+    pub fn stance<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> Stance {
         let (height, plane) = self.around(maps, x, y, radius);
-        (height.max(plane.level), up(plane.slope))
-    }
-
-    /// Returns the height of the highest crumb or plate within `radius` of a point above the plane of
-    /// [`Ground::stance`], metres. A leaf that lies on the ground lies on it.
-    pub fn rise<L: LayerMaps>(&self, maps: &[L], x: f32, y: f32, radius: f32) -> f32 {
-        self.around(maps, x, y, radius).1.rise
+        Stance { height: height.max(plane.level), normal: up(plane.slope), rise: plane.rise }
     }
 
     /// Returns the height at a point without clods and the plane fitted around it.

@@ -51,7 +51,7 @@ pub use desc::{
 };
 pub use envelope::Envelope;
 pub use estimate::{Expected, expected};
-pub use ground::{Ground, MOISTURE_LEVELS};
+pub use ground::{Ground, MOISTURE_LEVELS, Stance};
 pub use in_view::InView;
 pub use litter::litter;
 pub use pigments::PigmentsDesc;

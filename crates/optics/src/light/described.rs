@@ -20,7 +20,7 @@ pub trait Described {
     /// Samples the light; `open` loads a file named in the scene file.
     fn draw(&self, stream: &mut Stream, open: &mut Open<'_>) -> Result<(Self::Record, Self::Sources)>;
 
-    /// Returns an error that [`Self::draw`] would return for the same stream, as far as it follows from the sampled values alone.
+    /// Returns an error that [`Self::draw`] would return for the same stream, if it follows from the sampled values alone.
     fn check(&self, _stream: &mut Stream) -> Result<()> {
         Ok(())
     }

@@ -129,8 +129,8 @@ impl Augment {
         Ok(augment)
     }
 
-    /// Returns an augmented crop of an image as input of the network and its labels. `colour[b]` is `true` if band b is a channel of the colour image. A crop is normalized with the moments of the whole image, because
-    /// predictions are made on whole images.
+    /// Returns an augmented crop of an image as input of the network, and its labels. `colour[b]` is `true` if band b is a channel of the
+    /// colour image. A crop is normalized with the moments of the whole image, because predictions are made on whole images.
     pub fn apply(
         &self,
         example: &Example,

@@ -12,7 +12,7 @@ pub const PLANES: usize = 4;
 /// Smallest area of a plant that is learnt, pixels.
 const LEAST: u64 = 8;
 /// Smallest radius, pixels.
-pub const LEAST_RADIUS: f64 = 1.0;
+const LEAST_RADIUS: f64 = 1.0;
 
 /// Sums over the pixels of one plant: number, x, y, x² + y².
 #[derive(Clone, Copy, Default)]

@@ -93,16 +93,6 @@ impl Found {
         };
         Self { size, plants: all.into_iter().map(plant).collect() }
     }
-
-    /// Returns the number of plants.
-    pub fn len(&self) -> usize {
-        self.plants.len()
-    }
-
-    /// Returns whether there are no plants.
-    pub fn is_empty(&self) -> bool {
-        self.plants.is_empty()
-    }
 }
 
 /// Reads the `plants.json` of a folder of predictions before images of these names are predicted into it; empty without the file.

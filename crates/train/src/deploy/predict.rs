@@ -133,7 +133,7 @@ fn predict_here(
                 Err(_) => break,
             }
             if batch.len() == options.batch || number + 1 == pictures.len() {
-                made.seconds += infer(&models, card.refine, std::mem::take(&mut batch), &writers)?;
+                made.seconds += infer(&models, card.refine, options.plants, std::mem::take(&mut batch), &writers)?;
                 (options.done)(learnt + number + 1);
             }
         }
@@ -226,7 +226,7 @@ type Scored<'a> = (usize, PreparedImage<'a>, Scores);
 /// Index of each image and what was written for it.
 type Written = Result<Vec<(usize, Drawn)>>;
 
-/// What the writers draw.
+/// Settings of the writers.
 #[derive(Clone, Copy)]
 struct Drawing<'a> {
     card: &'a ModelCard,
@@ -274,22 +274,24 @@ fn write<'s, 'a: 's>(
 fn infer<'a>(
     models: &[Model],
     refine: Refine,
+    plants: bool,
     batch: Vec<(usize, PreparedImage<'a>)>,
     writers: &[SyncSender<Scored<'a>>],
 ) -> Result<f64> {
     let begun = Instant::now();
+    let is_plain = !refine.appearance && !(models[0].has_plants && (plants || refine.separate));
     // Consecutive images go through the network together if there is one network and one input per image, of equal size.
     let alike = |a: &(usize, PreparedImage<'_>), b: &(usize, PreparedImage<'_>)| match (
         a.1.inputs.as_slice(),
         b.1.inputs.as_slice(),
     ) {
-        ([a], [b]) => models.len() == 1 && !models[0].has_plants && a.size == b.size && !refine.appearance,
+        ([a], [b]) => models.len() == 1 && a.size == b.size && is_plain,
         _ => false,
     };
     let mut all = Vec::new();
     for group in batch.chunk_by(alike) {
         match group {
-            [(_, ready)] => all.push(multiscale::scores(models, refine, &ready.inputs)?),
+            [(_, ready)] => all.push(multiscale::scores(models, refine, plants, &ready.inputs)?),
             several => {
                 let size = several[0].1.inputs[0].size;
                 let pixels: Vec<f32> = several.iter().flat_map(|(_, ready)| &ready.inputs[0].pixels).copied().collect();

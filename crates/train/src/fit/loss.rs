@@ -21,8 +21,8 @@ pub(super) fn loss(of: LossFunction, logits: &Tensor, labels: &Tensor, weights: 
 }
 
 /// Returns the loss of the plant decoder: the weighted mean over plant pixels of the distance between the vectors relative to the
-/// plant's radius and [`BLUR`], and of the difference between the logarithms of the radii. `found` is images × [`plants::CHANNELS`] × height × width;
-/// `targets` has one plane more, the weights. Both are in the units of the decoder. `None` without a plant pixel.
+/// plant's radius and [`BLUR`], and of the difference between the logarithms of the radii. `found` is images × [`plants::CHANNELS`] ×
+/// height × width; `targets` has one plane more, the weights. Both are in the units of the decoder. `None` without a plant pixel.
 pub(super) fn plants(found: &Tensor, targets: &Tensor) -> Option<Tensor> {
     let weights = targets.narrow(1, plants::CHANNELS.to_i64(), 1);
     let sum = weights.sum(Kind::Float);

@@ -270,13 +270,14 @@ fn step(
     let mut gradients = Gradients::new(model, learns);
     let mut losses: Vec<f64> = Vec::new();
     for (batch, pass, weight) in batches.chain(photographs) {
+        if batch.labels.iter().all(|l| *l == IGNORE) {
+            continue;
+        }
         let x = model.images(&batch.pixels, size);
         let loss = if plan.plants.is_some() {
             let targets = planes(model, &batch.plants, batch.images, size);
             let Some(loss) = loss::plants(&model.forward_plants(&x, pass)?, &targets) else { continue };
             loss
-        } else if batch.labels.iter().all(|l| *l == IGNORE) {
-            continue;
         } else {
             let y = labels(model, &batch.labels, batch.images, size);
             loss::loss(plan.hyper.loss, &model.forward_named(&x, pass, &batch.crops), &y, weights) * weight

@@ -5,8 +5,8 @@
 //! true ones): the product of the mean IoU of the pairs (segmentation quality) and an F-score of detection (recognition quality). Crops
 //! and weeds count alike: the classes have scores of their own.
 //!
-//! Pixels without a label are removed from both. True plants below [`LEAST`] labelled pixels count neither as missed nor as found, nor do
-//! predicted ones of which less than that remains, or that cover mostly such plants.
+//! Pixels without a label are removed from both. True plants below [`LEAST`] labelled pixels count neither as missed nor as found.
+//! Predicted plants below that size, or mostly on such true plants, do not count either.
 //!
 //! Source: Kirillov et al. 2019, "Panoptic segmentation".
 

@@ -149,6 +149,10 @@ pub trait Operations {
     }
     /// Called with the output of the plant decoder, if it is wanted.
     fn plants(&mut self, _x: Self::Value) {}
+    /// Returns whether the class decoder is to be applied. Without it, the result of a network with a plant decoder is that decoder's.
+    fn wants_classes(&self) -> bool {
+        true
+    }
 }
 
 /// Defines [`Network`] from one line for each network: variant, module, name on the command line, description.
@@ -242,6 +246,9 @@ fn decode<O: Operations>(
         let widths = &widths[..widths.len() - 1];
         let found = branch(o, x, (&deepest, channels), kept, widths, (PLANTS, PLANT_CHANNELS));
         let found = o.enlarge(&found, x);
+        if !o.wants_classes() {
+            return found;
+        }
         o.plants(found);
     }
     branch(o, x, (deepest, channels), skips.into_iter().rev(), widths, ("", classes))

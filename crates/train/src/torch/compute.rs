@@ -36,6 +36,8 @@ pub(super) struct Compute<'a> {
     pub(super) wants_plants: bool,
     /// Its output.
     pub(super) plants: Option<Tensor>,
+    /// Whether the class decoder is applied.
+    pub(super) wants_classes: bool,
 }
 
 impl Compute<'_> {
@@ -178,6 +180,10 @@ impl Operations for Compute<'_> {
 
     fn plants(&mut self, x: Tensor) {
         self.plants = Some(x);
+    }
+
+    fn wants_classes(&self) -> bool {
+        self.wants_classes
     }
 
     fn features(&mut self, x: &Tensor, halvings: usize) {

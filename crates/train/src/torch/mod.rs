@@ -149,18 +149,21 @@ impl Model {
 
     fn compute(&self, pass: Pass) -> Compute<'_> {
         let (tensors, precision) = (&self.tensors, self.place.precision);
-        Compute { tensors, precision, pass, features: None, crops: None, wants_plants: false, plants: None }
+        let (features, crops, plants) = (None, None, None);
+        Compute { tensors, precision, pass, features, crops, wants_plants: false, plants, wants_classes: true }
     }
 
-    /// Applies the plant decoder: images × bands × height × width to images × [`CHANNELS`](crate::net::plants::CHANNELS) × height × width, in single precision.
+    /// Applies the plant decoder alone: images × bands × height × width to images × [`CHANNELS`](crate::net::plants::CHANNELS) × height ×
+    /// width, in single precision.
     ///
     /// # Errors
     /// If the network has no plant decoder.
     pub fn forward_plants(&self, x: &Tensor, pass: Pass) -> Result<Tensor> {
-        let mut compute = Compute { wants_plants: self.has_plants, ..self.compute(pass) };
-        drop(self.network.walk(&mut compute, x, self.bands, self.classes));
-        let found = compute.plants.ok_or_else(|| Error::failed("this network has no plant decoder"))?;
-        Ok(found.to_kind(Kind::Float))
+        if !self.has_plants {
+            return Err(Error::failed("this network has no plant decoder"));
+        }
+        let mut compute = Compute { wants_plants: true, wants_classes: false, ..self.compute(pass) };
+        Ok(self.network.walk(&mut compute, x, self.bands, self.classes).to_kind(Kind::Float))
     }
 
     /// Returns the mean embedding of each image's crops, images × [`film::WIDTH`]; zero for an image without a named crop. `None` if no

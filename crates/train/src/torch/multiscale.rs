@@ -15,7 +15,7 @@ use tch::{Kind, Tensor};
 const LEARNT: usize = 64;
 /// Largest logarithm of a plant's radius that is used: 8,000 pixels.
 const LARGEST: f32 = 9.0;
-/// Radius at which the vectors of an input have half of the weight, pixels of the input.
+/// Radius, in pixels of the input, at which the vectors of an input have half of the weight.
 const RELIABLE: f32 = 40.0;
 
 /// Scores of the classes for one image.
@@ -28,7 +28,7 @@ pub struct Scores {
     pub finest: Option<Vec<f32>>,
     /// Encoder features of the first network for the largest input, if requested.
     pub features: Option<Features>,
-    /// Vectors of the plant decoder at this size, if the first network has one: the mean over the inputs.
+    /// Vectors of the plant decoder at this size, if they are wanted and the first network has one: the mean over the inputs.
     pub vectors: Option<Vectors>,
     /// `true` if the values are logits (one network and one input); otherwise they are sums of probabilities.
     pub are_logits: bool,
@@ -109,20 +109,21 @@ pub fn learn(
     let mut examples = Vec::new();
     for inputs in pictures {
         let inputs = inputs?;
-        examples.extend(scores(models, refine, &inputs)?.examples(refine, &inputs, bands));
+        examples.extend(scores(models, refine, false, &inputs)?.examples(refine, &inputs, bands));
     }
     Ok(Appearance::learn(&examples))
 }
 
 /// Computes the scores of an image. For one model and one input they are logits; otherwise the sum over inputs of the mean
-/// probabilities of the models, at the size of the largest input.
-pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scores> {
+/// probabilities of the models, at the size of the largest input. With `plants` or the refinement `separate`, the plant decoder is applied.
+pub fn scores(models: &[Model], refine: Refine, plants: bool, inputs: &[Input]) -> Result<Scores> {
+    let plants = plants || refine.separate;
     let largest = inputs.iter().map(|input| input.size).max_by_key(|(w, h)| u64::from(*w) * u64::from(*h));
     let size = largest.ok_or_else(|| Error::failed("the image has no input sizes"))?;
     if let ([model], [input]) = (models, inputs) {
-        let wanted = Wanted { features: refine.appearance, plants: true };
-        let Outputs { scores, features, plants } = model.outputs(&input.pixels, size, wanted)?;
-        let vectors = plants.map(|plants| -> Result<_> {
+        let wanted = Wanted { features: refine.appearance, plants };
+        let Outputs { scores, features, plants: found } = model.outputs(&input.pixels, size, wanted)?;
+        let vectors = found.map(|plants| -> Result<_> {
             let mut sum = WeightedSum::new(size);
             sum.add(&plants, size, size)?;
             Ok(sum.mean())
@@ -136,7 +137,8 @@ pub fn scores(models: &[Model], refine: Refine, inputs: &[Input]) -> Result<Scor
         let mut mean: Vec<f32> = Vec::new();
         for (k, model) in models.iter().enumerate() {
             let first = refine.appearance && input.size == size && features.is_none();
-            let found = model.outputs(&input.pixels, input.size, Wanted { features: first, plants: k == 0 })?;
+            let found =
+                model.outputs(&input.pixels, input.size, Wanted { features: first, plants: plants && k == 0 })?;
             features = features.or(found.features);
             if let Some(plants) = &found.plants {
                 summed.get_or_insert_with(|| WeightedSum::new(size)).add(plants, input.size, size)?;
