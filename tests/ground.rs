@@ -60,8 +60,8 @@ fn chroma(soil: &str) -> [f64; 2] {
 }
 
 /// Rationale: ground of one hue gives a render away at once, and ground of many looks like paint. Expected: default iron
-/// and humus, algae and stones raise the standard deviation of a* of ground of one soil by two thirds and that of b* by a third;
-/// both stay below those of photographs.
+/// and humus, algae and stones raise the standard deviation of a* of ground of one soil by a half and that of b* by a quarter; grains
+/// and crumbs of the textures alone give 0.75 in a*; all stay below those of photographs.
 #[test]
 fn pigments_and_stones_vary_the_chroma_of_ground() {
     let one = "pigments: (iron: 0, humus: 0, lime: 0), clods: (hue_sigma: 0)";
@@ -72,6 +72,6 @@ fn pigments_and_stones_vary_the_chroma_of_ground() {
         [0, 1].map(|k| all.iter().map(|found| found[k]).sum::<f64>() / soils.len() as f64)
     };
     let ([a, b], [plain_a, plain_b]) = (mean(many), mean(one));
-    assert!(a > 1.67 * plain_a && b > 1.33 * plain_b, "{a} {b} {plain_a} {plain_b}");
+    assert!(a > 1.5 * plain_a && b > 1.25 * plain_b && plain_a > 0.75, "{a} {b} {plain_a} {plain_b}");
     assert!(a < MOST_A && b < MOST_B, "{a} {b}");
 }

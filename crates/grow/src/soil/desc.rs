@@ -314,8 +314,8 @@ pub struct ClodsDesc {
     pub tint_sigma: Num<NonNegative<10>>,
     /// Scale of the exponential distribution of the logarithms of green over red and of blue over green between clods;
     /// the standard deviation is 0.8 of it. Iron, humus and algae are distributed unevenly, so that some clods are
-    /// yellow or almost green. Source: patches of 2 mm on 20 images of SugarBeets2016, 0.042 and 0.044, minus in
-    /// quadrature the values of rendered images without this variation, 0.026 and 0.029.
+    /// yellow or almost green. Source: 0.03 from patches of 2 mm on 20 images of SugarBeets2016 (0.042 and 0.044, minus in
+    /// quadrature the values of rendered images without this variation); other photographs vary more.
     pub hue_sigma: Num<NonNegative<10>>,
     /// Fraction of the ground's moisture that clods and crumbs have lost: 0 as wet as the ground, 1 air-dry. On damp
     /// ground dry clods are the most conspicuous feature.
@@ -342,7 +342,7 @@ impl Default for ClodsDesc {
             cluster_m: Vary::fixed(0.12),
             sorting: Num::new(0.1),
             tint_sigma: Num::new(0.1),
-            hue_sigma: Num::new(0.03),
+            hue_sigma: Num::new(0.05),
             dryness: Vary::uniform(0.3, 0.9),
             damp: Vary::uniform(0.05, 0.25),
             loose: Vary::uniform(0.0, 0.5),

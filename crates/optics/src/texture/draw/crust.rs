@@ -40,7 +40,7 @@ impl Tile {
             let h = 4.6 + 0.45 * (broad[i] - 2.6) + 0.5 * shows * (soft[i] - broad[i]) + relief;
             let veil = albedo * (1.0 + 0.10 * t.noise(x, y, 60.0, 5, 9) + 0.10 * t.noise(x, y, 11.0, 3, 12));
             let colour = veil.lerp(t.colour[i], 0.25 + 0.4 * shows) * (1.0 + 0.22 * grain + 0.08 * knobs - 0.14 * pore);
-            (h, colour)
+            (h, colour * t.grain_hue(x, y))
         });
     }
 

@@ -9,6 +9,21 @@ use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, lerp, smoothstep, v
 use furrow_base::ron_file::Num;
 use furrow_base::sampling::rng::{Purpose, Stream};
 
+/// Changes of the reflectance in R, G, B by one standard deviation of iron oxides and of organic coatings. Grains and crumbs then
+/// vary by 1.3 in a* and 2 in b*, as the soil of photographs does (docs/results/ground.md).
+const IRON: Vec3 = vec3(0.035, -0.02, -0.04);
+const COATING: Vec3 = vec3(0.0, 0.0, -0.08);
+/// Standard deviation of one octave of [`Tile::noise`] with `octaves` from 2 to 3.
+const NOISE_SD: f32 = 0.3;
+/// Colours of loose mineral grains and their fractions: quartz, feldspar, dark minerals.
+const GRAINS: [(Vec3, f32); 3] =
+    [(vec3(0.42, 0.38, 0.32), 0.6), (vec3(0.40, 0.29, 0.21), 0.25), (vec3(0.09, 0.085, 0.08), 0.15)];
+
+/// Returns factors on the reflectance of soil of another hue, from standard normal amounts of iron oxides and coatings.
+fn hue(iron: f32, coating: f32) -> Vec3 {
+    Vec3::ONE + IRON * iron + COATING * coating
+}
+
 /// Ground during generation.
 pub(super) struct Tile {
     pub(super) size: usize,
@@ -62,6 +77,12 @@ impl Tile {
         (self.height, self.colour) = (height, colour);
     }
 
+    /// Returns the factors of the hue of grains at a pixel.
+    pub(super) fn grain_hue(&self, x: f32, y: f32) -> Vec3 {
+        let [iron, coating] = [40, 41].map(|layer| self.noise(x, y, 1.6, 2, layer) / NOISE_SD);
+        hue(iron, coating)
+    }
+
     /// Generates the fine earth between crumbs.
     pub(super) fn matrix(&mut self) {
         let albedo = self.albedo;
@@ -71,7 +92,7 @@ impl Tile {
             let stain = t.noise(x, y, t.period_mm / 6.0, 5, 3);
             let warm = t.noise(x, y, t.period_mm / 9.0, 4, 4);
             let shade = 0.9 * (1.0 + 0.10 * stain + 0.16 * grain);
-            (2.6 + 2.4 * swell + 0.5 * grain, albedo * shade * vec3(1.0 + 0.03 * warm, 1.0, 1.0 - 0.05 * warm))
+            (2.6 + 2.4 * swell + 0.5 * grain, albedo * shade * hue(warm, warm))
         });
     }
 
@@ -140,8 +161,7 @@ impl Tile {
             let stamp = Stamp::new(centre, axes, bottom, dome, s.range32(0.2, 0.9), &mut s);
             // Crumbs vary in brightness: some broke from deeper, moister soil.
             let bright = (f64::from(self.spread) * s.normal()).exp().to_f32() * 1.03;
-            let warm = s.normal().to_f32();
-            let own = self.albedo * bright * vec3(1.0 + 0.022 * warm, 1.0, 1.0 - 0.04 * warm);
+            let own = self.albedo * bright * hue(s.normal().to_f32(), s.normal().to_f32());
             self.stamp(&stamp, |_, h, _| own * (0.97 + 0.06 * h), (0.05 * l).clamp(0.10, 0.18));
         }
     }
@@ -159,7 +179,7 @@ impl Tile {
             let stands = ((t.height[i] - soft[i]) * 0.5).clamp(-1.0, 1.0);
             let high = ((t.height[i] - mean) * 0.15).clamp(-1.0, 1.0);
             let fine = t.noise(x, y, 1.4, 2, 5);
-            (t.height[i], t.colour[i] * (1.0 + 0.10 * stands + 0.06 * high + 0.06 * fine))
+            (t.height[i], t.colour[i] * (1.0 + 0.10 * stands + 0.06 * high + 0.06 * fine) * t.grain_hue(x, y))
         });
     }
 
@@ -167,8 +187,13 @@ impl Tile {
         let mut s = self.stream.child(Purpose::Texture, 4);
         let area = f64::from(self.period_mm * self.period_mm) * 1e-6;
         for _ in 0..s.poisson(litter.grains.get() * area) {
-            let pale = vec3(0.42, 0.38, 0.32) * s.range32(0.75, 1.35);
-            self.bit(s.range32(0.5, 1.5), 0.9, pale, &mut s);
+            let mut pick = s.uniform32();
+            let kind = GRAINS.into_iter().find(|(_, share)| {
+                pick -= share;
+                pick < 0.0
+            });
+            let mineral = kind.unwrap_or(GRAINS[0]).0 * s.range32(0.75, 1.35);
+            self.bit(s.range32(0.5, 1.5), 0.9, mineral, &mut s);
         }
         for _ in 0..s.poisson(litter.humus.get() * area) {
             let dark = vec3(0.075, 0.048, 0.030).lerp(vec3(0.20, 0.085, 0.040), s.uniform32().powi(2));
