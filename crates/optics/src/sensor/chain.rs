@@ -1,6 +1,6 @@
 //! Sensor: converts the linear film to an 8-bit colour image and an 8-bit NIR image.
 //!
-//! The steps follow a camera: radiance → blur of the optics → vignetting → exposure → electrons with shot and read
+//! The steps follow a camera: radiance → blur of the optics → veiling glare → vignetting → exposure → electrons with shot and read
 //! noise, dark current and fixed pattern, full well → integers above black → white balance → demosaicing → colour
 //! matrix → tone curve → sharpening → 8 bits → JPEG loss. The two images have separate exposures, as the two sensors of
 //! the JAI AD-130 have, within the limits of exposure time and analog gain. A step that is off is skipped and changes no bit.
@@ -44,6 +44,8 @@ pub struct Sensor {
     pub corner_shading: f32,
     /// Blur of the optics.
     pub psf: Psf,
+    /// Fraction of the light that is scattered evenly over the image.
+    pub glare: f32,
     /// `None` for a sensor without noise.
     pub noise: Option<Noise>,
     /// Colour filter mosaic.
@@ -124,6 +126,7 @@ impl Sensor {
             (film.left, film.top),
             (camera.width(), camera.height()),
         );
+        self.scatter(&mut signals, width);
         signals.par_iter_mut().enumerate().for_each(|(i, signal)| {
             *signal = *signal * RESPONSE * self.vignetting(camera, place(i));
         });
@@ -196,6 +199,17 @@ impl Sensor {
             full_scale_electrons: shutters.map(|shutter| self.limits.white * CLIP / shutter.gain),
             saturated: count.map(|n| n.to_f32() / pixels),
         }
+    }
+
+    /// Spreads the fraction [`Self::glare`] of the light evenly over the image.
+    fn scatter(&self, signals: &mut [Spectrum], width: u32) {
+        if self.glare == 0.0 || signals.is_empty() {
+            return;
+        }
+        let sum = |row: &[Spectrum]| row.iter().fold(Spectrum::ZERO, |sum, signal| sum + *signal);
+        let rows: Vec<Spectrum> = signals.par_chunks(width.to_usize()).map(sum).collect();
+        let veil = sum(&rows) * (self.glare / signals.len().to_f32());
+        signals.par_iter_mut().for_each(|signal| *signal = *signal * (1.0 - self.glare) + veil);
     }
 
     /// Returns the fraction of the light that reaches a pixel.

@@ -30,6 +30,7 @@ layered! {
     ///     )",
     ///     "(
     ///         psf: (color_px: 0.6, nir_px: 0.8, red_shift_px: 0.3),
+    ///         glare: Uniform(0.01, 0.05),
     ///         noise: (full_well: 10000, read: 3, dark_current: 5, dsnu: 2, prnu: 0.01, body: 7),
     ///         mosaic: Bayer(pattern: Grbg, demosaic: MalvarHeCutler),
     ///         adc: Bits(bits: 12),
@@ -67,6 +68,9 @@ layered! {
         pub corner_shading: Vary<Fraction> = Given<Vary<Fraction>>,
         /// Blur of the optics; default none.
         pub psf: PsfDesc = PsfWritten,
+        /// Fraction of the light that lens and housing scatter evenly over the image (veiling glare, ISO 9358): 0.01 to
+        /// 0.05 for clean lenses, above 0.1 for dusty ones and against the sun; default 0.
+        pub glare: Vary<Fraction> = Given<Vary<Fraction>>,
         /// Shot and read noise, dark current, fixed pattern; default shot and read noise.
         pub noise: NoiseDesc = NoiseWritten,
         /// Colour filter mosaic; default `Off`. NIR has its own sensor, without a mosaic.
@@ -97,6 +101,7 @@ impl Default for SensorDesc {
             natural_vignetting: true,
             corner_shading: Vary::fixed(0.05),
             psf: PsfDesc::default(),
+            glare: Vary::fixed(0.0),
             noise: NoiseDesc::default(),
             mosaic: MosaicDesc::default(),
             adc: AdcDesc::default(),
@@ -129,6 +134,7 @@ impl SensorDesc {
             sharpen: self.sharpen.draw(&mut later),
             bits: self.bits.get().trunc_to::<u32>(),
             jpeg: self.jpeg.draw(&mut later),
+            glare: self.glare.draw32(&mut later),
         }
     }
 }

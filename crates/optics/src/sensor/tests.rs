@@ -221,6 +221,24 @@ fn corners_are_darker_by_the_fourth_power_of_the_cosine() {
     assert!(f32::from(shaded.nir[0]) < 0.85 * f32::from(shot.nir[0]));
 }
 
+/// Expected: a scene of two halves keeps its mean, and its difference shrinks by the glare; an even scene stays the
+/// same.
+#[test]
+fn glare_lifts_the_dark_half_and_keeps_the_mean() {
+    let page = "(tone: Linear, noise: (on: false), natural_vignetting: false, corner_shading: 0, nir_exposure: Fixed(gain: 0.8), glare: 0.2)";
+    let halves: Vec<Spectrum> = (0..48 * 32).map(|i| Spectrum::splat(if i % 48 < 24 { 0.2 } else { 0.8 })).collect();
+    let level = |scene: &[Spectrum], page: &str| {
+        let shot = expose(&sensor(page), scene, Spectrum::ONE);
+        [shot.nir[0], shot.nir[47]].map(f32::from)
+    };
+    let ([dark, bright], [clear_dark, clear_bright]) =
+        (level(&halves, page), level(&halves, &page.replace("0.2)", "0)")));
+    assert!((dark + bright - clear_dark - clear_bright).abs() <= 2.0, "{dark} {bright}");
+    assert!(((bright - dark) / (clear_bright - clear_dark) - 0.8).abs() < 0.02, "{dark} {bright}");
+    let even = vec![Spectrum::splat(0.5); 48 * 32];
+    assert_eq!(level(&even, page), level(&even, &page.replace("0.2)", "0)")));
+}
+
 /// Rationale: steps act in sequence, and the properties tested for each must hold for the result. Expected: under any
 /// light and for every named sensor, a white card is neutral and has the exposure's brightness, two runs give equal
 /// bytes, and noise stays with its pixel in a window, except for the few edge pixels whose filters reach outside.
