@@ -450,6 +450,7 @@ fn images_of_a_set_are_asked_about_by_name_and_bands_are_found() {
         finest: None,
         features: None,
         vectors: None,
+        points: &[],
     };
     Refine::parse("colour,plants").unwrap().apply(&seen, &mut probabilities, None);
     let n = (w * h) as usize;

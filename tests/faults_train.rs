@@ -212,7 +212,7 @@ fn damaged_files_of_the_program_are_refused_with_a_way_out() {
     let identity: run::Identity = run::read_json(&RUN.join(run::PLAN)).expect("a plan");
     let trained = TrainedModel::open(&RUN).expect("a network");
     let pictures = input_images::find(&[images("0..2").into()], &trained.card.input, &[]).expect("images");
-    let claim = |folder: &Path| Prediction::claim(folder, &trained.card, None, &pictures).map(drop);
+    let claim = |folder: &Path| Prediction::claim(folder, &trained.card, None, None, &pictures).map(drop);
     let claim_plan = |folder: &Path| identity.claim(folder);
     let files: [(&Path, &str, Read<'_>); 7] = [
         (&out, input_images::PREDICTION, &claim),

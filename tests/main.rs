@@ -68,6 +68,8 @@ mod labels_only;
 mod layers;
 mod light;
 #[cfg(feature = "train")]
+mod like;
+#[cfg(feature = "train")]
 mod make;
 mod measure;
 mod mitsuba;

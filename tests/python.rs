@@ -131,6 +131,16 @@ fn predictions_are_read_as_annotations() {
     done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).envs(quiet));
 }
 
+/// Expected: the page lists the images of its folder, whatever their names, and replaces no other page.
+#[test]
+fn plants_are_marked_on_a_page() {
+    let Some(python) = python("import numpy, PIL") else { return };
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_points.py");
+    done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).env("PYTHONDONTWRITEBYTECODE", "1"));
+}
+
 /// Rationale: a notebook that stops in its third cell is worse than none. Expected: all code cells run, with small images:
 /// plots where Matplotlib is installed, the training, whose loss falls, where PyTorch is.
 #[test]

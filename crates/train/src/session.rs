@@ -348,7 +348,8 @@ pub fn evaluate(
         };
         let (refine, bands) = (card.refine, &card.input.bands);
         let pictures = multiscale::training_images(refine, store.len()).into_iter();
-        let appearance = multiscale::learn(&models, refine, bands, pictures.map(|place| Ok(open(place)?.2)))?;
+        let appearance =
+            multiscale::learn(&models, refine, bands, pictures.map(|place| Ok((open(place)?.2, Vec::new()))))?;
         for place in 0..store.len() {
             let (size, example, inputs) = open(place)?;
             let begun = Instant::now();

@@ -26,6 +26,19 @@ pub(crate) struct InferenceArgs {
 }
 
 impl InferenceArgs {
+    /// Replaces the refinement of a model card by the one that learns from points on plants; fails if another was given.
+    pub(crate) fn with_appearance(&self, card: &mut ModelCard) -> Result<()> {
+        if let Some(refine) = self.refine {
+            return Err(Error::misuse(format!(
+                "--like needs the refinement appearance, not --refine {}",
+                refine.name()
+            ))
+            .help("leave --refine out, or write --refine colour,plants,rows,appearance"));
+        }
+        card.refine = Refine { colour: true, plants: true, rows: true, appearance: true, ..Refine::default() };
+        card.refine.check(&card.classes, &card.input.bands).map_err(|what| Error::misuse(format!("--like: {what}")))
+    }
+
     /// Returns the ground sampling distance of the images in millimetres a pixel, if it was given.
     pub(crate) fn pixel_mm(&self) -> Option<f64> {
         self.pixel_mm

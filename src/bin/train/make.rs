@@ -313,6 +313,7 @@ impl<'a> Make<'a> {
             batch: BATCH,
             pixel_mm: None,
             plants: false,
+            like: None,
             machine: &self.args.machine,
             quiet: self.args.quiet,
             signals: self.signals,

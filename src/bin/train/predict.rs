@@ -10,6 +10,7 @@ use furrow_train::crop::with_crops;
 use furrow_train::data::Band;
 use furrow_train::deploy::guard::Implausible;
 use furrow_train::deploy::input_images::{self, InputImage, Prediction};
+use furrow_train::deploy::points;
 use furrow_train::deploy::predict::{self, Options, Predictions};
 use furrow_train::ensemble::Ensemble;
 use furrow_train::refine::Evidence;
@@ -44,6 +45,11 @@ pub(crate) struct Args {
     /// (`train plants`) separates plants that touch; for a network without one, a plant is a connected region of plant pixels.
     #[arg(long)]
     plants: bool,
+    /// Table of points on plants of known class in some of the images (CSV: image, x, y, class), by which crop and weeds of the field are
+    /// told apart in all images: a few crop plants and a few weeds in two or three images are enough. x and y are pixels from the left
+    /// and the top, class is crop or weed. Needs the refinement appearance, and uses colour,plants,rows,appearance without --refine.
+    #[arg(long, value_name = "FILE")]
+    like: Option<PathBuf>,
     #[command(flatten)]
     inference: InferenceArgs,
     #[command(flatten)]
@@ -68,6 +74,9 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         furrow_cli::message!("warning: {warning}");
     }
     args.inference.apply(&mut trained.card)?;
+    if args.like.is_some() && !trained.card.refine.appearance {
+        args.inference.with_appearance(&mut trained.card)?;
+    }
     cli::check_folder(&args.out)?;
     let job = Job {
         images: &args.images,
@@ -75,6 +84,7 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         batch: args.batch.into(),
         pixel_mm: args.inference.pixel_mm(),
         plants: args.plants,
+        like: args.like.as_deref(),
         machine: &args.machine,
         quiet: args.quiet,
         signals,
@@ -94,6 +104,8 @@ pub(crate) struct Job<'a> {
     pub(crate) pixel_mm: Option<f64>,
     /// Whether plants are written one by one.
     pub(crate) plants: bool,
+    /// Table of points on plants of known class.
+    pub(crate) like: Option<&'a Path>,
     /// Device and threads.
     pub(crate) machine: &'a MachineArgs,
     /// Whether progress is hidden.
@@ -123,7 +135,8 @@ impl Job<'_> {
 
     /// Predicts the images into `out` and shows the progress.
     fn predict(&self, trained: &Ensemble, pictures: &[InputImage], out: &Path) -> Result<Predictions> {
-        let passes = predict::passes(&trained.card, pictures.len());
+        let points = self.like.map(|table| points::read(table, pictures)).transpose()?.unwrap_or_default();
+        let passes = predict::passes(&trained.card, pictures.len(), &points);
         let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(passes.to_u64()) };
         let style = ProgressStyle::with_template("{bar:30} {pos} of {len} images, {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -133,12 +146,20 @@ impl Job<'_> {
             batch: self.batch,
             pixel_mm: self.pixel_mm,
             plants: self.plants,
+            points: &points,
             done: &|done| bar.set_position(done.to_u64()),
             stop: self.signals.catch(),
         };
         let predicted = predict::predict(trained, pictures, out, &self.machine.machine(), &how);
         bar.finish_and_clear();
         let predicted = predicted?;
+        let asked = points.of.iter().map(Vec::len).sum::<usize>();
+        if predicted.points < asked {
+            let (on, asked) = (predicted.points, asked);
+            furrow_cli::message!(
+                "warning: {on} of {asked} points are on plants that the network found; the others have no effect"
+            );
+        }
         if !self.quiet && predicted.done > 0 {
             let each = predicted.seconds / predicted.done.to_f64();
             let pictures = if predicted.done == 1 { "image" } else { "images" };

@@ -329,6 +329,9 @@ pub struct Prediction {
     /// Result of the last prediction in this folder, if it labelled implausibly little vegetation as crop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub implausible: Option<Implausible>,
+    /// SHA-256 of the table of points on plants of known class, if one was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points_sha256: Option<String>,
     /// Whether the last prediction in this folder learnt an appearance model from its images; absent if it was not asked to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance: Option<bool>,
@@ -351,8 +354,14 @@ pub const PREDICTION: &str = "prediction.json";
 
 impl Prediction {
     /// Reserves a folder for the predictions of these images and writes its `prediction.json`. Fails if the folder holds predictions of
-    /// another network, size or refinement, or files that would be overwritten and are not predictions of these images.
-    pub fn claim(folder: &Path, card: &ModelCard, pixel_mm: Option<f64>, pictures: &[InputImage]) -> Result<Self> {
+    /// another network, size, refinement or table of points, or files that would be overwritten and are not predictions of these images.
+    pub fn claim(
+        folder: &Path,
+        card: &ModelCard,
+        pixel_mm: Option<f64>,
+        points_sha256: Option<&str>,
+        pictures: &[InputImage],
+    ) -> Result<Self> {
         let path = folder.join(PREDICTION);
         let refuse = |path: &Path, what: String| Err(Error::misuse(what).help("give another --out").in_file(path));
         let there: Option<Self> = path.exists().then(|| run::read_json(&path)).transpose()?;
@@ -365,6 +374,9 @@ impl Prediction {
         }
         if there.as_ref().is_some_and(|t| t.refine != card.refine) {
             return refuse(&path, "this folder holds predictions with another --refine".into());
+        }
+        if there.as_ref().is_some_and(|t| t.points_sha256.as_deref() != points_sha256) {
+            return refuse(&path, "this folder holds predictions with other points (--like)".into());
         }
         let (mut all, evidence) = there.map(|t| (t.pictures, t.evidence)).unwrap_or_default();
         for picture in pictures {
@@ -397,6 +409,7 @@ impl Prediction {
             refine: card.refine,
             crops: card.crops.clone(),
             implausible: None,
+            points_sha256: points_sha256.map(str::to_owned),
             appearance: None,
             classes,
             pictures: all,

@@ -9,6 +9,7 @@
 //! | `enlarge` | scores resized to the image's original size, and their argmax |
 //! | `overlay` | prediction blended over its image |
 //! | `plants` | plants of predictions, one by one |
+//! | `points` | table of points on plants of known class |
 //! | `predict` | prediction of images with a trained model |
 //!
 //! Exported networks include the input normalization, so that callers cannot apply a different mean or scale. The input `image` holds
@@ -25,6 +26,7 @@ pub mod input_images;
 pub mod onnx;
 pub mod overlay;
 pub mod plants;
+pub mod points;
 #[cfg(feature = "torch")]
 pub mod predict;
 #[cfg(feature = "torch")]

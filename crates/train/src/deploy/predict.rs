@@ -6,10 +6,11 @@
 use super::input_images::{InputImage, PREDICTION, Prediction, files};
 use super::overlay;
 use super::plants::{self, Found};
+use super::points::Points;
 use crate::data::resize::{self, Input};
 use crate::enlarge;
 use crate::ensemble::Ensemble;
-use crate::refine::{Appearance, Evidence, Refine};
+use crate::refine::{Appearance, Evidence, Point, Refine};
 use crate::run::ModelCard;
 use crate::session::Machine;
 use crate::torch::multiscale::{self, Scores};
@@ -17,7 +18,7 @@ use crate::torch::{Model, device, guarded};
 use furrow_base::supervise::supervised;
 use furrow_base::{Error, Result};
 use furrow_output::ImageData as Png;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,6 +38,8 @@ pub struct Options<'a> {
     pub pixel_mm: Option<f64>,
     /// Whether plants are written one by one as well; see [`plants`].
     pub plants: bool,
+    /// Points on plants of known class; they take part in the refinement `appearance`.
+    pub points: &'a Points,
     /// Progress callback: receives the number of finished passes, out of [`passes`].
     pub done: &'a (dyn Fn(usize) + Sync),
     /// Set by the caller to stop early.
@@ -60,11 +63,14 @@ pub struct Predictions {
     pub evidence: BTreeMap<String, Evidence>,
     /// `true` if an appearance model of crop and weeds was learnt from the images.
     pub appearance: bool,
+    /// Number of points on plants that the network found.
+    pub points: usize,
 }
 
 /// An image that has been read and prepared for the network.
 struct PreparedImage<'a> {
     picture: &'a InputImage,
+    points: &'a [Point],
     width: u32,
     height: u32,
     rgb: Vec<[u8; 3]>,
@@ -72,9 +78,17 @@ struct PreparedImage<'a> {
     inputs: Vec<Input>,
 }
 
-/// Returns the number of images that go through the network. Images that the appearance features are learnt from count twice.
-pub fn passes(card: &ModelCard, pictures: usize) -> usize {
-    pictures + multiscale::training_images(card.refine, pictures).len()
+/// Returns the number of images that go through the network, of `pictures` images with these points. Images that the appearance features
+/// are learnt from count twice.
+pub fn passes(card: &ModelCard, pictures: usize, points: &Points) -> usize {
+    pictures + training_images(card, pictures, points).len()
+}
+
+/// Returns the images that the appearance features are learnt from: some of all, and all with points.
+fn training_images(card: &ModelCard, pictures: usize, points: &Points) -> Vec<usize> {
+    let marked = points.of.iter().enumerate().filter(|(_, points)| !points.is_empty()).map(|(place, _)| place);
+    let all: BTreeSet<usize> = multiscale::training_images(card.refine, pictures).into_iter().chain(marked).collect();
+    all.into_iter().collect()
 }
 
 /// Capacity of each queue between the network and a reader or writer thread, images.
@@ -105,16 +119,17 @@ fn predict_here(
     let models = trained.models(place)?;
     let names = pictures.iter().map(|picture| picture.name.as_str());
     let before = options.plants.then(|| plants::claim(out, names)).transpose()?;
-    let prediction = Prediction::claim(out, card, options.pixel_mm, pictures)?;
+    let prediction = Prediction::claim(out, card, options.pixel_mm, options.points.table_sha256.as_deref(), pictures)?;
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
     let mut made = Predictions::default();
     let mut unread = Vec::new();
     let mut found = BTreeMap::new();
     let (appearance, learnt) = learn(&models, card, pictures, options)?;
+    let each = || (0..pictures.len()).map(|place| (&pictures[place], points(options, place)));
     std::thread::scope(|scope| -> Result<()> {
         let readers: Vec<_> =
-            (0..workers).map(|w| read(scope, card, pictures.iter().skip(w).step_by(workers))).collect::<Result<_>>()?;
+            (0..workers).map(|w| read(scope, card, each().skip(w).step_by(workers))).collect::<Result<_>>()?;
         let drawing = Drawing { card, out, appearance: appearance.as_ref(), plants: options.plants };
         let begun = (0..workers).map(|_| write(scope, drawing, &failed));
         let (writers, handles): (Vec<_>, Vec<_>) = begun.collect::<Result<Vec<_>>>()?.into_iter().unzip();
@@ -161,6 +176,7 @@ fn predict_here(
         let words = format!("stopped: {} of {} images are predicted", made.done, pictures.len());
         return Err(Error::stopped(words).help("run the same command again to predict all of them").in_file(out));
     }
+    made.points = appearance.as_ref().map_or(0, |found| found.points);
     made.appearance = appearance.is_some();
     if let Some(before) = before {
         plants::write(out, &before, &found, &card.classes.names())?;
@@ -171,13 +187,18 @@ fn predict_here(
     Ok(made)
 }
 
+/// Returns the points in an image.
+fn points<'a>(options: &Options<'a>, place: usize) -> &'a [Point] {
+    options.points.of.get(place).map_or(&[], Vec::as_slice)
+}
+
 impl<'a> PreparedImage<'a> {
-    fn read(picture: &'a InputImage, card: &ModelCard) -> Result<Self> {
+    fn read(picture: &'a InputImage, points: &'a [Point], card: &ModelCard) -> Result<Self> {
         let found = picture.read()?;
         let (size, trained) = ((found.width, found.height), (card.input.width, card.input.height));
         let sizes = card.resize.sizes(trained, size).map_err(|e| e.in_file(picture.photo.clone()))?;
         let inputs = resize::inputs(&found.planes, size, &sizes, &card.normalization);
-        Ok(Self { picture, width: found.width, height: found.height, rgb: found.rgb, inputs })
+        Ok(Self { picture, points, width: found.width, height: found.height, rgb: found.rgb, inputs })
     }
 }
 
@@ -189,12 +210,13 @@ fn learn(
     pictures: &[InputImage],
     options: &Options<'_>,
 ) -> Result<(Option<Appearance>, usize)> {
-    let picked = multiscale::training_images(card.refine, pictures.len());
+    let picked = training_images(card, pictures.len(), options.points);
     // After a stop request this ends early; the caller reports the stop.
     let going = |_: &(usize, &usize)| !options.stop.load(Ordering::Relaxed);
     let read = |(k, place): (usize, &usize)| {
         (options.done)(k);
-        PreparedImage::read(&pictures[*place], card).ok().map(|ready| Ok(ready.inputs))
+        let ready = PreparedImage::read(&pictures[*place], points(options, *place), card).ok()?;
+        Some(Ok((ready.inputs, ready.points.to_vec())))
     };
     let inputs = picked.iter().enumerate().take_while(going).filter_map(read);
     let found = multiscale::learn(models, card.refine, &card.input.bands, inputs)?;
@@ -205,12 +227,13 @@ fn learn(
 fn read<'s, 'a: 's>(
     scope: &'s Scope<'s, '_>,
     card: &'a ModelCard,
-    pictures: impl Iterator<Item = &'a InputImage> + Send + 's,
+    pictures: impl Iterator<Item = (&'a InputImage, &'a [Point])> + Send + 's,
 ) -> Result<Receiver<Result<Result<PreparedImage<'a>>>>> {
     let (sender, receiver) = sync_channel(AHEAD);
     let work = move || {
-        for picture in pictures {
-            let ready = supervised(|| PreparedImage::read(picture, card)).map_err(|bug| bug.within(&picture.name));
+        for (picture, points) in pictures {
+            let ready =
+                supervised(|| PreparedImage::read(picture, points, card)).map_err(|bug| bug.within(&picture.name));
             // The receiver is gone: the prediction was stopped.
             if sender.send(ready).is_err() {
                 return;
@@ -303,6 +326,7 @@ fn infer<'a>(
                     finest: None,
                     features: None,
                     vectors: None,
+                    points: Vec::new(),
                     are_logits: true,
                 };
                 all.extend(each.map(whole));
@@ -310,7 +334,8 @@ fn infer<'a>(
         }
     }
     let seconds = begun.elapsed().as_secs_f64();
-    for ((number, ready), scores) in batch.into_iter().zip(all) {
+    for ((number, ready), mut scores) in batch.into_iter().zip(all) {
+        scores.points = ready.points.to_vec();
         // A writer that has ended returns its error when it is joined.
         let _ = writers[number % writers.len()].send((number, ready, scores));
     }

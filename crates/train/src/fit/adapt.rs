@@ -56,7 +56,11 @@ fn answers(teacher: &Model, pixels: &[f32], plan: &Plan) -> Result<(Vec<u8>, Vec
     let images = pixels.chunks_exact(area * bands.len()).zip(probabilities.chunks_exact_mut(area * teacher.classes));
     let (mut labels, mut sure) = (Vec::new(), Vec::new());
     for (pixels, probabilities) in images {
-        refine.apply(&Seen { pixels, size, bands, finest: None, features: None, vectors: None }, probabilities, None);
+        refine.apply(
+            &Seen { pixels, size, bands, finest: None, features: None, vectors: None, points: &[] },
+            probabilities,
+            None,
+        );
         for at in 0..area {
             let each = probabilities.iter().skip(at).step_by(area).enumerate();
             let (class, p) =

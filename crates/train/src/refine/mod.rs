@@ -29,7 +29,7 @@ use furrow_base::math::ToInt;
 use furrow_dataset::model::classes::Classes;
 use serde::{Deserialize, Serialize};
 
-pub use appearance::{Appearance, Examples, Features};
+pub use appearance::{Appearance, Examples, Features, Point};
 pub use evidence::Evidence;
 pub use separate::{Vectors, fill, instances};
 
@@ -67,6 +67,8 @@ pub struct Seen<'a> {
     pub features: Option<&'a Features>,
     /// Output of the plant decoder, if the network has one.
     pub vectors: Option<&'a Vectors>,
+    /// Points on plants of known class.
+    pub points: &'a [Point],
 }
 
 impl Seen<'_> {
@@ -189,8 +191,8 @@ impl Refine {
             found.write(probabilities, |_, region| plants::crop_or_weed(odds[region]));
             return row_score;
         };
-        let looks = appearance.log_odds(&found.regions, seen.extent(), features);
-        found.write(probabilities, |at, region| plants::crop_or_weed(odds[region] + looks[at]));
+        let odds = appearance.log_odds(&found.regions, seen.extent(), &odds, features, seen.points);
+        found.write(probabilities, |at, _| plants::crop_or_weed(odds[at]));
         row_score
     }
 
@@ -201,7 +203,7 @@ impl Refine {
         self.recolour(seen, probabilities);
         let found =
             plants::PlantRegions::of(seen.extent(), probabilities, seen.finest, seen.vectors.filter(|_| self.separate));
-        Some(Examples::of(&found.regions, seen.extent(), &found.arranged().0, features))
+        Some(Examples::of(&found.regions, seen.extent(), &found.arranged().0, features, seen.points))
     }
 
     /// Applies `colour`. Returns `true` if the colours of plants were learnt from the image.

@@ -123,7 +123,7 @@ mod tests {
 
     /// Refines probabilities by `plants` or, with `rows`, by `plants,rows`.
     fn refine(size: (u32, u32), probabilities: &mut [f32], finest: Option<&[f32]>, rows: bool) {
-        let seen = Seen { pixels: &[], size, bands: &[], finest, features: None, vectors: None };
+        let seen = Seen { pixels: &[], size, bands: &[], finest, features: None, vectors: None, points: &[] };
         Refine { plants: true, rows, ..Refine::default() }.apply(&seen, probabilities, None);
     }
 

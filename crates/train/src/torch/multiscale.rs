@@ -6,7 +6,7 @@ use crate::data::example::nearest;
 use crate::data::resize::Input;
 use crate::enlarge::classes_at;
 use crate::net::plants::{CHANNELS, UNIT};
-use crate::refine::{Appearance, Evidence, Examples, Features, Refine, Seen, Vectors, fill, instances};
+use crate::refine::{Appearance, Evidence, Examples, Features, Point, Refine, Seen, Vectors, fill, instances};
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use tch::{Kind, Tensor};
@@ -30,6 +30,8 @@ pub struct Scores {
     pub features: Option<Features>,
     /// Vectors of the plant decoder at this size, if they are wanted and the first network has one: the mean over the inputs.
     pub vectors: Option<Vectors>,
+    /// Points on plants of known class.
+    pub points: Vec<Point>,
     /// `true` if the values are logits (one network and one input); otherwise they are sums of probabilities.
     pub are_logits: bool,
 }
@@ -87,7 +89,8 @@ impl Scores {
     /// Returns the input of refinement: the image at the largest size, and the values to refine.
     fn seen<'a>(&'a mut self, input: &'a Input, bands: &'a [Band]) -> (Seen<'a>, &'a mut [f32]) {
         let (finest, features, vectors) = (self.finest.as_deref(), self.features.as_ref(), self.vectors.as_ref());
-        (Seen { pixels: &input.pixels, size: self.size, bands, finest, features, vectors }, &mut self.values)
+        let (pixels, size, points) = (&input.pixels, self.size, &self.points);
+        (Seen { pixels, size, bands, finest, features, vectors, points }, &mut self.values)
     }
 }
 
@@ -98,18 +101,19 @@ pub fn training_images(refine: Refine, pictures: usize) -> Vec<usize> {
     (0..used).map(|k| k * pictures / used).collect()
 }
 
-/// Learns the appearance model of crop and weeds from the inputs of images of one field. Returns `None` if the images are not
-/// sufficient.
+/// Learns the appearance model of crop and weeds from the inputs of images of one field, and from points on plants of known class, if
+/// there are any. Returns `None` if the images are not sufficient.
 pub fn learn(
     models: &[Model],
     refine: Refine,
     bands: &[Band],
-    pictures: impl Iterator<Item = Result<Vec<Input>>>,
+    pictures: impl Iterator<Item = Result<(Vec<Input>, Vec<Point>)>>,
 ) -> Result<Option<Appearance>> {
     let mut examples = Vec::new();
     for inputs in pictures {
-        let inputs = inputs?;
-        examples.extend(scores(models, refine, false, &inputs)?.examples(refine, &inputs, bands));
+        let (inputs, points) = inputs?;
+        let seen = Scores { points, ..scores(models, refine, false, &inputs)? };
+        examples.extend(seen.examples(refine, &inputs, bands));
     }
     Ok(Appearance::learn(&examples))
 }
@@ -129,7 +133,8 @@ pub fn scores(models: &[Model], refine: Refine, plants: bool, inputs: &[Input]) 
             Ok(sum.mean())
         });
         let vectors = vectors.transpose()?;
-        return Ok(Scores { values: values(&scores)?, size, finest: None, features, vectors, are_logits: true });
+        let values = values(&scores)?;
+        return Ok(Scores { values, size, finest: None, features, vectors, points: Vec::new(), are_logits: true });
     }
     let mut sums: Vec<f32> = Vec::new();
     let (mut finest, mut features, mut summed) = (None, None, None::<WeightedSum>);
@@ -154,7 +159,7 @@ pub fn scores(models: &[Model], refine: Refine, plants: bool, inputs: &[Input]) 
         add(&mut sums, mean);
     }
     let vectors = summed.map(WeightedSum::mean);
-    Ok(Scores { values: sums, size, finest, features, vectors, are_logits: false })
+    Ok(Scores { values: sums, size, finest, features, vectors, points: Vec::new(), are_logits: false })
 }
 
 /// Weighted sum of the plant decoder's outputs for inputs of several sizes. The weight falls with the radius of the plant in the pixels

@@ -22,6 +22,9 @@ const LEAST_LIKELY: f64 = 1e-3;
 /// Features whose standard deviation is below this fraction of their mean count as constant and are left out.
 const FLAT: f64 = 1e-6;
 
+/// Standard deviations of the prior of a correction: of its bias, of the factor on the log odds, and of the coefficient of a component.
+const PRIOR_SD: [f64; 3] = [2.0, 1.0, 1.0];
+
 /// Affine function of the features that returns log odds.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Classifier {
@@ -29,6 +32,13 @@ pub(super) struct Classifier {
     pub weights: Vec<f64>,
     /// Constant term.
     pub bias: f64,
+}
+
+impl Classifier {
+    /// Returns the log odds of a feature vector.
+    pub(super) fn log_odds(&self, features: &[f32]) -> f64 {
+        self.bias + self.weights.iter().zip(features).map(|(weight, f)| weight * f64::from(*f)).sum::<f64>()
+    }
 }
 
 /// Training examples.
@@ -40,6 +50,8 @@ pub struct Examples {
     pub(super) labels: Vec<f64>,
     /// Weight of each example.
     pub(super) weights: Vec<f64>,
+    /// Plants of known class, which are among the examples.
+    pub(super) marked: Marked,
 }
 
 impl Examples {
@@ -67,20 +79,73 @@ impl Examples {
         if n <= COMPONENTS || total <= 0.0 {
             return None;
         }
-        let channels = self.features.len() / n;
-        let scales = self.scales(channels, total);
-        let axes = self.axes(&scales, total);
+        let components = self.components(total);
         // A column for each example: 1 for the bias, then its principal components.
-        let mut rows = DMatrix::repeat(axes.ncols() + 1, n, 1.0);
-        for (mut row, features) in rows.column_iter_mut().zip(self.features.chunks_exact(channels)) {
-            row.rows_mut(1, axes.ncols()).gemv_tr(1.0, &axes, &standard(features, &scales), 0.0);
+        let mut rows = DMatrix::repeat(components.axes.ncols() + 1, n, 1.0);
+        for (mut row, features) in rows.column_iter_mut().zip(self.features.chunks_exact(self.features.len() / n)) {
+            row.rows_mut(1, components.axes.ncols()).copy_from(&components.of(features));
         }
         let all: Vec<usize> = (0..n).collect();
         let beta = self.newton(&rows, &all)?;
-        let weights = &axes * beta.rows(1, axes.ncols());
-        let weights: Vec<f64> = weights.iter().zip(&scales).map(|(w, s)| w * s.factor).collect();
-        let bias = beta[0] - weights.iter().zip(&scales).map(|(w, s)| w * s.mean).sum::<f64>();
-        Some((Classifier { weights, bias }, self.cross_validated_accuracy(&rows, pictures)))
+        let classifier = components.classifier(beta[0], &beta.rows(1, components.axes.ncols()).into_owned());
+        Some((classifier, self.cross_validated_accuracy(&rows, pictures)))
+    }
+
+    /// Corrects log odds by plants of known class. Returns the factor on the log odds and the classifier that is added to them, or `None`
+    /// if there are no more examples than [`COMPONENTS`] or no marked plant.
+    ///
+    /// Maximizes the posterior of a logistic regression whose prior is the rule without marked plants: factor 1, bias and coefficients of
+    /// the principal components 0, with the standard deviations of [`PRIOR_SD`]. `odds` are the log odds of the marked plants.
+    pub(super) fn correction(&self, odds: &[f64]) -> Option<(f64, Classifier)> {
+        let marked = &self.marked;
+        let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
+        if n <= COMPONENTS || total <= 0.0 || marked.crops.is_empty() {
+            return None;
+        }
+        let components = self.components(total);
+        let count = components.axes.ncols();
+        let mut rows = DMatrix::repeat(count + 2, odds.len(), 1.0);
+        for (k, mut row) in rows.column_iter_mut().enumerate() {
+            row[1] = odds[k];
+            row.rows_mut(2, count).copy_from(&components.of(marked.features(k)));
+        }
+        let mut beta = DVector::zeros(count + 2);
+        beta[1] = 1.0;
+        let prior = beta.clone();
+        let precision = DVector::from_fn(count + 2, |i, _| PRIOR_SD[i.min(2)].powi(-2));
+        let loss = |beta: &DVector<f64>| {
+            let penalty = precision.dot(&(beta - &prior).map(|b| 0.5 * b * b));
+            // −ln of the logistic function, for all sizes of the log odds.
+            let each = |(x, crop): (_, &bool)| softplus(beta.dot(&x) * if *crop { -1.0 } else { 1.0 });
+            penalty + rows.column_iter().zip(&marked.crops).map(each).sum::<f64>()
+        };
+        for _ in 0..STEPS {
+            let mut gradient = precision.component_mul(&(&beta - &prior));
+            let mut hessian = DMatrix::from_diagonal(&precision);
+            for (x, crop) in rows.column_iter().zip(&marked.crops) {
+                let q = logistic(beta.dot(&x));
+                gradient.axpy(q - f64::from(u8::from(*crop)), &x, 1.0);
+                hessian.syger(q * (1.0 - q), &x, &x, 1.0);
+            }
+            let mut step = Cholesky::new(hessian)?.solve(&gradient);
+            // Far from the maximum a full step may pass it.
+            let before = loss(&beta);
+            while loss(&(&beta - &step)) > before && step.amax() > CLOSE {
+                step *= 0.5;
+            }
+            beta -= &step;
+            if step.amax() < CLOSE {
+                break;
+            }
+        }
+        let classifier = components.classifier(beta[0], &beta.rows(2, count).into_owned());
+        beta.iter().all(|b| b.is_finite()).then_some((beta[1], classifier))
+    }
+
+    /// Returns the principal components of the examples; `total` is the sum of their weights.
+    fn components(&self, total: f64) -> Components {
+        let scales = self.scales(self.features.len() / self.labels.len(), total);
+        Components { axes: self.axes(&scales, total), scales }
     }
 
     /// Returns the cross-validated pseudo-R². See [`Self::learn`] for it, and [`Self::newton`] for `rows`.
@@ -179,8 +244,63 @@ impl Examples {
     }
 }
 
+/// Plants of known class, each with the features at a point on it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Marked {
+    /// Feature vectors, one plant after the other.
+    pub(super) features: Vec<f32>,
+    /// Log odds of crop over weed from the network, sizes and rows.
+    pub(super) odds: Vec<f64>,
+    /// `true` for crop.
+    pub(super) crops: Vec<bool>,
+}
+
+impl Marked {
+    /// Returns the features of a plant.
+    pub(super) fn features(&self, k: usize) -> &[f32] {
+        let channels = self.features.len() / self.crops.len();
+        &self.features[k * channels..(k + 1) * channels]
+    }
+
+    /// Appends other plants.
+    pub(super) fn extend(&mut self, other: &Self) {
+        self.features.extend(&other.features);
+        self.odds.extend(&other.odds);
+        self.crops.extend(&other.crops);
+    }
+}
+
+/// Principal components of features.
+struct Components {
+    scales: Vec<Scale>,
+    /// Directions as columns.
+    axes: DMatrix<f64>,
+}
+
+impl Components {
+    /// Returns the components of a feature vector.
+    fn of(&self, features: &[f32]) -> DVector<f64> {
+        let mut components = DVector::zeros(self.axes.ncols());
+        components.gemv_tr(1.0, &self.axes, &standard(features, &self.scales), 0.0);
+        components
+    }
+
+    /// Returns the classifier of the features with this bias and these coefficients of the components.
+    fn classifier(&self, bias: f64, coefficients: &DVector<f64>) -> Classifier {
+        let weights = &self.axes * coefficients;
+        let weights: Vec<f64> = weights.iter().zip(&self.scales).map(|(w, s)| w * s.factor).collect();
+        let bias = bias - weights.iter().zip(&self.scales).map(|(w, s)| w * s.mean).sum::<f64>();
+        Classifier { weights, bias }
+    }
+}
+
 fn logistic(odds: f64) -> f64 {
     1.0 / (1.0 + (-odds).exp())
+}
+
+/// Returns ln(1 + eˣ).
+fn softplus(x: f64) -> f64 {
+    x.max(0.0) + (-x.abs()).exp().ln_1p()
 }
 
 /// Returns the expected log likelihood of the prediction q if the label has the probability p.
@@ -252,6 +372,33 @@ mod tests {
         assert_eq!(rows.classifier(), Some(found), "the same again");
     }
 
+    /// Expected: log odds that are wrong for all plants are turned by points on ten of each class, so that nearly all other plants are right;
+    /// right ones keep at least half of their weight; without points there is no correction. Source: the rule.
+    #[test]
+    fn points_turn_wrong_log_odds_and_keep_right_ones() {
+        let (mut rows, kinds) = examples(400, 12, 0.0);
+        let side = |crop: bool| if crop { 6.0 } else { -6.0 };
+        for sign in [-1.0, 1.0] {
+            rows.marked = Marked::default();
+            for kind in [true, false] {
+                for k in (0..400).filter(|k| kinds[*k] == kind).take(10) {
+                    rows.marked.features.extend(&rows.features[k * 12..(k + 1) * 12]);
+                    rows.marked.odds.push(sign * side(kind));
+                    rows.marked.crops.push(kind);
+                }
+            }
+            let (factor, added) = rows.correction(&rows.marked.odds).unwrap();
+            let right = |k: &usize| {
+                let odds = factor * sign * side(kinds[*k]) + added.log_odds(&rows.features[k * 12..(k + 1) * 12]);
+                (odds > 0.0) == kinds[*k]
+            };
+            assert!((0..400).filter(right).count() > 390, "{sign}: {factor}");
+            assert!(if sign > 0.0 { factor > 0.5 } else { factor < 0.5 }, "{sign}: {factor}");
+        }
+        rows.marked = Marked::default();
+        assert_eq!(rows.correction(&[]), None);
+    }
+
     /// Expected: with constant features the log odds are those of the labels' weighted mean; too few examples, or examples without weight,
     /// give no classifier. Source: the minimum of the loss.
     #[test]
@@ -260,11 +407,13 @@ mod tests {
             features: vec![1.0; 40],
             labels: [[0.9; 15], [0.1; 15], [0.5; 15]].concat()[..20].to_vec(),
             weights: vec![2.0; 20],
+            ..Examples::default()
         };
         let found = flat.classifier().unwrap();
         let mean = (15.0 * 0.9 + 5.0 * 0.1) / 20.0;
         assert!((found.bias - f64::ln(mean / (1.0 - mean))).abs() < 1e-6 && found.weights == [0.0, 0.0], "{found:?}");
-        let few = Examples { features: vec![1.0; 8], labels: vec![0.5; 8], weights: vec![1.0; 8] };
+        let few =
+            Examples { features: vec![1.0; 8], labels: vec![0.5; 8], weights: vec![1.0; 8], ..Examples::default() };
         assert!(few.classifier().is_none());
         assert!(Examples { weights: vec![0.0; 20], ..flat }.classifier().is_none());
         assert!(Examples::default().classifier().is_none());

@@ -10,17 +10,20 @@
 //! The classifier is weighted by its cross-validated accuracy on held-out images. If crop and weeds look alike, or all plants are of one
 //! class, a classifier can only predict the more frequent class; it is then left out.
 //!
+//! Points on plants of known class, if there are any, correct the sum of all log odds; see [`Examples::correction`].
+//!
 //! Source: self-training on the arrangement of plants, Lottes & Stachniss 2017, "Semi-supervised online visual crop and weed
 //! classification in precision farming exploiting plant arrangement"; features and constants are our choice.
 
 mod logistic;
 
 use crate::measure::components::Components;
-use furrow_base::math::{RoundTo, ToFloat, ToInt};
+use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2};
 use logistic::Classifier;
 use std::collections::BTreeMap;
 
 pub use logistic::Examples;
+use logistic::Marked;
 
 /// Weight of the appearance log odds relative to the sum of the other log odds.
 const WEIGHT: f64 = 8.0;
@@ -34,8 +37,36 @@ const SURE: f64 = 8.0;
 const MOST: usize = 2000;
 /// Range of the cross-validated pseudo-R² over which the classifier's weight rises linearly from 0 to 1.
 const ACCURACY_RANGE: (f64, f64) = (0.05, 0.15);
+/// Weight of the local log odds at a pixel if points mark plants: they also separate plants that touch, which are one region.
+const PLACE_MARKED: f64 = 1.0;
+/// Distance up to which a point that is beside all plants marks the nearest one, as a fraction of the longer side of the image.
+const BESIDE: f32 = 0.01;
 /// Minimum number of images with plants: within one image, plants only repeat the errors of its rows.
 const LEAST: usize = 2;
+
+/// Point on a plant of known class.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Position in an image as fractions of its width and height, from the left and the top.
+    pub at: Vec2,
+    /// Whether the plant is crop; otherwise it is a weed.
+    pub is_crop: bool,
+}
+
+impl Point {
+    /// Returns the pixel that the point marks in an image of this size: that at the point, or the nearest pixel of a plant. `None` if no
+    /// plant is near.
+    fn pixel(&self, regions: &Components, (width, height): (usize, usize)) -> Option<usize> {
+        let place = |part: f32, cells: usize| ((part * cells.to_f32()).trunc_to::<usize>()).min(cells - 1);
+        let (x, y) = (place(self.at.x, width), place(self.at.y, height));
+        let reach = (BESIDE * width.max(height).to_f32()).ceil_to::<usize>();
+        let pixels = (y.saturating_sub(reach)..=(y + reach).min(height - 1))
+            .flat_map(|j| (x.saturating_sub(reach)..=(x + reach).min(width - 1)).map(move |i| (i, j)));
+        let far = |(i, j): &(usize, usize)| i.abs_diff(x).pow(2) + j.abs_diff(y).pow(2);
+        let plants = pixels.filter(|(i, j)| regions.labels[j * width + i] > 0);
+        plants.min_by_key(far).filter(|pixel| far(pixel) <= reach.pow(2)).map(|(i, j)| j * width + i)
+    }
+}
 
 /// Encoder features of an image: a vector for each cell of a grid.
 #[derive(Clone, Debug, Default)]
@@ -75,12 +106,27 @@ impl Features {
         }
         shared
     }
+
+    /// Evaluates a classifier in each cell; returns log odds.
+    fn cells(&self, classifier: &Classifier) -> Vec<f64> {
+        let mut cells = vec![classifier.bias; self.size.0 * self.size.1];
+        for (plane, weight) in self.planes.iter().zip(&classifier.weights) {
+            cells.iter_mut().zip(plane).for_each(|(cell, value)| *cell += weight * f64::from(*value));
+        }
+        cells
+    }
 }
 
 impl Examples {
     /// Collects the largest regions of an image as examples. `odds` holds each region's log odds of crop over weed from the
-    /// network, sizes and rows; an example's weight is the square root of its area.
-    pub(super) fn of(regions: &Components, size: (usize, usize), odds: &[f64], features: &Features) -> Self {
+    /// network, sizes and rows; an example's weight is the square root of its area. `points` mark plants of known class.
+    pub(super) fn of(
+        regions: &Components,
+        size: (usize, usize),
+        odds: &[f64],
+        features: &Features,
+        points: &[Point],
+    ) -> Self {
         let mut largest: Vec<usize> = (0..regions.areas.len()).collect();
         largest.sort_by_key(|region| std::cmp::Reverse(regions.areas[*region]));
         largest.truncate(MOST);
@@ -95,10 +141,24 @@ impl Examples {
             means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
         }
         let label = |region: &usize| 1.0 / (1.0 + (-odds[*region].clamp(-SURE, SURE)).exp());
+        let mut marked = Marked::default();
+        for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
+            let region = regions.labels[at].to_usize() - 1;
+            let Some(place) = places[region] else { continue };
+            let cell = features.cell(at, size);
+            let mean = &means[place * channels..(place + 1) * channels];
+            let local = features.planes.iter().map(|plane| plane[cell]);
+            let mixed =
+                |(mean, local): (&f32, f32)| (1.0 - PLACE_MARKED.to_f32()) * mean + PLACE_MARKED.to_f32() * local;
+            marked.features.extend(mean.iter().zip(local).map(mixed));
+            marked.odds.push(odds[region]);
+            marked.crops.push(point.is_crop);
+        }
         Self {
             features: means,
             labels: largest.iter().map(label).collect(),
             weights: largest.iter().map(|region| f64::from(regions.areas[*region]).sqrt()).collect(),
+            marked,
         }
     }
 }
@@ -106,57 +166,95 @@ impl Examples {
 /// Appearance model of crop and weeds in one field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appearance {
-    classifier: Classifier,
-    /// Weight of the classifier by its cross-validated accuracy, 0 to 1.
-    trust: f64,
+    /// Classifier that was learnt from rows and sizes, and its weight by its cross-validated accuracy, 0 to 1.
+    learnt: Option<(Classifier, f64)>,
+    /// Factor on all log odds and the classifier that is added to them, from points on plants of known class.
+    correction: Option<(f64, Classifier)>,
+    /// Number of points on plants.
+    pub points: usize,
 }
 
 impl Appearance {
-    /// Learns the model from the plants of several images. Returns `None` if there are too few of them or if appearance does not
-    /// predict the labels of held-out images.
+    /// Learns the model from the plants of several images. Returns `None` if there are too few of them, or if no points mark plants and
+    /// appearance does not predict the labels of held-out images.
     pub fn learn(pictures: &[Examples]) -> Option<Self> {
         let pictures: Vec<&Examples> = pictures.iter().filter(|picture| !picture.labels.is_empty()).collect();
-        if pictures.len() < LEAST {
-            return None;
-        }
         let (mut all, mut numbers) = (Examples::default(), Vec::new());
-        for (number, picture) in pictures.into_iter().enumerate() {
+        for (number, picture) in pictures.iter().enumerate() {
             all.features.extend(&picture.features);
             all.labels.extend(&picture.labels);
             all.weights.extend(&picture.weights);
+            all.marked.extend(&picture.marked);
             numbers.resize(all.labels.len(), number);
         }
-        let (classifier, accuracy) = all.learn(&numbers)?;
-        let trust = ((accuracy - ACCURACY_RANGE.0) / (ACCURACY_RANGE.1 - ACCURACY_RANGE.0)).clamp(0.0, 1.0);
-        (trust > 0.0).then_some(Self { classifier, trust })
+        let learnt = if pictures.len() < LEAST { None } else { all.learn(&numbers) };
+        let learnt = learnt.and_then(|(classifier, accuracy)| {
+            let trust = ((accuracy - ACCURACY_RANGE.0) / (ACCURACY_RANGE.1 - ACCURACY_RANGE.0)).clamp(0.0, 1.0);
+            (trust > 0.0).then_some((classifier, trust))
+        });
+        let looks =
+            |k: usize| learnt.as_ref().map_or(0.0, |(c, trust)| WEIGHT * trust * c.log_odds(all.marked.features(k)));
+        let odds: Vec<f64> =
+            all.marked.odds.iter().enumerate().map(|(k, odds)| (odds + looks(k)).clamp(-SURE, SURE)).collect();
+        let correction = all.correction(&odds);
+        let points = if correction.is_some() { odds.len() } else { 0 };
+        (learnt.is_some() || points > 0).then_some(Self { learnt, correction, points })
     }
 
-    /// Returns the term to add to the log odds of crop over weed at each plant pixel of an image; 0 at other pixels.
-    pub(super) fn log_odds(&self, regions: &Components, size: (usize, usize), features: &Features) -> Vec<f64> {
-        let cells = self.cells(features);
-        let mut counts = vec![0.0; cells.len()];
-        let mut sums = vec![0.0; regions.areas.len()];
-        for ((region, cell), pixels) in features.shared(regions, size) {
-            counts[cell] += f64::from(pixels);
-            sums[region] += f64::from(pixels) * cells[cell];
-        }
-        let near = blurred(&cells, &counts, features.size);
+    /// Returns the log odds of crop over weed at each plant pixel of an image; 0 at other pixels. `odds` holds those of each region from the
+    /// network, sizes and rows; regions that `points` mark have their class.
+    pub(super) fn log_odds(
+        &self,
+        regions: &Components,
+        size: (usize, usize),
+        odds: &[f64],
+        features: &Features,
+        points: &[Point],
+    ) -> Vec<f64> {
+        let looks = self.learnt.as_ref().map(|(classifier, trust)| {
+            (WEIGHT * trust, spread(&features.cells(classifier), regions, size, features, PLACE))
+        });
+        let added = self.correction.as_ref().map(|(factor, classifier)| {
+            (*factor, spread(&features.cells(classifier), regions, size, features, PLACE_MARKED))
+        });
+        let known = known(regions, size, points);
         let value = |(at, region): (usize, &u32)| {
             let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
-            let whole = sums[region] / f64::from(regions.areas[region]);
-            WEIGHT * self.trust * ((1.0 - PLACE) * whole + PLACE * features.between(&near, at, size))
+            if let Some(is_crop) = known.get(&region).copied().flatten() {
+                return if is_crop { SURE } else { -SURE };
+            }
+            let odds = odds[region] + looks.as_ref().map_or(0.0, |(weight, looks)| weight * looks[at]);
+            added.as_ref().map_or(odds, |(factor, added)| factor * odds.clamp(-SURE, SURE) + added[at])
         };
         regions.labels.iter().enumerate().map(value).collect()
     }
+}
 
-    /// Evaluates the classifier in each cell; returns log odds.
-    fn cells(&self, features: &Features) -> Vec<f64> {
-        let mut cells = vec![self.classifier.bias; features.size.0 * features.size.1];
-        for (plane, weight) in features.planes.iter().zip(&self.classifier.weights) {
-            cells.iter_mut().zip(plane).for_each(|(cell, value)| *cell += weight * f64::from(*value));
-        }
-        cells
+/// Returns the class of each region that points mark; `None` for regions with points of both classes.
+fn known(regions: &Components, size: (usize, usize), points: &[Point]) -> BTreeMap<usize, Option<bool>> {
+    let mut known = BTreeMap::new();
+    for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
+        let class = known.entry(regions.labels[at].to_usize() - 1).or_insert(Some(point.is_crop));
+        *class = class.filter(|is_crop| *is_crop == point.is_crop);
     }
+    known
+}
+
+/// Returns, at each plant pixel, a mean of the values of its region's cells and of the cells around it, the latter with the weight `place`.
+fn spread(cells: &[f64], regions: &Components, size: (usize, usize), features: &Features, place: f64) -> Vec<f64> {
+    let mut counts = vec![0.0; cells.len()];
+    let mut sums = vec![0.0; regions.areas.len()];
+    for ((region, cell), pixels) in features.shared(regions, size) {
+        counts[cell] += f64::from(pixels);
+        sums[region] += f64::from(pixels) * cells[cell];
+    }
+    let near = blurred(cells, &counts, features.size);
+    let value = |(at, region): (usize, &u32)| {
+        let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
+        let whole = sums[region] / f64::from(regions.areas[region]);
+        (1.0 - place) * whole + place * features.between(&near, at, size)
+    };
+    regions.labels.iter().enumerate().map(value).collect()
 }
 
 /// Blurs cell values with a Gaussian, each cell weighted by its number of plant pixels. Cells without plants nearby keep their value.
@@ -181,6 +279,7 @@ fn blurred(values: &[f64], counts: &[f64], (width, height): (usize, usize)) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use furrow_base::math::vec2;
     use furrow_base::sampling::{Purpose, Stream};
 
     /// Builds an image of 80 × 80 pixels in cells of 8. Each plant (cell x, cell y, feature value, log odds by rows) covers 6 × 6
@@ -211,12 +310,12 @@ mod tests {
         let plants = [crops.as_slice(), &weeds, &odd].concat();
         let (regions, features, evidence) = picture(&plants);
         assert_eq!(regions.areas, [36; 16]);
-        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features, &[]);
         let appearance = Appearance::learn(&[learnt(), learnt(), Examples::default()]).unwrap();
-        let odds = appearance.log_odds(&regions, (80, 80), &features);
-        for (x, y, looks, rows) in plants {
+        let odds = appearance.log_odds(&regions, (80, 80), &evidence, &features, &[]);
+        for (x, y, looks, _) in plants {
             let at = (y * 8 + 4) * 80 + x * 8 + 4;
-            assert_eq!(odds[at] + rows > 0.0, looks > 0.0, "({x}, {y}): {}", odds[at]);
+            assert_eq!(odds[at] > 0.0, looks > 0.0, "({x}, {y}): {}", odds[at]);
         }
         assert!(regions.labels.iter().zip(&odds).all(|(region, odds)| (*region == 0) == (*odds == 0.0)));
     }
@@ -242,12 +341,39 @@ mod tests {
             };
             (0..8).map(&mut one).collect()
         };
-        let trust = |pictures: &[Examples]| Appearance::learn(pictures).map_or(0.0, |found| found.trust);
+        let trust = |pictures: &[Examples]| {
+            Appearance::learn(pictures).and_then(|found| found.learnt).map_or(0.0, |(_, trust)| trust)
+        };
         assert_eq!(trust(&field(0.9, true)), 1.0);
         assert_eq!(trust(&field(0.0, true)), 0.0);
         assert_eq!(trust(&field(0.9, false)), 0.0);
         let part = trust(&field(0.33, true));
         assert!(part > 0.0 && part < 1.0, "{part}");
+    }
+
+    /// Expected: rows and sizes call all plants the wrong class; a point on three of each kind turns the others, a region with points of one
+    /// class has it, and points on soil have no effect. Source: the rule.
+    #[test]
+    fn points_name_plants_and_those_that_look_alike() {
+        let wrong = |k: usize| if k.is_multiple_of(2) { -4.0 } else { 4.0 };
+        let looks = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let plants: Vec<_> = (0..24).map(|k| (2 * (k % 5), 2 * (k / 5), looks(k), wrong(k))).collect();
+        let (regions, features, odds) = picture(&plants);
+        let at = |k: usize| vec2((2.0 * (k % 5).to_f32() + 0.5) / 10.0, (2.0 * (k / 5).to_f32() + 0.5) / 10.0);
+        let mut points: Vec<Point> = (0..6).map(|k| Point { at: at(k), is_crop: looks(k) > 0.0 }).collect();
+        points.push(Point { at: vec2(0.15, 0.95), is_crop: true });
+        let learnt = Appearance::learn(&[Examples::of(&regions, (80, 80), &odds, &features, &points)]).unwrap();
+        assert_eq!(learnt.points, 6);
+        let values = |points: &[Point]| learnt.log_odds(&regions, (80, 80), &odds, &features, points);
+        let pixel = |k: usize| (2 * (k / 5) * 8 + 4) * 80 + 2 * (k % 5) * 8 + 4;
+        for k in 0..24 {
+            assert_eq!(values(&[])[pixel(k)] > 0.0, looks(k) > 0.0, "{k}");
+        }
+        // A single plant of another class than its looks.
+        let odd = Point { at: at(10), is_crop: looks(10) < 0.0 };
+        assert_eq!(values(&[odd])[pixel(10)] > 0.0, odd.is_crop);
+        let both = [odd, Point { is_crop: !odd.is_crop, ..odd }];
+        assert_eq!(values(&both)[pixel(10)], values(&[])[pixel(10)]);
     }
 
     /// Expected: nothing is learnt from one image alone, nor from images without plants. Source: the rule.
@@ -256,7 +382,7 @@ mod tests {
         let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let plants: Vec<_> = (0..10).map(|k| (k, k, side(k), f64::from(side(k)))).collect();
         let (regions, features, evidence) = picture(&plants);
-        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features);
+        let learnt = || Examples::of(&regions, (80, 80), &evidence, &features, &[]);
         assert!(Appearance::learn(&[learnt()]).is_none());
         assert!(Appearance::learn(&[learnt(), Examples::default()]).is_none());
         assert!(Appearance::learn(&[]).is_none());
@@ -299,7 +425,7 @@ mod tests {
         let regions = Components::of(202, 110, |at| (plant(at) || speck(at)).then_some(()));
         assert_eq!(regions.areas.len(), 2501);
         let odds: Vec<f64> = (0..2501).map(|k| if k == 2500 { 4.0 } else { -4.0 }).collect();
-        let found = Examples::of(&regions, (202, 110), &odds, &Features { size: (1, 1), planes: vec![vec![2.5]] });
+        let found = Examples::of(&regions, (202, 110), &odds, &Features { size: (1, 1), planes: vec![vec![2.5]] }, &[]);
         assert_eq!((found.labels.len(), found.weights[0], found.weights[1]), (MOST, 90f64.sqrt(), 1.0));
         assert!(found.labels[0] > 0.9 && found.labels[1..].iter().all(|p| *p < 0.1));
         assert!(found.features.iter().all(|f| (f - 2.5).abs() < 1e-5));
