@@ -145,7 +145,7 @@ fn soil() -> String {
         "Field(seed: 4, camera: {CAMERA}, lights: [Daylight(sun: Angles(elevation_deg: 40, azimuth_deg: 90), cloud: Uniform(0, 1))], \
          soil: (layers: [{}, {}], stones: [(cover: 0.02)], clods: (over_5mm_per_m2: 2000)))",
         layer("dirt", ""),
-        layer("cracked", ", clods: 0")
+        layer("crust", ", clods: 0")
     )
 }
 

@@ -182,7 +182,7 @@ fn lists_have_a_line_for_everything_that_ships() {
         assert!(cameras.contains(words), "no {words} in\n{cameras}");
     }
     let soils = list("soils");
-    for words in ["Loess", "R 0.220, G 0.144, B 0.088, NIR 0.273", "albedo: \"dirt.png\"", "cracked", "stony"] {
+    for words in ["Loess", "R 0.220, G 0.144, B 0.088, NIR 0.273", "albedo: \"dirt.png\"", "crust", "stony"] {
         assert!(soils.contains(words), "no {words} in\n{soils}");
     }
 }

@@ -88,12 +88,12 @@ mod tests {
     fn words_that_people_use_lead_to_fields() {
         let of = [scene(), species()];
         let others = [
-            ("textures/soil/cracked.png".to_owned(), "a crust with cracks".to_owned()),
+            ("textures/soil/crust.png".to_owned(), "a crust of cracked soil".to_owned()),
             ("species: \"maize\"".to_owned(), "maize, corn, Mais".to_owned()),
         ];
         for (word, path) in [
             ("moisture", "soil.moisture"),
-            ("Cracks", "textures/soil/cracked.png"),
+            ("Cracks", "textures/soil/crust.png"),
             ("tilt", "camera.JaiAd130.pitch_deg"),
             ("insects", "crops.condition.bites"),
             ("hairs", "species.materials.hairs"),

@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// Longest table, bytes.
 const MOST_BYTES: u64 = 16 << 20;
-/// What the table must hold.
+/// Columns of the table.
 const HELP: &str =
     "the table has the columns image (file name), x and y (pixels from the left and the top) and class (crop or weed)";
 

@@ -1,4 +1,4 @@
-//! Periodic cellular noise for the areoles of a leaf and the plates of a crust. Source: Worley 1996; borders are exact,
+//! Periodic cellular noise for the areoles of a leaf. Source: Worley 1996; borders are exact,
 //! computed as those of the Voronoi cells of the jittered points.
 
 use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, vec2};
@@ -25,8 +25,6 @@ pub(super) struct Cell {
     pub(super) border: f32,
     /// Random value of this cell, uniform in 0..1.
     pub(super) own: f32,
-    /// Random value of the pair of cells that share the nearest border, uniform in 0..1.
-    pub(super) shared: f32,
 }
 
 pub(super) fn unit(hash: u64) -> f32 {
@@ -64,20 +62,18 @@ impl Cells {
                 }
             }
         }
-        let (mut border, mut other) = (f32::MAX, 0);
+        let mut border = f32::MAX;
         for y in square.1 - 2..=square.1 + 2 {
             for x in square.0 - 2..=square.0 + 2 {
                 if (x, y) == square {
                     continue;
                 }
-                let (q, h) = self.point(x, y);
+                let (q, _) = self.point(x, y);
                 let d = ((centre + q) * 0.5 - p).dot((q - centre).normalize_or_zero());
-                if d < border {
-                    (border, other) = (d, h);
-                }
+                border = border.min(d);
             }
         }
-        Cell { away: best.sqrt(), border: border.max(0.0), own: unit(mix(own)), shared: unit(mix(own ^ other)) }
+        Cell { away: best.sqrt(), border: border.max(0.0), own: unit(mix(own)) }
     }
 }
 

@@ -2,11 +2,8 @@
 //!
 //! Aggregates are stamped one by one from large to small, each a faceted dome with its own colour. Their number per
 //! size follows the power law of tilled soil, N(>L) ∝ L^−D. Source: Aubertot et al. 1999 (Soil Sci. Soc. Am. J.
-//! 63:1377), which also gives the axis ratios l/L = 0.77 and h/L = 0.55. Crusts crack along the borders of Voronoi
-//! cells.
+//! 63:1377), which also gives the axis ratios l/L = 0.77 and h/L = 0.55.
 
-use super::cells::MOST_CELLS;
-use super::crust::FRAGMENTS;
 use super::generated::GeneratedTexture;
 use super::soil_recipe::{Ground, SoilRecipe};
 use super::tile::Tile;
@@ -41,19 +38,13 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
     let area = period * period;
     let many = |cover: f64, smallest: f64| cover * area / (0.6 * smallest * smallest);
     let crumbs = many(recipe.crumbs.cover.get(), recipe.crumbs.smallest_mm.get());
-    let (pieces, plates) = match recipe.ground {
-        Ground::Dirt | Ground::Crust => (0.0, 0.0),
-        Ground::Stony { cover, smallest_mm, .. } => (many(cover.get(), smallest_mm.get()), 0.0),
-        Ground::Cracked { plate_mm, .. } => (many(FRAGMENTS.0.into(), FRAGMENTS.1.into()), period / plate_mm.get()),
+    let stones = match recipe.ground {
+        Ground::Dirt | Ground::Crust => 0.0,
+        Ground::Stony { cover, smallest_mm, .. } => many(cover.get(), smallest_mm.get()),
     };
     let litter = recipe.litter;
     let bits = litter.grains.get().max(litter.humus.get()).max(litter.fibres.get()) * area * 1e-6;
-    for (what, asked, most) in [
-        ("crumbs", crumbs, 4e6),
-        ("stones or fragments", pieces, 4e6),
-        ("plates side by side", plates, MOST_CELLS),
-        ("bits of litter", bits, 1e5),
-    ] {
+    for (what, asked, most) in [("crumbs", crumbs, 4e6), ("stones", stones, 4e6), ("bits of litter", bits, 1e5)] {
         if asked > most {
             return Err(Error::input(format!("about {asked:.0} {what} on the tile: at most {most:.0} are supported")));
         }
@@ -68,12 +59,6 @@ pub(super) fn draw(recipe: &SoilRecipe) -> Result<GeneratedTexture> {
         Ground::Crust => {
             tile.crumbs(recipe);
             tile.slake();
-        }
-        Ground::Cracked { plate_mm, crack_mm, depth_mm } => {
-            tile.crumbs(recipe);
-            tile.slake();
-            let near = tile.crack(plate_mm.f32(), crack_mm.f32(), depth_mm.f32());
-            tile.fragments(&near);
         }
     }
     tile.litter(&recipe.litter);

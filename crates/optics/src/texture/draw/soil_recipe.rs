@@ -97,15 +97,6 @@ pub enum Ground {
     Dirt,
     /// Crust, slaked by rain, without cracks: `cracks` of a scene file break it.
     Crust,
-    /// Crust, slaked by rain and cracked by drying.
-    Cracked {
-        /// Mean width of the plates, mm.
-        plate_mm: Num<Positive<1000>>,
-        /// Width of the widest cracks, mm.
-        crack_mm: Num<Positive<1000>>,
-        /// Depth of the cracks, mm.
-        depth_mm: Num<Positive<1000>>,
-    },
     /// Crumbs with gravel.
     Stony {
         /// Fraction of the ground covered by stones.
