@@ -16,8 +16,9 @@ def run():
 refused = run()
 assert refused.returncode == 2 and "no PNG or JPEG" in refused.stderr and "help:" in refused.stderr, refused
 names = ['a "b".jpg', "<script>.PNG", "ü,1.jpeg"]
-for name in [*names, "notes.txt"]:
+for name in [*names, "notes.txt", "a.nir.png"]:
     (folder / name).write_bytes(b"")
+(folder / "folder.jpg").mkdir()
 for _ in range(2):
     made = run()
     assert made.returncode == 0 and made.stdout.strip() == str(folder / "points.html"), made

@@ -4,8 +4,7 @@ use super::input_images::InputImage;
 use crate::refine::Point;
 use furrow_base::error::{Error, Result};
 use furrow_base::input::read_text;
-use furrow_base::math::{ToFloat, vec2};
-use serde::Deserialize;
+use furrow_base::math::{ToFloat, ToInt, vec2};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
@@ -14,15 +13,6 @@ const MOST_BYTES: u64 = 16 << 20;
 /// Columns of the table.
 const HELP: &str =
     "the table has the columns image (file name), x and y (pixels from the left and the top) and class (crop or weed)";
-
-/// Columns of the table; others are ignored.
-#[derive(Deserialize)]
-struct Row {
-    image: String,
-    x: f64,
-    y: f64,
-    class: String,
-}
 
 /// Points of images, and the table that they come from.
 #[derive(Clone, Debug, Default)]
@@ -33,40 +23,74 @@ pub struct Points {
     pub table_sha256: Option<String>,
 }
 
-/// Reads a table of points; those of each image are in the order of `pictures`.
+/// Columns of the table; others are ignored.
+const COLUMNS: [&str; 4] = ["image", "x", "y", "class"];
+/// Longest text of a cell in an error, characters.
+const SHOWN: usize = 60;
+
+/// Reads a table of points; those of each image are in the order of `pictures`. Columns are separated by commas, semicolons or tabs.
 ///
-/// Images are named by their file name, or by the name of their prediction. Fails if a row has another image, another class or a position
-/// outside the image, or if an image with points cannot be read.
+/// Images are named by their file name, or by the name of their prediction. Fails if a row names no image or several, has another class or a
+/// position outside the image, or if an image with points cannot be read.
 pub fn read(table: &Path, pictures: &[InputImage]) -> Result<Points> {
     let refuse = |line: u64, what: String| Error::input(format!("line {line}: {what}")).help(HELP).in_file(table);
     let text = read_text(table, MOST_BYTES)?;
+    let names = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let delimiter = [b',', b';', b'\t'].into_iter().find(|sign| names.as_bytes().contains(sign)).unwrap_or(b',');
+    let mut rows = csv::ReaderBuilder::new().delimiter(delimiter).flexible(true).from_reader(text.as_bytes());
+    let line_of = |place: Option<&csv::Position>| line_at(&text, place.map_or(0, csv::Position::byte));
+    let failed = |e: csv::Error| refuse(line_of(e.position()), e.to_string());
+    let names = rows.headers().map_err(failed)?.clone();
+    let column = |name: &&str| {
+        let place = names.iter().position(|found| found.trim().eq_ignore_ascii_case(name));
+        place.ok_or_else(|| refuse(1, format!("there is no column `{name}`")))
+    };
+    let columns = COLUMNS.iter().map(column).collect::<Result<Vec<usize>>>()?;
     let mut of = vec![Vec::new(); pictures.len()];
     let mut sizes: Vec<Option<(u32, u32)>> = vec![None; pictures.len()];
-    let mut rows = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-    let names = rows.headers().map_err(|e| refuse(1, e.to_string()))?.clone();
     let mut record = csv::StringRecord::new();
-    while rows.read_record(&mut record).map_err(|e| refuse(line_of(&e), e.to_string()))? {
-        let line = record.position().map_or(0, csv::Position::line);
-        let row: Row = record.deserialize(Some(&names)).map_err(|e| refuse(line, e.to_string()))?;
-        let is_crop = match row.class.as_str() {
+    while rows.read_record(&mut record).map_err(failed)? {
+        let line = line_of(record.position());
+        let cell = |k: usize| record.get(columns[k]).unwrap_or_default();
+        let shown = |k: usize| cell(k).trim().chars().take(SHOWN).collect::<String>();
+        let number = |k: usize| {
+            let found = cell(k).trim().parse::<f64>();
+            found.map_err(|_| refuse(line, format!("{} is `{}`, not a number", COLUMNS[k], shown(k))))
+        };
+        let (x, y) = (number(1)?, number(2)?);
+        let is_crop = match cell(3).trim() {
             "crop" => true,
             "weed" => false,
-            other => return Err(refuse(line, format!("`{other}` is no class of a plant"))),
+            _ => return Err(refuse(line, format!("`{}` is no class of a plant", shown(3)))),
         };
-        let is_named = |picture: &InputImage| {
-            picture.name == row.image || picture.photo.file_name().is_some_and(|name| name == row.image.as_str())
+        let named = |name: &str| -> Vec<usize> {
+            let is_named = |picture: &InputImage| {
+                picture.name == name || picture.photo.file_name().is_some_and(|file| file == name)
+            };
+            (0..pictures.len()).filter(|place| is_named(&pictures[*place])).collect()
         };
-        let place = pictures.iter().position(is_named);
-        let place = place.ok_or_else(|| refuse(line, format!("`{}` is none of the images to predict", row.image)))?;
+        let places = Some(named(cell(0))).filter(|found| !found.is_empty()).unwrap_or_else(|| named(cell(0).trim()));
+        let place = match places.as_slice() {
+            [place] => *place,
+            [] => return Err(refuse(line, format!("`{}` is none of the images to predict", shown(0)))),
+            [one, other, ..] => {
+                let (one, other) = (&pictures[*one].name, &pictures[*other].name);
+                let what =
+                    format!("`{}` names several images: write the name of the prediction, {one} or {other}", shown(0));
+                return Err(refuse(line, what));
+            }
+        };
         let (width, height) = match sizes[place] {
             Some(size) => size,
-            None => pictures[place].read().map(|found| (found.width, found.height))?,
+            None => match pictures[place].read() {
+                Ok(found) => (found.width, found.height),
+                Err(fault) => return Err(refuse(line, format!("the image of this point cannot be read: {fault}"))),
+            },
         };
         sizes[place] = Some((width, height));
-        let at = (row.x / f64::from(width), row.y / f64::from(height));
+        let at = (x / f64::from(width), y / f64::from(height));
         if !((0.0..=1.0).contains(&at.0) && (0.0..=1.0).contains(&at.1)) {
-            let what = format!("({}, {}) is outside the image, {width} × {height} pixels", row.x, row.y);
-            return Err(refuse(line, what));
+            return Err(refuse(line, format!("({x}, {y}) is outside the image, {width} × {height} pixels")));
         }
         of[place].push(Point { at: vec2(at.0.to_f32(), at.1.to_f32()), is_crop });
     }
@@ -76,8 +100,12 @@ pub fn read(table: &Path, pictures: &[InputImage]) -> Result<Points> {
     Ok(Points { of, table_sha256: Some(hex::encode(Sha256::digest(text))) })
 }
 
-fn line_of(error: &csv::Error) -> u64 {
-    error.position().map_or(0, csv::Position::line)
+/// Returns the number of the line of the first text at or after a byte. The reader's own count is wrong after CRLF and empty lines.
+fn line_at(text: &str, byte: u64) -> u64 {
+    let at = byte.to_usize().min(text.len());
+    let ends = |c: &char| c.is_ascii_whitespace();
+    let skipped = text.get(at..).map_or(0, |rest| rest.chars().take_while(ends).count());
+    text.as_bytes()[..at + skipped].iter().filter(|c| **c == b'\n').count().to_u64() + 1
 }
 
 #[cfg(test)]
@@ -103,7 +131,7 @@ mod tests {
             std::fs::write(&table, text).unwrap();
             read(&table, &pictures).map(|points| points.of)
         };
-        let found = of("image,x,y,class,note\n# clicked\nb.png, 3, 1.5, crop,\na,0,4,weed,pale\n").unwrap();
+        let found = of("Image,x,y,class,note\nb.png, 3, 1.5, crop,\n\na,0,4,weed,pale\n").unwrap();
         assert_eq!(found[0], [Point { at: vec2(0.0, 1.0), is_crop: false }]);
         assert_eq!(found[1], [Point { at: vec2(0.375, 0.375), is_crop: true }]);
         for (text, what) in [
@@ -111,11 +139,13 @@ mod tests {
             ("image,x,y,class\na,1,1,soil\n", "line 2: `soil` is no class"),
             ("image,x,y,class\na,1,NaN,crop\n", "line 2: (1, NaN) is outside the image, 8 × 4 pixels"),
             ("image,x,y,class\na,9,1,crop\n", "line 2: (9, 1) is outside"),
-            ("image,x,y,class\na,1,one,crop\n", "line 2"),
-            ("image,x,class\na,1,crop\n", "line 2"),
-            ("image,x,y,class\na,1\n", "line 2"),
+            ("image,x,y,class\r\n\r\na,1,one,crop\r\n", "line 3: y is `one`, not a number"),
+            ("image;x;y;class\na;1;1;crops\n", "line 2: `crops` is no class"),
+            ("image,x,class\na,1,crop\n", "line 1: there is no column `y`"),
+            ("a,1,1,crop\n", "line 1: there is no column `image`"),
+            ("image,x,y,class\na,1\n", "line 2: y is ``, not a number"),
             ("image,x,y,class\n", "there are no points"),
-            ("", "there are no points"),
+            ("", "line 1: there is no column `image`"),
         ] {
             let error = of(text).unwrap_err().to_string();
             assert!(error.contains(what), "{text}: {error}");

@@ -120,6 +120,10 @@ fn predict_here(
     let names = pictures.iter().map(|picture| picture.name.as_str());
     let before = options.plants.then(|| plants::claim(out, names)).transpose()?;
     let prediction = Prediction::claim(out, card, options.pixel_mm, options.points.table_sha256.as_deref(), pictures)?;
+    // A run that continues this one then knows that the plant maps are its own.
+    if let Some(before) = &before {
+        plants::write(out, before, &BTreeMap::new(), &card.classes.names())?;
+    }
     let workers = machine.loaders.max(1);
     let failed = AtomicBool::new(false);
     let mut made = Predictions::default();

@@ -23,7 +23,7 @@ const LEAST_LIKELY: f64 = 1e-3;
 const FLAT: f64 = 1e-6;
 
 /// Standard deviations of the prior of a correction: of its bias, of the factor on the log odds, and of the coefficient of a component.
-const PRIOR_SD: [f64; 3] = [2.0, 1.0, 1.0];
+const PRIOR_SD: [f64; 3] = [1.0, 1.0, 0.5];
 
 /// Affine function of the features that returns log odds.
 #[derive(Clone, Debug, PartialEq)]
@@ -244,10 +244,12 @@ impl Examples {
     }
 }
 
-/// Plants of known class, each with the features at a point on it.
+/// Plants of known class, each marked by a point.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Marked {
-    /// Feature vectors, one plant after the other.
+    /// Pixel of each point in its image.
+    pub(super) pixels: Vec<usize>,
+    /// Feature vectors, one plant after the other: the mean over the region and around the point.
     pub(super) features: Vec<f32>,
     /// Log odds of crop over weed from the network, sizes and rows.
     pub(super) odds: Vec<f64>,

@@ -37,10 +37,11 @@ const SURE: f64 = 8.0;
 const MOST: usize = 2000;
 /// Range of the cross-validated pseudo-R² over which the classifier's weight rises linearly from 0 to 1.
 const ACCURACY_RANGE: (f64, f64) = (0.05, 0.15);
-/// Weight of the local log odds at a pixel if points mark plants: they also separate plants that touch, which are one region.
-const PLACE_MARKED: f64 = 1.0;
 /// Distance up to which a point that is beside all plants marks the nearest one, as a fraction of the longer side of the image.
 const BESIDE: f32 = 0.01;
+/// Log odds that a point adds at its pixel, and the standard deviation of the Gaussian with which they fall over its region, as a fraction of
+/// the longer side of the image: about a leaf.
+const AT_POINT: (f64, f32) = (16.0, 0.03);
 /// Minimum number of images with plants: within one image, plants only repeat the errors of its rows.
 const LEAST: usize = 2;
 
@@ -107,6 +108,15 @@ impl Features {
         shared
     }
 
+    /// Counts the plant pixels of each cell.
+    fn counts(&self, regions: &Components, size: (usize, usize)) -> Vec<f64> {
+        let mut counts = vec![0.0; self.size.0 * self.size.1];
+        for (at, _) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
+            counts[self.cell(at, size)] += 1.0;
+        }
+        counts
+    }
+
     /// Evaluates a classifier in each cell; returns log odds.
     fn cells(&self, classifier: &Classifier) -> Vec<f64> {
         let mut cells = vec![classifier.bias; self.size.0 * self.size.1];
@@ -142,17 +152,23 @@ impl Examples {
         }
         let label = |region: &usize| 1.0 / (1.0 + (-odds[*region].clamp(-SURE, SURE)).exp());
         let mut marked = Marked::default();
+        let counts = if points.is_empty() { Vec::new() } else { features.counts(regions, size) };
         for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
             let region = regions.labels[at].to_usize() - 1;
             let Some(place) = places[region] else { continue };
-            let cell = features.cell(at, size);
-            let mean = &means[place * channels..(place + 1) * channels];
-            let local = features.planes.iter().map(|plane| plane[cell]);
-            let mixed =
-                |(mean, local): (&f32, f32)| (1.0 - PLACE_MARKED.to_f32()) * mean + PLACE_MARKED.to_f32() * local;
-            marked.features.extend(mean.iter().zip(local).map(mixed));
+            let means = &means[place * channels..(place + 1) * channels];
+            marked.pixels.push(at);
+            marked.features.extend(means);
             marked.odds.push(odds[region]);
             marked.crops.push(point.is_crop);
+        }
+        for (c, plane) in features.planes.iter().enumerate().filter(|_| !marked.crops.is_empty()) {
+            let plane: Vec<f64> = plane.iter().map(|value| f64::from(*value)).collect();
+            let near = blurred(&plane, &counts, features.size);
+            for (k, at) in marked.pixels.iter().enumerate() {
+                let value = &mut marked.features[k * channels + c];
+                *value = ((1.0 - PLACE) * f64::from(*value) + PLACE * features.between(&near, *at, size)).to_f32();
+            }
         }
         Self {
             features: means,
@@ -168,7 +184,8 @@ impl Examples {
 pub struct Appearance {
     /// Classifier that was learnt from rows and sizes, and its weight by its cross-validated accuracy, 0 to 1.
     learnt: Option<(Classifier, f64)>,
-    /// Factor on all log odds and the classifier that is added to them, from points on plants of known class.
+    /// Factor on all log odds and the classifier that is added to them, from points on plants of known class; `None` if there are too few
+    /// plants.
     correction: Option<(f64, Classifier)>,
     /// Number of points on plants.
     pub points: usize,
@@ -197,12 +214,12 @@ impl Appearance {
         let odds: Vec<f64> =
             all.marked.odds.iter().enumerate().map(|(k, odds)| (odds + looks(k)).clamp(-SURE, SURE)).collect();
         let correction = all.correction(&odds);
-        let points = if correction.is_some() { odds.len() } else { 0 };
+        let points = odds.len();
         (learnt.is_some() || points > 0).then_some(Self { learnt, correction, points })
     }
 
     /// Returns the log odds of crop over weed at each plant pixel of an image; 0 at other pixels. `odds` holds those of each region from the
-    /// network, sizes and rows; regions that `points` mark have their class.
+    /// network, sizes and rows; `points` add to those around them.
     pub(super) fn log_odds(
         &self,
         regions: &Components,
@@ -211,48 +228,56 @@ impl Appearance {
         features: &Features,
         points: &[Point],
     ) -> Vec<f64> {
-        let looks = self.learnt.as_ref().map(|(classifier, trust)| {
-            (WEIGHT * trust, spread(&features.cells(classifier), regions, size, features, PLACE))
-        });
-        let added = self.correction.as_ref().map(|(factor, classifier)| {
-            (*factor, spread(&features.cells(classifier), regions, size, features, PLACE_MARKED))
-        });
-        let known = known(regions, size, points);
+        let looks = self
+            .learnt
+            .as_ref()
+            .map(|(classifier, trust)| (WEIGHT * trust, spread(&features.cells(classifier), regions, size, features)));
+        let added = self
+            .correction
+            .as_ref()
+            .map(|(factor, classifier)| (*factor, spread(&features.cells(classifier), regions, size, features)));
+        let around = around(regions, size, points);
         let value = |(at, region): (usize, &u32)| {
             let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
-            if let Some(is_crop) = known.get(&region).copied().flatten() {
-                return if is_crop { SURE } else { -SURE };
-            }
             let odds = odds[region] + looks.as_ref().map_or(0.0, |(weight, looks)| weight * looks[at]);
-            added.as_ref().map_or(odds, |(factor, added)| factor * odds.clamp(-SURE, SURE) + added[at])
+            let all = added.as_ref().map_or(odds, |(factor, added)| factor * odds.clamp(-SURE, SURE) + added[at]);
+            all + around.get(&at).copied().unwrap_or(0.0)
         };
         regions.labels.iter().enumerate().map(value).collect()
     }
 }
 
-/// Returns the class of each region that points mark; `None` for regions with points of both classes.
-fn known(regions: &Components, size: (usize, usize), points: &[Point]) -> BTreeMap<usize, Option<bool>> {
-    let mut known = BTreeMap::new();
+/// Returns the log odds that points add at the pixels around them, within the region that each marks.
+fn around(regions: &Components, size: (usize, usize), points: &[Point]) -> BTreeMap<usize, f64> {
+    let sd = AT_POINT.1 * size.0.max(size.1).to_f32();
+    let reach = (3.0 * sd).ceil_to::<usize>();
+    let mut around = BTreeMap::new();
     for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
-        let class = known.entry(regions.labels[at].to_usize() - 1).or_insert(Some(point.is_crop));
-        *class = class.filter(|is_crop| *is_crop == point.is_crop);
+        let (x, y) = (at % size.0, at / size.0);
+        for j in y.saturating_sub(reach)..=(y + reach).min(size.1 - 1) {
+            for i in x.saturating_sub(reach)..=(x + reach).min(size.0 - 1) {
+                if regions.labels[j * size.0 + i] == regions.labels[at] {
+                    let squares = (i.abs_diff(x).pow(2) + j.abs_diff(y).pow(2)).to_f32() / (sd * sd);
+                    let added = AT_POINT.0 * f64::from((-0.5 * squares).exp());
+                    *around.entry(j * size.0 + i).or_insert(0.0) += if point.is_crop { added } else { -added };
+                }
+            }
+        }
     }
-    known
+    around
 }
 
-/// Returns, at each plant pixel, a mean of the values of its region's cells and of the cells around it, the latter with the weight `place`.
-fn spread(cells: &[f64], regions: &Components, size: (usize, usize), features: &Features, place: f64) -> Vec<f64> {
-    let mut counts = vec![0.0; cells.len()];
+/// Returns, at each plant pixel, a mean of the values of its region's cells and of the cells around it.
+fn spread(cells: &[f64], regions: &Components, size: (usize, usize), features: &Features) -> Vec<f64> {
     let mut sums = vec![0.0; regions.areas.len()];
     for ((region, cell), pixels) in features.shared(regions, size) {
-        counts[cell] += f64::from(pixels);
         sums[region] += f64::from(pixels) * cells[cell];
     }
-    let near = blurred(cells, &counts, features.size);
+    let near = blurred(cells, &features.counts(regions, size), features.size);
     let value = |(at, region): (usize, &u32)| {
         let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
         let whole = sums[region] / f64::from(regions.areas[region]);
-        (1.0 - place) * whole + place * features.between(&near, at, size)
+        (1.0 - PLACE) * whole + PLACE * features.between(&near, at, size)
     };
     regions.labels.iter().enumerate().map(value).collect()
 }
@@ -351,8 +376,8 @@ mod tests {
         assert!(part > 0.0 && part < 1.0, "{part}");
     }
 
-    /// Expected: rows and sizes call all plants the wrong class; a point on three of each kind turns the others, a region with points of one
-    /// class has it, and points on soil have no effect. Source: the rule.
+    /// Expected: rows and sizes call all plants the wrong class; a point on three of each kind turns the others, a plant with a point has its
+    /// class whatever its looks, points of both classes cancel, and points on soil have no effect. Source: the rule.
     #[test]
     fn points_name_plants_and_those_that_look_alike() {
         let wrong = |k: usize| if k.is_multiple_of(2) { -4.0 } else { 4.0 };
