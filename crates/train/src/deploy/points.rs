@@ -105,7 +105,7 @@ fn line_at(text: &str, byte: u64) -> u64 {
     let at = byte.to_usize().min(text.len());
     let ends = |c: &char| c.is_ascii_whitespace();
     let skipped = text.get(at..).map_or(0, |rest| rest.chars().take_while(ends).count());
-    text.as_bytes()[..at + skipped].iter().filter(|c| **c == b'\n').count().to_u64() + 1
+    text.get(..at + skipped).unwrap_or_default().matches('\n').count().to_u64() + 1
 }
 
 #[cfg(test)]
