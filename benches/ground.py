@@ -11,7 +11,8 @@ which are at least `--apart` pixels from any other label count.
 Chroma: sRGB is averaged over blocks of 4 × 4 pixels and converted to CIE Lab (D65). `a` and `b` are the standard
 deviations of a* and b* over the brightest 70 % of an image's blocks, which leaves out shadows. `C` is their mean chroma.
 Slope: exponent of the radial power spectrum of luminance, 4 to 32 cycles in windows of 128 pixels of soil. Contrast:
-standard deviation of luminance over its mean in windows of 32 pixels. Printed: median and quartiles over the images.
+standard deviation of luminance over its mean in windows of 32 pixels. Darkest: luminance below which a thousandth of all
+pixels are, over the mean luminance of the image. Printed: median and quartiles over the images.
 """
 
 import argparse
@@ -20,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-BLOCK, BRIGHTEST, WINDOW, SMALL = 4, 0.7, 128, 32
+BLOCK, BRIGHTEST, WINDOW, SMALL, DARKEST = 4, 0.7, 128, 32, 0.001
 TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 WHITE = TO_XYZ.sum(1)
 LEAST_BLOCKS = 400
@@ -104,7 +105,8 @@ def measure(image, label, soil, apart):
     if found is None:
         return None
     luminance = linear(rgb) @ TO_XYZ[1]
-    return *found, spectrum_slope(luminance, ground), contrast(luminance, ground)
+    dark = np.quantile(luminance, DARKEST) / luminance.mean()
+    return *found, spectrum_slope(luminance, ground), contrast(luminance, ground), dark
 
 
 def pairs(folder):
@@ -123,7 +125,7 @@ def main():
     parser.add_argument("--apart", type=int, default=3, help="distance from other labels, pixels")
     parser.add_argument("--each", action="store_true", help="print a row for each image")
     options = parser.parse_args()
-    print(f"{'set':24} {'images':>6} {'std a*':>17} {'std b*':>17} {'mean C*':>17} {'slope':>20} {'contrast':>17}")
+    print(f"{'set':24} {'images':>6} {'std a*':>17} {'std b*':>17} {'mean C*':>17} {'slope':>20} {'contrast':>17} {'darkest':>17}")
     for folder in options.sets:
         rows = []
         for image, label in pairs(folder):

@@ -103,21 +103,24 @@ fn an_installed_wheel_needs_nothing_else() {
     done(&mut check);
 }
 
+/// Runs a script of `tests/python` on a folder with the package of this clone.
+fn passes(python: &Path, script: &str, folder: &Path) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
+    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
+    done(Command::new(python).arg(script).arg(folder).env("PYTHONPATH", source()).envs(quiet));
+}
+
 #[test]
 fn pytorch_loads_batches_of_a_dataset() {
     let Some(python) = torch_with("PIL") else { return };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_loader.py");
-    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
-    done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
+    passes(&python, "check_loader.py", &DATASET);
 }
 
 /// Expected: tensors and targets equal the files, and a detector of torchvision takes them.
 #[test]
 fn pytorch_trains_on_targets_of_a_dataset() {
     let Some(python) = torch_with("PIL, torchvision") else { return };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_torch.py");
-    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
-    done(Command::new(python).arg(script).arg(&*DATASET).env("PYTHONPATH", source()).envs(quiet));
+    passes(&python, "check_torch.py", &DATASET);
 }
 
 /// Expected: CVAT's reader and Label Studio's decoder find the predicted classes of every pixel.
@@ -126,9 +129,7 @@ fn predictions_are_read_as_annotations() {
     let Some(python) = python("import datumaro, numpy, PIL") else { return };
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).expect("a folder");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_annotate.py");
-    let quiet = [("PYTHONDONTWRITEBYTECODE", "1"), ("OMP_NUM_THREADS", "1")];
-    done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).envs(quiet));
+    passes(&python, "check_annotate.py", &folder);
 }
 
 /// Expected: the page lists the images of its folder, whatever their names, and replaces no other page.
@@ -137,8 +138,7 @@ fn plants_are_marked_on_a_page() {
     let Some(python) = python("import numpy, PIL") else { return };
     let (_keep, folder) = scratch();
     std::fs::create_dir_all(&folder).expect("a folder");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_points.py");
-    done(Command::new(python).arg(script).arg(&folder).env("PYTHONPATH", source()).env("PYTHONDONTWRITEBYTECODE", "1"));
+    passes(&python, "check_points.py", &folder);
 }
 
 /// Rationale: a notebook that stops in its third cell is worse than none. Expected: all code cells run, with small images:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import re
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 # Kinds of errors by the exit code of the program.
 _KINDS = {1: "io", 2: "input", 75: "interrupted"}
@@ -60,3 +62,14 @@ def ended(program: str, code: int, text: str) -> FurrowError:
     place = Place(found[1], int(found[2]), int(found[3])) if found else None
     advice = re.search(r"(?m)^ help: (.*)$", message)
     return FurrowError(message, _KINDS.get(code, "io"), advice[1] if advice else None, place)
+
+
+@contextlib.contextmanager
+def reported(parser: argparse.ArgumentParser) -> Iterator[None]:
+    """End a command line with one error and its exit code instead of a traceback."""
+    try:
+        yield
+    except OSError as error:
+        parser.exit(1, f"error: {error}\n")
+    except FurrowError as error:
+        parser.exit(2, f"error: {error}\n" + (f" help: {error.help}\n" if error.help else ""))

@@ -23,7 +23,7 @@ from typing import IO, Any, Dict, Iterator, List, NamedTuple, Optional, Sequence
 import numpy as np
 from PIL import Image as Picture
 
-from ._errors import FurrowError
+from ._errors import FurrowError, reported
 from ._image import parsed
 
 # Numbers of bits of run lengths in Label Studio's masks.
@@ -182,17 +182,13 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     chosen = parser.parse_args(arguments)
     if not (chosen.cvat or chosen.label_studio):
         parser.error("give --cvat ZIP or --label-studio JSON")
-    try:
+    with reported(parser):
         predictions = Predictions(chosen.folder)
         if chosen.cvat:
             cvat(predictions, chosen.cvat)
         if chosen.label_studio:
             label_studio(predictions, chosen.label_studio, chosen.prefix)
             print(interface(predictions))
-    except OSError as error:
-        parser.exit(1, f"error: {error}\n")
-    except FurrowError as error:
-        parser.exit(2, f"error: {error}\n" + (f" help: {error.help}\n" if error.help else ""))
 
 
 if __name__ == "__main__":

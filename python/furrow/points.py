@@ -15,7 +15,7 @@ import json
 from pathlib import Path
 from typing import List, Optional, Sequence
 
-from ._errors import FurrowError
+from ._errors import FurrowError, reported
 
 _ENDINGS = {".png", ".jpg", ".jpeg"}
 _MARK = "<!-- furrow.points -->"
@@ -133,12 +133,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m furrow.points", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="folder of photographs")
-    try:
-        print(page(parser.parse_args(arguments).folder))
-    except OSError as error:
-        parser.exit(1, f"error: {error}\n")
-    except FurrowError as error:
-        parser.exit(2, f"error: {error}\n" + (f" help: {error.help}\n" if error.help else ""))
+    folder = parser.parse_args(arguments).folder
+    with reported(parser):
+        print(page(folder))
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ impl InferenceArgs {
             ))
             .help("leave --refine out, or write --refine colour,plants,rows,appearance"));
         }
-        card.refine = Refine { colour: true, plants: true, rows: true, appearance: true, ..Refine::default() };
+        card.refine = Refine { colour: true, smooth: false, plants: true, rows: true, appearance: true, ..card.refine };
         card.refine.check(&card.classes, &card.input.bands).map_err(|what| Error::misuse(format!("--like: {what}")))
     }
 

@@ -45,9 +45,9 @@ pub(crate) struct Args {
     /// (`train plants`) separates plants that touch; for a network without one, a plant is a connected region of plant pixels.
     #[arg(long)]
     plants: bool,
-    /// Table of points on plants of known class in some of the images (CSV: image, x, y, class), by which crop and weeds of the field are
-    /// told apart in all images: a few crop plants and a few weeds in two or three images are enough. x and y are pixels from the left
-    /// and the top, class is crop or weed. Needs the refinement appearance, and uses colour,plants,rows,appearance without --refine.
+    /// Table of points on some plants of known class (CSV: image, x, y, class), from which the classes in all images are corrected. About
+    /// ten crop plants and ten weeds in two or three images are enough. x and y are pixels from the left and the top, class is crop or
+    /// weed. Needs the refinement appearance; without --refine it is colour,plants,rows,appearance.
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
     #[command(flatten)]

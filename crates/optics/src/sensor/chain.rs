@@ -1,8 +1,8 @@
 //! Sensor: converts the linear film to an 8-bit colour image and an 8-bit NIR image.
 //!
-//! The steps follow a camera: radiance → blur of the optics → veiling glare → vignetting → exposure → electrons with shot and read
-//! noise, dark current and fixed pattern, full well → integers above black → white balance → demosaicing → colour
-//! matrix → tone curve → sharpening → 8 bits → JPEG loss. The two images have separate exposures, as the two sensors of
+//! The steps follow a camera: radiance → blur of the optics → veiling glare → vignetting → exposure → electrons with
+//! shot and read noise, dark current and fixed pattern, full well → integers above black → white balance → demosaicing
+//! → colour matrix → tone curve → sharpening → 8 bits → JPEG loss. The two images have separate exposures, as the two sensors of
 //! the JAI AD-130 have, within the limits of exposure time and analog gain. A step that is off is skipped and changes no bit.
 //!
 //! A linear value of 1 is white: 90 % of the full well, as that camera sets its output. The channels' responses to

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Longest table, bytes.
 const MOST_BYTES: u64 = 16 << 20;
-/// Columns of the table.
+/// Help of the errors about the table.
 const HELP: &str =
     "the table has the columns image (file name), x and y (pixels from the left and the top) and class (crop or weed)";
 
@@ -43,7 +43,7 @@ pub fn read(table: &Path, pictures: &[InputImage]) -> Result<Points> {
     let names = rows.headers().map_err(failed)?.clone();
     let column = |name: &&str| {
         let place = names.iter().position(|found| found.trim().eq_ignore_ascii_case(name));
-        place.ok_or_else(|| refuse(1, format!("there is no column `{name}`")))
+        place.ok_or_else(|| refuse(line_of(names.position()), format!("there is no column `{name}`")))
     };
     let columns = COLUMNS.iter().map(column).collect::<Result<Vec<usize>>>()?;
     let mut of = vec![Vec::new(); pictures.len()];
@@ -112,7 +112,7 @@ fn line_at(text: &str, byte: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// Expected: points are found by file name and by prediction name, further columns and comments are skipped; each mistake is an error
+    /// Expected: points are found by file name and by prediction name, further columns and empty lines are skipped; each mistake is an error
     /// with its line.
     #[test]
     fn tables_of_points_are_read_and_mistakes_named() {
@@ -142,6 +142,7 @@ mod tests {
             ("image,x,y,class\r\n\r\na,1,one,crop\r\n", "line 3: y is `one`, not a number"),
             ("image;x;y;class\na;1;1;crops\n", "line 2: `crops` is no class"),
             ("image,x,class\na,1,crop\n", "line 1: there is no column `y`"),
+            ("\n\nimage,x\n", "line 3: there is no column `y`"),
             ("a,1,1,crop\n", "line 1: there is no column `image`"),
             ("image,x,y,class\na,1\n", "line 2: y is ``, not a number"),
             ("image,x,y,class\n", "there are no points"),

@@ -15,7 +15,7 @@ use tch::{Kind, Tensor};
 const LEARNT: usize = 64;
 /// Largest logarithm of a plant's radius that is used: 8,000 pixels.
 const LARGEST: f32 = 9.0;
-/// Radius, in pixels of the input, at which the vectors of an input have half of the weight.
+/// Radius of plants whose vectors have half of the weight, pixels of the input.
 const RELIABLE: f32 = 40.0;
 
 /// Scores of the classes for one image.

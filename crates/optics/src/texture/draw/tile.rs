@@ -9,17 +9,17 @@ use furrow_base::math::{RoundTo, ToFloat, ToInt, Vec2, Vec3, lerp, smoothstep, v
 use furrow_base::ron_file::Num;
 use furrow_base::sampling::rng::{Purpose, Stream};
 
-/// Changes of the reflectance in R, G, B by one standard deviation of iron oxides and of organic coatings. Grains and crumbs then
-/// vary by 1.3 in a* and 2 in b*, as the soil of photographs does (docs/results/ground.md).
+/// Changes of the reflectance in R, G, B by one standard deviation of iron oxides and of organic coatings. Crumbs then vary by
+/// 1.3 in a* and 2 in b*; photographs of sugar beet fields vary by 1.5 and 2.1 (docs/results/ground.md).
 const IRON: Vec3 = vec3(0.035, -0.02, -0.04);
 const COATING: Vec3 = vec3(0.0, 0.0, -0.08);
-/// Standard deviation of one octave of [`Tile::noise`] with `octaves` from 2 to 3.
+/// Standard deviation of [`Tile::noise`] with two octaves; an estimate.
 const NOISE_SD: f32 = 0.3;
 /// Colours of loose mineral grains and their fractions: quartz, feldspar, dark minerals.
 const GRAINS: [(Vec3, f32); 3] =
     [(vec3(0.42, 0.38, 0.32), 0.6), (vec3(0.40, 0.29, 0.21), 0.25), (vec3(0.09, 0.085, 0.08), 0.15)];
 
-/// Returns factors on the reflectance of soil of another hue, from standard normal amounts of iron oxides and coatings.
+/// Returns factors on the reflectance of soil of another hue, from iron oxides and coatings in standard deviations from the mean.
 fn hue(iron: f32, coating: f32) -> Vec3 {
     Vec3::ONE + IRON * iron + COATING * coating
 }

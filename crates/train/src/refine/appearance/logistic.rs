@@ -58,11 +58,10 @@ impl Examples {
     /// Calls [`Self::learn`] without image numbers and returns the classifier alone.
     #[cfg(test)]
     pub(super) fn classifier(&self) -> Option<Classifier> {
-        self.learn(&[]).map(|(classifier, _)| classifier)
+        self.learn(&self.components()?, &[]).map(|(classifier, _)| classifier)
     }
 
-    /// Fits a classifier, and returns it with its cross-validated pseudo-R². Returns `None` if there are no more examples than
-    /// [`COMPONENTS`].
+    /// Fits a classifier, and returns it with its cross-validated pseudo-R².
     ///
     /// Minimizes Σ u_i (−p_i ln q_i − (1 − p_i) ln(1 − q_i)) + ½ |β|² over β and a bias that is not penalized. The weights u are
     /// scaled so that their sum is the number of examples; q_i is the logistic function of bias + β · y_i, and y_i are the
@@ -74,12 +73,8 @@ impl Examples {
     /// the image number of each example; if it is empty, the pseudo-R² is 0.
     ///
     /// Cross-validation has [`FOLDS`] folds by image. The principal components do not depend on labels and are computed from all examples.
-    pub(super) fn learn(&self, pictures: &[usize]) -> Option<(Classifier, f64)> {
-        let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
-        if n <= COMPONENTS || total <= 0.0 {
-            return None;
-        }
-        let components = self.components(total);
+    pub(super) fn learn(&self, components: &Components, pictures: &[usize]) -> Option<(Classifier, f64)> {
+        let n = self.labels.len();
         // A column for each example: 1 for the bias, then its principal components.
         let mut rows = DMatrix::repeat(components.axes.ncols() + 1, n, 1.0);
         for (mut row, features) in rows.column_iter_mut().zip(self.features.chunks_exact(self.features.len() / n)) {
@@ -92,17 +87,15 @@ impl Examples {
     }
 
     /// Corrects log odds by plants of known class. Returns the factor on the log odds and the classifier that is added to them, or `None`
-    /// if there are no more examples than [`COMPONENTS`] or no marked plant.
+    /// without marked plants.
     ///
     /// Maximizes the posterior of a logistic regression whose prior is the rule without marked plants: factor 1, bias and coefficients of
     /// the principal components 0, with the standard deviations of [`PRIOR_SD`]. `odds` are the log odds of the marked plants.
-    pub(super) fn correction(&self, odds: &[f64]) -> Option<(f64, Classifier)> {
+    pub(super) fn correction(&self, components: &Components, odds: &[f64]) -> Option<(f64, Classifier)> {
         let marked = &self.marked;
-        let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
-        if n <= COMPONENTS || total <= 0.0 || marked.crops.is_empty() {
+        if marked.crops.is_empty() {
             return None;
         }
-        let components = self.components(total);
         let count = components.axes.ncols();
         let mut rows = DMatrix::repeat(count + 2, odds.len(), 1.0);
         for (k, mut row) in rows.column_iter_mut().enumerate() {
@@ -142,10 +135,14 @@ impl Examples {
         beta.iter().all(|b| b.is_finite()).then_some((beta[1], classifier))
     }
 
-    /// Returns the principal components of the examples; `total` is the sum of their weights.
-    fn components(&self, total: f64) -> Components {
-        let scales = self.scales(self.features.len() / self.labels.len(), total);
-        Components { axes: self.axes(&scales, total), scales }
+    /// Returns the principal components of the examples, or `None` if there are no more examples than [`COMPONENTS`].
+    pub(super) fn components(&self) -> Option<Components> {
+        let (n, total) = (self.labels.len(), self.weights.iter().sum::<f64>());
+        if n <= COMPONENTS || total <= 0.0 {
+            return None;
+        }
+        let scales = self.scales(self.features.len() / n, total);
+        Some(Components { axes: self.axes(&scales, total), scales })
     }
 
     /// Returns the cross-validated pseudo-R². See [`Self::learn`] for it, and [`Self::newton`] for `rows`.
@@ -247,8 +244,6 @@ impl Examples {
 /// Plants of known class, each marked by a point.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Marked {
-    /// Pixel of each point in its image.
-    pub(super) pixels: Vec<usize>,
     /// Feature vectors, one plant after the other: the mean over the region and around the point.
     pub(super) features: Vec<f32>,
     /// Log odds of crop over weed from the network, sizes and rows.
@@ -273,7 +268,7 @@ impl Marked {
 }
 
 /// Principal components of features.
-struct Components {
+pub(super) struct Components {
     scales: Vec<Scale>,
     /// Directions as columns.
     axes: DMatrix<f64>,
@@ -379,6 +374,7 @@ mod tests {
     #[test]
     fn points_turn_wrong_log_odds_and_keep_right_ones() {
         let (mut rows, kinds) = examples(400, 12, 0.0);
+        let components = rows.components().unwrap();
         let side = |crop: bool| if crop { 6.0 } else { -6.0 };
         for sign in [-1.0, 1.0] {
             rows.marked = Marked::default();
@@ -389,7 +385,7 @@ mod tests {
                     rows.marked.crops.push(kind);
                 }
             }
-            let (factor, added) = rows.correction(&rows.marked.odds).unwrap();
+            let (factor, added) = rows.correction(&components, &rows.marked.odds).unwrap();
             let right = |k: &usize| {
                 let odds = factor * sign * side(kinds[*k]) + added.log_odds(&rows.features[k * 12..(k + 1) * 12]);
                 (odds > 0.0) == kinds[*k]
@@ -398,7 +394,7 @@ mod tests {
             assert!(if sign > 0.0 { factor > 0.5 } else { factor < 0.5 }, "{sign}: {factor}");
         }
         rows.marked = Marked::default();
-        assert_eq!(rows.correction(&[]), None);
+        assert_eq!(rows.correction(&components, &[]), None);
     }
 
     /// Expected: with constant features the log odds are those of the labels' weighted mean; too few examples, or examples without weight,

@@ -37,7 +37,7 @@ const SURE: f64 = 8.0;
 const MOST: usize = 2000;
 /// Range of the cross-validated pseudo-R² over which the classifier's weight rises linearly from 0 to 1.
 const ACCURACY_RANGE: (f64, f64) = (0.05, 0.15);
-/// Distance up to which a point that is beside all plants marks the nearest one, as a fraction of the longer side of the image.
+/// Largest distance of a point from the plant that it marks, as a fraction of the longer side of the image.
 const BESIDE: f32 = 0.01;
 /// Log odds that a point adds at its pixel, and the standard deviation of the Gaussian with which they fall over its region, as a fraction of
 /// the longer side of the image: about a leaf.
@@ -108,11 +108,11 @@ impl Features {
         shared
     }
 
-    /// Counts the plant pixels of each cell.
-    fn counts(&self, regions: &Components, size: (usize, usize)) -> Vec<f64> {
+    /// Sums the plant pixels of each cell over all regions.
+    fn counts(&self, shared: &BTreeMap<(usize, usize), f32>) -> Vec<f64> {
         let mut counts = vec![0.0; self.size.0 * self.size.1];
-        for (at, _) in regions.labels.iter().enumerate().filter(|(_, region)| **region > 0) {
-            counts[self.cell(at, size)] += 1.0;
+        for ((_, cell), pixels) in shared {
+            counts[*cell] += f64::from(*pixels);
         }
         counts
     }
@@ -144,28 +144,29 @@ impl Examples {
         largest.iter().enumerate().for_each(|(place, region)| places[*region] = Some(place));
         let channels = features.planes.len();
         let mut means = vec![0.0f32; largest.len() * channels];
-        for ((region, cell), pixels) in features.shared(regions, size) {
+        let shared = features.shared(regions, size);
+        for (&(region, cell), pixels) in &shared {
             let Some(place) = places[region] else { continue };
             let share = pixels / regions.areas[region].to_f32();
             let means = &mut means[place * channels..(place + 1) * channels];
             means.iter_mut().zip(&features.planes).for_each(|(mean, plane)| *mean += share * plane[cell]);
         }
         let label = |region: &usize| 1.0 / (1.0 + (-odds[*region].clamp(-SURE, SURE)).exp());
-        let mut marked = Marked::default();
-        let counts = if points.is_empty() { Vec::new() } else { features.counts(regions, size) };
+        let (mut marked, mut pixels) = (Marked::default(), Vec::new());
         for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
             let region = regions.labels[at].to_usize() - 1;
             let Some(place) = places[region] else { continue };
             let means = &means[place * channels..(place + 1) * channels];
-            marked.pixels.push(at);
+            pixels.push(at);
             marked.features.extend(means);
             marked.odds.push(odds[region]);
             marked.crops.push(point.is_crop);
         }
-        for (c, plane) in features.planes.iter().enumerate().filter(|_| !marked.crops.is_empty()) {
+        let counts = features.counts(&shared);
+        for (c, plane) in features.planes.iter().enumerate().filter(|_| !pixels.is_empty()) {
             let plane: Vec<f64> = plane.iter().map(|value| f64::from(*value)).collect();
             let near = blurred(&plane, &counts, features.size);
-            for (k, at) in marked.pixels.iter().enumerate() {
+            for (k, at) in pixels.iter().enumerate() {
                 let value = &mut marked.features[k * channels + c];
                 *value = ((1.0 - PLACE) * f64::from(*value) + PLACE * features.between(&near, *at, size)).to_f32();
             }
@@ -204,16 +205,18 @@ impl Appearance {
             all.marked.extend(&picture.marked);
             numbers.resize(all.labels.len(), number);
         }
-        let learnt = if pictures.len() < LEAST { None } else { all.learn(&numbers) };
-        let learnt = learnt.and_then(|(classifier, accuracy)| {
-            let trust = ((accuracy - ACCURACY_RANGE.0) / (ACCURACY_RANGE.1 - ACCURACY_RANGE.0)).clamp(0.0, 1.0);
-            (trust > 0.0).then_some((classifier, trust))
-        });
+        let components = all.components();
+        let learnt = components.as_ref().filter(|_| pictures.len() >= LEAST);
+        let learnt =
+            learnt.and_then(|components| all.learn(components, &numbers)).and_then(|(classifier, accuracy)| {
+                let trust = ((accuracy - ACCURACY_RANGE.0) / (ACCURACY_RANGE.1 - ACCURACY_RANGE.0)).clamp(0.0, 1.0);
+                (trust > 0.0).then_some((classifier, trust))
+            });
         let looks =
             |k: usize| learnt.as_ref().map_or(0.0, |(c, trust)| WEIGHT * trust * c.log_odds(all.marked.features(k)));
         let odds: Vec<f64> =
             all.marked.odds.iter().enumerate().map(|(k, odds)| (odds + looks(k)).clamp(-SURE, SURE)).collect();
-        let correction = all.correction(&odds);
+        let correction = components.and_then(|components| all.correction(&components, &odds));
         let points = odds.len();
         (learnt.is_some() || points > 0).then_some(Self { learnt, correction, points })
     }
@@ -228,58 +231,58 @@ impl Appearance {
         features: &Features,
         points: &[Point],
     ) -> Vec<f64> {
-        let looks = self
-            .learnt
-            .as_ref()
-            .map(|(classifier, trust)| (WEIGHT * trust, spread(&features.cells(classifier), regions, size, features)));
-        let added = self
-            .correction
-            .as_ref()
-            .map(|(factor, classifier)| (*factor, spread(&features.cells(classifier), regions, size, features)));
+        let shared = features.shared(regions, size);
+        let counts = features.counts(&shared);
+        let spread = |classifier: &Classifier| -> Vec<f64> {
+            let cells = features.cells(classifier);
+            let mut sums = vec![0.0; regions.areas.len()];
+            for ((region, cell), pixels) in &shared {
+                sums[*region] += f64::from(*pixels) * cells[*cell];
+            }
+            let near = blurred(&cells, &counts, features.size);
+            let value = |(at, region): (usize, &u32)| {
+                let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
+                let whole = sums[region] / f64::from(regions.areas[region]);
+                (1.0 - PLACE) * whole + PLACE * features.between(&near, at, size)
+            };
+            regions.labels.iter().enumerate().map(value).collect()
+        };
+        let looks = self.learnt.as_ref().map(|(classifier, trust)| (WEIGHT * trust, spread(classifier)));
+        let added = self.correction.as_ref().map(|(factor, classifier)| (*factor, spread(classifier)));
         let around = around(regions, size, points);
         let value = |(at, region): (usize, &u32)| {
             let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
             let odds = odds[region] + looks.as_ref().map_or(0.0, |(weight, looks)| weight * looks[at]);
             let all = added.as_ref().map_or(odds, |(factor, added)| factor * odds.clamp(-SURE, SURE) + added[at]);
-            all + around.get(&at).copied().unwrap_or(0.0)
+            all + around.get(at).copied().unwrap_or(0.0)
         };
         regions.labels.iter().enumerate().map(value).collect()
     }
 }
 
-/// Returns the log odds that points add at the pixels around them, within the region that each marks.
-fn around(regions: &Components, size: (usize, usize), points: &[Point]) -> BTreeMap<usize, f64> {
+/// Returns the log odds that points add at the pixels around them, within the region that each marks; empty without points.
+fn around(regions: &Components, size: (usize, usize), points: &[Point]) -> Vec<f64> {
     let sd = AT_POINT.1 * size.0.max(size.1).to_f32();
     let reach = (3.0 * sd).ceil_to::<usize>();
-    let mut around = BTreeMap::new();
+    let bell: Vec<f64> = (0..=reach).map(|d| f64::from((-0.5 * (d.to_f32() / sd).powi(2)).exp())).collect();
+    // Points on one pixel count together: however many there are, each pixel is marked once.
+    let mut marks: BTreeMap<usize, f64> = BTreeMap::new();
     for (point, at) in points.iter().filter_map(|point| Some((point, point.pixel(regions, size)?))) {
+        *marks.entry(at).or_insert(0.0) += if point.is_crop { AT_POINT.0 } else { -AT_POINT.0 };
+    }
+    let mut around = vec![0.0; if marks.is_empty() { 0 } else { regions.labels.len() }];
+    for (at, odds) in marks {
         let (x, y) = (at % size.0, at / size.0);
         for j in y.saturating_sub(reach)..=(y + reach).min(size.1 - 1) {
             for i in x.saturating_sub(reach)..=(x + reach).min(size.0 - 1) {
-                if regions.labels[j * size.0 + i] == regions.labels[at] {
-                    let squares = (i.abs_diff(x).pow(2) + j.abs_diff(y).pow(2)).to_f32() / (sd * sd);
-                    let added = AT_POINT.0 * f64::from((-0.5 * squares).exp());
-                    *around.entry(j * size.0 + i).or_insert(0.0) += if point.is_crop { added } else { -added };
+                let pixel = j * size.0 + i;
+                if regions.labels[pixel] == regions.labels[at] {
+                    around[pixel] += odds * bell[i.abs_diff(x)] * bell[j.abs_diff(y)];
                 }
             }
         }
     }
     around
-}
-
-/// Returns, at each plant pixel, a mean of the values of its region's cells and of the cells around it.
-fn spread(cells: &[f64], regions: &Components, size: (usize, usize), features: &Features) -> Vec<f64> {
-    let mut sums = vec![0.0; regions.areas.len()];
-    for ((region, cell), pixels) in features.shared(regions, size) {
-        sums[region] += f64::from(pixels) * cells[cell];
-    }
-    let near = blurred(cells, &features.counts(regions, size), features.size);
-    let value = |(at, region): (usize, &u32)| {
-        let Some(region) = region.to_usize().checked_sub(1) else { return 0.0 };
-        let whole = sums[region] / f64::from(regions.areas[region]);
-        (1.0 - PLACE) * whole + PLACE * features.between(&near, at, size)
-    };
-    regions.labels.iter().enumerate().map(value).collect()
 }
 
 /// Blurs cell values with a Gaussian, each cell weighted by its number of plant pixels. Cells without plants nearby keep their value.
