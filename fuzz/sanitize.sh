@@ -9,4 +9,4 @@ export RUSTC_BOOTSTRAP=1
 export RUSTFLAGS="-Ctarget-cpu=x86-64-v3 -Zsanitizer=address"
 export ASAN_OPTIONS="detect_leaks=0:detect_odr_violation=0:detect_stack_use_after_return=1"
 cargo test --target x86_64-unknown-linux-gnu --target-dir fuzz/target/asan -p furrow-embree --tests
-cargo test --target x86_64-unknown-linux-gnu --target-dir fuzz/target/asan --features system-tests --test all "$@" -- accel:: labels:: denoise::
+cargo test --target x86_64-unknown-linux-gnu --target-dir fuzz/target/asan --features system-tests --test system "$@" -- accel:: labels:: denoise::

@@ -71,10 +71,10 @@ const ALLOWED: &[(&str, &str)] = &[
     ("crc32c", "train/fit/log/events.rs"),
     // Checksums at the end of PNG files.
     ("crc32fast", "texture/png_end.rs"),
-    // Tables: measured spectra (input), bounding boxes of plants and report figures (output).
+    // Tables: measured spectra and points on plants (input), bounding boxes of plants and report figures (output).
     (
         "csv",
-        "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs dataset/format/traits.rs report/csv.rs",
+        "optics/measured.rs optics/munsell.rs optics/prospect.rs dataset/format/cropandweed.rs dataset/format/traits.rs report/csv.rs train/deploy/points.rs",
     ),
     // Layers (output), environment maps (input).
     ("exr", "output/exr/mod.rs texture/exr_size.rs texture/openexr.rs"),

@@ -4,7 +4,7 @@
 //! before rendering if it is missing; the noisy files in any case; each band written back to its own channel. Stand-ins
 //! that copy their input replace the denoiser, so these tests run anywhere: a script for its program, and
 //! `denoise/stand_in.c` for its library. With Open Image Denoise itself:
-//! `cargo test --release --features system-tests --test all denoise:: -- --ignored --nocapture`.
+//! `cargo test --release --features system-tests --test system denoise:: -- --ignored --nocapture`.
 
 #![allow(clippy::print_stdout, reason = "the long test prints its measurements")]
 

@@ -7,7 +7,7 @@
 //!
 //! `tests/ref/labels.sha256` holds the hash of the small scene's label map. After an intended change to plants, soil,
 //! scattering or labels, inspect `target/test-failures/golden-labels/`, then update it:
-//! `FURROW_BLESS=1 cargo test --features system-tests --test all determinism::`.
+//! `FURROW_BLESS=1 cargo test --features system-tests --test system determinism::`.
 
 use crate::common::pictures;
 use crate::common::program::{self, FILES, SMALL, bits, field, hash, names, run, scratch, shoot, small_text, trace};
@@ -129,7 +129,7 @@ fn the_small_pages_label_map_is_the_one_on_record() {
         let seen = pictures::keep("golden-labels", labels.window.width(), &now, &now);
         panic!(
             "the label map of {SMALL} has changed; if it should have, look at it in {seen} and renew its hash with \
-             FURROW_BLESS=1 cargo test --features system-tests --test all determinism::"
+             FURROW_BLESS=1 cargo test --features system-tests --test system determinism::"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! All integration tests of the library and the programs, one module per subject: `cargo test --features system-tests --test all labels::`.
+//! All integration tests of the library and the programs, one module per subject: `cargo test --features system-tests --test system labels::`.
 //!
 //! They form a single test binary. 70 separate binaries would each link the whole library, libtorch and Embree, which
 //! takes minutes longer.

@@ -10,7 +10,7 @@
 //!
 //! `tests/ref/*.exr` hold the mean of each band (f32) and its standard error (f16). After an intended change of pixels,
 //! inspect `target/test-failures/reference-*/`, then update them:
-//! `FURROW_BLESS=1 cargo test --release --features system-tests --test all reference::`.
+//! `FURROW_BLESS=1 cargo test --release --features system-tests --test system reference::`.
 
 use crate::common::layers::{read_layers, write_layers};
 use crate::common::pictures;
@@ -198,7 +198,7 @@ fn check(name: &str, scene: &Scene, ways: &[(&str, PathTracer, Points, u32)]) {
             let seen = keep(&format!("{name}-{way}"), &got, &reference);
             panic!(
                 "{name}, {way}: {fault}; if it should have changed, look at {seen} and renew the references with \
-                 FURROW_BLESS=1 cargo test --release --features system-tests --test all reference::"
+                 FURROW_BLESS=1 cargo test --release --features system-tests --test system reference::"
             );
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! Rationale: users write scene files by hand, in editors that do not know the format. Expected: a file builds, or its
 //! error shows the file, line, column, the faulty characters and a remedy. Source: none; the messages are our own.
-//! After a change of messages, `FURROW_BLESS=1 cargo test --features system-tests --test all scene_files::` updates them; review the difference
+//! After a change of messages, `FURROW_BLESS=1 cargo test --features system-tests --test system scene_files::` updates them; review the difference
 //! before committing.
 
 use furrow_base::Result;

@@ -5,7 +5,7 @@
 //! times, measured over the whole image, 216 pixels wide, when this was written. Without the relative weighting, a few
 //! bright pixels would dominate. Source: Burley 2020; the reference uses independent samples with another seed.
 //!
-//! The long test, with many more pixels: `cargo test --release --features system-tests --test all stratification:: -- --ignored --nocapture`.
+//! The long test, with many more pixels: `cargo test --release --features system-tests --test system stratification:: -- --ignored --nocapture`.
 
 #![allow(clippy::print_stdout, reason = "the long test prints its measurements")]
 

@@ -1,6 +1,6 @@
 //! The textures that ship with the program.
 //!
-//! After a change of the texture generator, `cargo test --features system-tests --test all textures::redraw -- --ignored` generates all of them
+//! After a change of the texture generator, `cargo test --features system-tests --test system textures::redraw -- --ignored` generates all of them
 //! again; with `ONLY=beet` before it, only those whose path contains the word.
 
 use furrow_base::geometry::outline::Outline;

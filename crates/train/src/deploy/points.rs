@@ -5,7 +5,7 @@ use crate::refine::Point;
 use furrow_base::error::{Error, Result};
 use furrow_base::input::read_text;
 use furrow_base::math::{ToFloat, ToInt, vec2};
-use sha2::{Digest, Sha256};
+use furrow_dataset::read::checksum::Checksum;
 use std::path::Path;
 
 /// Longest table, bytes.
@@ -97,7 +97,7 @@ pub fn read(table: &Path, pictures: &[InputImage]) -> Result<Points> {
     if of.iter().all(Vec::is_empty) {
         return Err(Error::input("there are no points in it").help(HELP).in_file(table));
     }
-    Ok(Points { of, table_sha256: Some(hex::encode(Sha256::digest(text))) })
+    Ok(Points { of, table_sha256: Some(Checksum::of(text.as_bytes()).sha256) })
 }
 
 /// Returns the number of the line of the first text at or after a byte. The reader's own count is wrong after CRLF and empty lines.
