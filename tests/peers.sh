@@ -25,7 +25,7 @@ build() {
 }
 
 packages() {
-  debian mesa-vulkan-drivers libvulkan1 libllvm19 chromium slurm-wlm munge iproute2 procps parallel \
+  debian mesa-vulkan-drivers libvulkan1 libllvm19 chromium slurm-wlm munge iproute2 procps parallel curl \
     python3-torch python3-torchvision python3-pil
 }
 

@@ -141,6 +141,31 @@ fn plants_are_marked_on_a_page() {
     passes(&python, "check_points.py", &folder);
 }
 
+/// Runs a script of `tests/python` that starts the program on a scene with one plant.
+fn passes_with_program(python: &Path, script: &str) {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut run = Command::new(python);
+    run.arg(root.join("tests/python").join(script)).arg(env!("CARGO_BIN_EXE_trace"));
+    run.arg(root.join("tests/ref/plant.ron")).arg(folder);
+    done(run.env("PYTHONPATH", source()).env("PYTHONDONTWRITEBYTECODE", "1"));
+}
+
+/// Expected: workers of Dask render the same files as one process, and a lost shard is submitted again.
+#[test]
+fn executors_of_python_render_a_dataset() {
+    let Some(python) = python("import distributed, numpy, PIL") else { return };
+    passes_with_program(&python, "check_distribute.py");
+}
+
+/// Expected: a bucket of a server that checks signatures contains the dataset; mistakes are named, and the next run goes on.
+#[test]
+fn a_dataset_is_pushed_to_a_bucket() {
+    let Some(python) = python("import boto3, flask_cors, moto.server") else { return };
+    passes_with_program(&python, "check_bucket.py");
+}
+
 /// Rationale: a notebook that stops in its third cell is worse than none. Expected: all code cells run, with small images:
 /// plots where Matplotlib is installed, the training, whose loss falls, where PyTorch is.
 #[test]

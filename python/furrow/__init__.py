@@ -19,6 +19,7 @@ Requires numpy and Pillow. A `Dataset` can be passed to PyTorch's `DataLoader`; 
 """
 
 from ._dataset import Dataset
+from ._distribute import distribute
 from ._errors import FurrowError, FurrowWarning, Place
 from ._image import Image
 from ._program import program
@@ -33,6 +34,7 @@ __all__ = [
     "RenderOptions",
     "Scene",
     "StreamOptions",
+    "distribute",
     "load",
     "program",
     "render",

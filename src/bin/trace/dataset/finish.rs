@@ -35,7 +35,7 @@ pub(crate) struct Args {
 /// Adds formats, then writes the dataset-wide files.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let mut set = Set::open(&args.dir)?;
-    let push = args.push.push()?;
+    let push = args.push.push_from_here()?;
     let labelling = args.labels.labelling();
     if !args.format.is_empty() || !labelling.is_usual() {
         for warning in plan::add_formats(&mut set, &args.format, &labelling)? {

@@ -123,7 +123,7 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
         }
         None => {
             let profiler = cli.make.profile.profiler();
-            let push = cli.make.push.push()?;
+            let push = cli.make.push.push_from_here()?;
             let set = order::run(&cli.make.order, cli.make.work.quiet, signals)?;
             order::print_plants(&set, cli.make.work.quiet)?;
             let memory = cli.make.order.images.memory.bytes;

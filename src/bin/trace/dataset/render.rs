@@ -11,7 +11,7 @@ use furrow_cli::cli::signal::Signals;
 use furrow_dataset::Set;
 use furrow_dataset::deliver::scratch;
 use furrow_dataset::make::generate::{self, Callbacks, Shard, Work};
-use furrow_dataset::make::push::Push;
+use furrow_dataset::make::push::{Destination, Push};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -41,13 +41,13 @@ pub(crate) struct Args {
 /// Transfer of finished images to another place.
 #[derive(clap::Args)]
 pub(crate) struct PushArgs {
-    /// Run this shell command for each finished image or pack. {dir} is a folder with its files under their paths in
-    /// the dataset, such as 'rclone copy {dir} remote:set' or 'cp -a {dir}/. /mnt/set/'. Pushed images are recorded,
-    /// and not pushed again.
-    #[arg(long, value_name = "COMMAND")]
+    /// Upload each finished image or pack to a bucket, s3://BUCKET/FOLDER, or run a shell command for it. {dir} in the
+    /// command is a folder with its files under their paths in the dataset, such as 'rclone copy {dir} remote:set' or
+    /// 'cp -a {dir}/. /mnt/set/'. Pushed images are recorded, and not pushed again.
+    #[arg(long, value_name = "TO")]
     push: Option<String>,
-    /// Run this command after it, such as 'rclone check --one-way {dir} remote:set'. If it fails, the push counts as
-    /// failed.
+    /// Run this command after that of `--push`, such as 'rclone check --one-way {dir} remote:set'. If it fails, the push
+    /// counts as failed.
     #[arg(long, value_name = "COMMAND", requires = "push")]
     push_check: Option<String>,
     /// Remove images here once they are pushed. Run `finish` at the other place then.
@@ -64,11 +64,16 @@ pub(crate) struct PushArgs {
 impl PushArgs {
     /// Returns the selected push options.
     pub(crate) fn push(&self) -> Result<Option<Push>> {
-        let Self { push, push_check: check, push_free: free, push_tries: tries, push_timeout } = self;
-        let timeout = push_timeout.map(Duration::from_secs);
-        let push =
-            push.clone().map(|command| Push { command, check: check.clone(), free: *free, tries: *tries, timeout });
-        push.as_ref().map_or(Ok(()), Push::check)?;
+        let Some(to) = &self.push else { return Ok(None) };
+        let to = Destination::parse(to, self.push_check.as_deref())?;
+        let timeout = self.push_timeout.map(Duration::from_secs);
+        Ok(Some(Push { to, free: self.push_free, tries: self.push_tries, timeout }))
+    }
+
+    /// Like [`PushArgs::push`], for pushes from this machine: fails if it cannot push.
+    pub(crate) fn push_from_here(&self) -> Result<Option<Push>> {
+        let push = self.push()?;
+        push.as_ref().map_or(Ok(()), Push::check_machine)?;
         Ok(push)
     }
 
@@ -104,7 +109,7 @@ impl WorkArgs {
 /// Renders the images of a shard.
 pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
     let set = Set::open(&args.dir)?;
-    let push = args.push.push()?;
+    let push = args.push.push_from_here()?;
     if let Some(scratch) = &args.scratch {
         check_scratch(scratch, &args.dir)?;
         let help = "give --scratch a folder on a disk of this machine; it is created if it does not exist";

@@ -97,7 +97,6 @@ fn check(set: &Set, job: &Job) -> Result<()> {
         }
     }
     if let Some(push) = &job.push {
-        push.check()?;
         if push.free {
             return fault("--push-free removes the images that the finishing job needs".into(), "leave it out here");
         }

@@ -1,7 +1,7 @@
 //! Settings of job files.
 
 use super::script::expanded;
-use crate::make::push::Push;
+use crate::make::push::{Destination, Push, ShellCommand};
 use furrow_base::shell::quoted;
 use furrow_base::{Error, Result};
 use std::path::PathBuf;
@@ -127,9 +127,11 @@ impl Job {
 
     /// Returns the options that scripts append to `finish`: those for pushing, or none.
     pub(super) fn pushing(&self) -> String {
-        let Some(Push { command, check, free, tries, timeout }) = &self.push else { return String::new() };
-        let mut words = format!(" --push {} --push-tries {tries}", quoted(command));
-        words.extend(check.iter().map(|check| format!(" --push-check {}", quoted(check))));
+        let Some(Push { to, free, tries, timeout }) = &self.push else { return String::new() };
+        let mut words = format!(" --push {} --push-tries {tries}", quoted(&to.to_string()));
+        if let Destination::Command(ShellCommand { check: Some(check), .. }) = to {
+            words.extend([" --push-check ", &quoted(check)]);
+        }
         words.extend(timeout.iter().map(|timeout| format!(" --push-timeout {}", timeout.as_secs())));
         if *free {
             words += " --push-free";
