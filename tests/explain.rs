@@ -71,6 +71,10 @@ fn what_is_not_there_is_refused_with_the_nearest() {
         let words = String::from_utf8(trace(&["explain", path]).stderr).unwrap();
         assert!(words.contains(&format!("there is no `{path}`")), "{words}");
     }
+    assert_eq!(trace(&["explain", "xyzzy"]).status.code(), Some(2));
+    // A word that is no path lists what contains it.
+    let found = message(&trace(&["explain", "corn"]));
+    assert_eq!(found.split_once('\n').unwrap().1, message(&trace(&["explain", "--search", "corn"])));
     let words = message(&trace(&["explain", "distribution"]));
     assert!(words.contains("LogNormal") && words.contains("median"), "{words}");
 }
