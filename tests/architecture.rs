@@ -126,7 +126,7 @@ const ALLOWED: &[(&str, &str)] = &[
     // Only outer loops run in parallel: images, plants, soil maps, sensor pixels, textures of exports.
     (
         "rayon",
-        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ field/assemble/bank.rs field/assemble/estimate.rs field/assemble/ground.rs field/assemble/sow.rs field/assemble/stand.rs field/library.rs field/shipped.rs field/species.rs field/traits.rs output/gltf/ output/mitsuba/ soil/bake.rs soil/crack.rs soil/crumb.rs soil/ground.rs soil/in_view.rs soil/openness.rs light/sky.rs texture/maps.rs material/ground.rs raster/textures.rs",
+        "accel/embree.rs render/ sensor/ job/threads.rs dataset/ compare/ field/assemble/bank.rs field/assemble/estimate.rs field/assemble/ground.rs field/assemble/sow.rs field/assemble/stand.rs field/library.rs field/shipped.rs field/species.rs field/traits.rs output/appearance/ output/mitsuba/ output/usd/ soil/bake.rs soil/crack.rs soil/crumb.rs soil/ground.rs soil/in_view.rs soil/openness.rs light/sky.rs texture/maps.rs material/ground.rs raster/textures.rs",
     ),
     // One reader for all RON files, which reports faults inside a value at their position.
     ("ron", "ron_file/"),

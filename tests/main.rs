@@ -109,4 +109,5 @@ mod table;
 mod technique;
 mod textures;
 #[cfg(unix)]
+mod usd;
 mod watch;

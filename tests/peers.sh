@@ -5,7 +5,7 @@
 #   packages  Mesa's Vulkan driver for the raster engine; the programs used as independent references by the tests: a browser, a batch
 #             system, Debian's PyTorch for the CPU
 #   libtorch  for the feature `train`, and weights that start a training
-#   python    clients that the tests compare with, in target/venv and target/venv-torch; needs `packages`; 210 MB to download
+#   python    clients that the tests compare with, in target/venv and target/venv-torch; needs `packages`; 240 MB to download
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

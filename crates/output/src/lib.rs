@@ -1,6 +1,7 @@
 //! Output files: images, radiance and labels. Each file appears completely or not at all. Files contain no timestamps
 //! or paths, so equal runs write equal bytes.
 
+mod appearance;
 mod camera_tags;
 pub mod cloud;
 mod denoise;
@@ -15,6 +16,8 @@ mod overlay;
 mod photo;
 mod png;
 pub mod scan;
+mod skinning;
+pub mod usd;
 
 use self::camera_tags::Bands;
 use self::png::Metadata;

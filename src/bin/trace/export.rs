@@ -24,7 +24,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Export the joints of leaves and stems as skins with weights, so that plants can bend in the other program; with
-    /// `--format gltf`.
+    /// `--format gltf` and `usd`.
     #[arg(long)]
     skins: bool,
     /// Points per square metre of surface; with `--format ply`, `las` and `laz`. Default: 100000.
@@ -43,6 +43,8 @@ pub(crate) struct Args {
 enum Format {
     /// glTF 2.0: scene.glb with meshes, textures, labels, sun, lamps and camera; for Blender and other programs.
     Gltf,
+    /// USD: scene.usda with meshes, textures, labels as semantics, lights and camera; for Isaac Sim and other programs.
+    Usd,
     /// Mitsuba 3: scene.xml with meshes, textures, lights and camera.
     Mitsuba,
     /// Point cloud of all surfaces, including hidden ones: points.ply with position, normal, colour and labels.
@@ -69,6 +71,7 @@ impl Format {
             Self::Ply => furrow_output::cloud::write(folder, field, density),
             Self::Las | Self::Laz => furrow_output::cloud::write_las(folder, field, density, matches!(self, Self::Laz)),
             Self::Gltf => furrow_output::gltf::write(folder, &field.scene, &field.plants, &field.provenance()),
+            Self::Usd => furrow_output::usd::write(folder, field),
             Self::Mitsuba => furrow_job::mitsuba::export(folder, &field.scene, &field.provenance()),
         }
     }
@@ -76,6 +79,11 @@ impl Format {
     /// Returns `true` if the export has points.
     fn has_points(self) -> bool {
         matches!(self, Self::Ply | Self::Las | Self::Laz)
+    }
+
+    /// Returns `true` if the export can have joints.
+    fn has_joints(self) -> bool {
+        matches!(self, Self::Gltf | Self::Usd)
     }
 
     fn name(self) -> String {
@@ -93,9 +101,9 @@ pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
             furrow_cli::message!("{words}");
         }
     };
-    if args.skins && !matches!(args.format, Format::Gltf) {
+    if args.skins && !args.format.has_joints() {
         let words = format!("--skins has no effect with --format {}, which has no joints", args.format.name());
-        return Err(Error::misuse(words).help("use --format gltf, or leave --skins out"));
+        return Err(Error::misuse(words).help("use --format gltf or usd, or leave --skins out"));
     }
     if args.density.is_some() && !args.format.has_points() {
         let words = format!("--density has no effect with --format {}, which contains surfaces", args.format.name());

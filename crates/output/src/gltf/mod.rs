@@ -17,12 +17,11 @@
 //! The document is built here, because the crate `gltf` reads documents but does not write them (tests read these with
 //! it).
 
-mod image_choice;
-mod images;
 mod materials;
 mod pack;
 mod skins;
 
+use super::appearance::{Strength, Surfaces};
 use super::{Export, unsupported, write_atomically};
 use furrow_base::math::{Spectrum, Vec3};
 use furrow_base::{Error, Result};
@@ -35,7 +34,6 @@ use furrow_optics::light::Form;
 use furrow_optics::sensor::{Lens, OpenCv};
 use furrow_render::scene::tag::Tag;
 use furrow_render::scene::{Part, Scene};
-use materials::Materials;
 use pack::Pack;
 use serde_json::{Map, Value, json};
 use skins::Skins;
@@ -46,10 +44,10 @@ use std::path::Path;
 const Z_UP_TO_Y_UP: [f64; 16] = [1., 0., 0., 0., 0., 0., -1., 0., 0., 1., 0., 0., 0., 0., 0., 1.];
 
 /// Lumens per W·nm⁻¹ of light with a flat spectrum: 683 lm/W times ∫V(λ) dλ = 106.857 nm. Source: CIE 1924.
-const LUMENS: f64 = 683.0 * 106.857;
+pub(crate) const LUMENS: f64 = 683.0 * 106.857;
 
 /// Near clipping distance for other programs, metres.
-const NEAR: f64 = 0.01;
+pub(crate) const NEAR: f64 = 0.01;
 
 /// Writes `scene.glb` into `folder`; `provenance` states the source of the scene. Leaves and stems of `plants` with
 /// joints get skins.
@@ -66,7 +64,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     let mut skins = Skins::new(plants);
     // Children of the root node.
     let mut top = Vec::new();
-    let mut materials = Materials::new(scene);
+    let mut surfaces = Surfaces::new(scene, Strength::OfSurfaces);
     let mut document = Document {
         asset: Asset {
             version: "2.0".into(),
@@ -81,7 +79,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     };
     // Parts without triangles are omitted.
     for part in scene.parts.iter().filter(|p| !p.mesh.triangles.is_empty()) {
-        let material = materials.add(part);
+        let material = surfaces.add(part);
         document.meshes.push(mesh(part, material, &mut pack));
         let mesh = document.meshes.len() - 1;
         let extras = document.meshes[mesh].extras.clone();
@@ -96,7 +94,7 @@ pub fn encode(scene: &Scene, plants: &[PlantRecord], provenance: &str) -> Result
     let lights = lights(scene, &mut document.nodes);
     top.extend(others..document.nodes.len());
     document.nodes[0].children = top;
-    materials.write(&mut document, &mut pack)?;
+    materials::write(surfaces.draw()?, &mut document, &mut pack);
     if !lights.is_empty() {
         document.extensions.insert(LIGHTS.into(), json!({ "lights": lights }));
         document.extensions_used.push(LIGHTS.into());
@@ -181,7 +179,7 @@ fn camera(scene: &Scene, cameras: &mut Vec<Camera>) -> Node {
 }
 
 /// Returns the name of a lens's model, and its coefficients in OpenCV's order.
-fn lens(of: Lens) -> (&'static str, Vec<f64>) {
+pub(crate) fn lens(of: Lens) -> (&'static str, Vec<f64>) {
     match of {
         Lens::BrownConrady(d) => ("opencv", vec![d.k1, d.k2, d.p1, d.p2, d.k3]),
         Lens::OpenCv(OpenCv { k: [k1, k2, k3, k4, k5, k6], p, s, tilt }) => {

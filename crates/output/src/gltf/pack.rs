@@ -1,5 +1,6 @@
 //! Buffer of a GLB file: vertices, indices and images, each kind in a separate span.
 
+use crate::skinning::tidy;
 use furrow_base::geometry::JointWeights;
 use furrow_base::math::{DMat4, ToFloat, Vec2, Vec3};
 use furrow_grow::model::document::{
@@ -147,17 +148,4 @@ impl Pack {
         document.buffers = vec![Buffer { byte_length: buffer.len(), uri: None }];
         buffer
     }
-}
-
-/// Merges duplicate joints of a vertex, drops those without weight, and normalises the weights to a sum of 1.
-fn tidy(of: &JointWeights) -> ([u16; 4], [f32; 4]) {
-    let (mut numbers, mut shares, mut used) = ([0; 4], [0.0; 4], 0);
-    let sum: f32 = of.iter().map(|(_, weight)| weight).sum();
-    for (joint, weight) in of.iter().filter(|(_, weight)| *weight > 0.0) {
-        let place = numbers[..used].iter().position(|number| number == joint).unwrap_or(used);
-        used = used.max(place + 1);
-        numbers[place] = *joint;
-        shares[place] += weight / sum;
-    }
-    (numbers, shares)
 }

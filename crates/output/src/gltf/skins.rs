@@ -10,7 +10,8 @@
 //! [`RigJoint::axes`].
 
 use super::pack::Pack;
-use furrow_base::math::{DMat4, DQuat, DVec3, Mat3, Quat};
+use crate::skinning::rotation;
+use furrow_base::math::{DMat4, DQuat, DVec3};
 use furrow_field::PlantRecord;
 use furrow_grow::model::document::{Document, Node, Skin};
 use furrow_grow::plant::{LeafAxis, RigJoint};
@@ -128,10 +129,9 @@ struct ParentJoint<'a> {
 /// Returns the transform from a joint's parent (or the world) to the joint: a unit quaternion x, y, z, w, and an offset
 /// in metres.
 fn step(joint: &RigJoint, parent: Option<&RigJoint>) -> ([f32; 4], [f32; 3]) {
-    let turned = |axes: &Mat3| Quat::from_mat3(axes).as_dquat().normalize();
-    let (turn, at) = (turned(&joint.axes), joint.at.as_dvec3());
+    let (turn, at) = (rotation(&joint.axes), joint.at.as_dvec3());
     let Some(parent) = parent else { return (turn.as_quat().to_array(), joint.at.to_array()) };
-    let back = turned(&parent.axes).inverse();
+    let back = rotation(&parent.axes).inverse();
     let moved = back * (at - parent.at.as_dvec3());
     ((back * turn).as_quat().to_array(), moved.as_vec3().to_array())
 }

@@ -1,4 +1,4 @@
-//! Choice of the image of a glTF material: that of the species, or one of its own.
+//! Choice of the image of a surface: that of the species, or one of its own.
 //!
 //! The condition of a leaf gives every texel another colour, so each leaf would need its own images: thousands in one
 //! field, which take minutes to compute and more memory than viewers have. Most conditions are, within a few percent, a

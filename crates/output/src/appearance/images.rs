@@ -1,4 +1,4 @@
-//! Images of a glTF document: each is computed and encoded once, on all threads, however many materials share it.
+//! Images of surfaces, as PNG files.
 
 use super::image_choice::transmission_share;
 use crate::png::{self, ImageData};
@@ -8,7 +8,7 @@ use furrow_base::math::{RoundTo, ToInt, Vec3};
 use furrow_optics::texture::ColorSpace;
 use furrow_render::material::swatch::{Dye, Swatch};
 
-/// Colours shared by several glTF materials.
+/// Colours shared by several surfaces.
 pub(super) struct SharedColors<'a> {
     swatch: &'a Swatch<'a>,
     /// Component-wise maximum of the users' factors on reflected colours. The image is multiplied by it so that no
@@ -20,12 +20,12 @@ pub(super) struct SharedColors<'a> {
     most: [Vec3; 2],
 }
 
-/// Factors of one material on the colours that it shares.
-pub(super) struct Factors {
+/// Factors of one surface on the colours that it shares.
+pub(crate) struct Factors {
     /// Diffuse transmission factor f: reflected colours are divided by 1 − f, transmitted ones by f.
-    pub(super) share: f32,
-    pub(super) reflected: Vec3,
-    pub(super) transmitted: Vec3,
+    pub(crate) share: f32,
+    pub(crate) reflected: Vec3,
+    pub(crate) transmitted: Vec3,
 }
 
 /// Colours of an image, ready to be combined with masks.
@@ -117,11 +117,11 @@ pub(super) fn reflected(colors: Option<&Colors>, mask: Option<&AlphaMask>) -> Re
     png::encode(w, h, &data, "").map(Some)
 }
 
-/// Encodes the relief of a swatch as a normal map; `None` if it has no image.
-pub(super) fn relief(swatch: &Swatch<'_>) -> Result<Option<Vec<u8>>> {
+/// Encodes the relief of a swatch as a normal map, with slopes times `strength`; `None` if it has no image.
+pub(super) fn relief(swatch: &Swatch<'_>, strength: f32) -> Result<Option<Vec<u8>>> {
     let Some(size) = swatch.size else { return Ok(None) };
     let normal = |(x, y): (u32, u32)| {
-        let slope = swatch.slope(x, y);
+        let slope = swatch.slope(x, y) * strength;
         let n = Vec3::new(-slope.x, -slope.y, 1.0).normalize();
         n.to_array().map(|c| ((0.5 * c + 0.5) * 255.0 + 0.5).trunc_to::<u8>())
     };
