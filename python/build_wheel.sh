@@ -9,10 +9,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ $# -eq 0 ]; then
-  embree=$PWD/target/embreex
-  python3 -m pip install -q --no-deps --upgrade --target "$embree" --only-binary :all: --python-version 3.11 --platform manylinux_2_28_x86_64 \
-    --require-hashes -r python/embreex.txt
-  export EMBREE_DIR=$embree/embreex.libs
+  EMBREE_DIR=$(python/embreex.sh)
+  export EMBREE_DIR
   set -- --release --strip --zig --compatibility manylinux_2_28
 fi
 # A separate target folder, because maturin changes the library search path of the program, and cargo's own builds must not change.

@@ -7,6 +7,9 @@
 //! 2. `../share/furrow` relative to the program's own folder: `/usr/local/bin/trace` and `/usr/local/share/furrow`;
 //! 3. `../furrow/data`, the location in the Python package;
 //! 4. the source tree that the program was built from, for `cargo run` and `cargo install --path .`.
+//!
+//! Without `FURROW_DATA`, trained networks are first looked for in `networks/` beside the program, as in the Python
+//! package `furrow-train`, whose scene files and textures are those of the package `furrow`.
 
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -16,8 +19,7 @@ pub const VARIABLE: &str = "FURROW_DATA";
 
 /// Returns the data folder, which contains `scenes/` and `textures/`.
 pub fn folder() -> Result<PathBuf> {
-    if let Some(named) = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) {
-        let named = PathBuf::from(named);
+    if let Some(named) = named() {
         if is_data(&named) {
             return Ok(named);
         }
@@ -34,6 +36,11 @@ pub fn folder() -> Result<PathBuf> {
             "copy scenes/ and textures/ of the repository to share/furrow beside the program's bin/, or set {VARIABLE} to their folder"
         ))
     })
+}
+
+/// Folder that the environment variable names.
+fn named() -> Option<PathBuf> {
+    std::env::var_os(VARIABLE).filter(|name| !name.is_empty()).map(PathBuf::from)
 }
 
 fn is_data(folder: &Path) -> bool {
@@ -84,7 +91,9 @@ pub fn soil_textures() -> Result<Vec<PathBuf>> {
 
 /// Folder of the shipped trained networks.
 pub fn networks() -> Result<PathBuf> {
-    Ok(folder()?.join("networks"))
+    let program = std::env::current_exe().ok().filter(|_| named().is_none());
+    let beside = program.as_deref().and_then(Path::parent).map(|folder| folder.join("networks"));
+    beside.filter(|networks| networks.is_dir()).map_or_else(|| Ok(folder()?.join("networks")), Ok)
 }
 
 fn ron_files(folder: &Path) -> Result<Vec<PathBuf>> {
