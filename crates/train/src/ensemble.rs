@@ -95,7 +95,7 @@ fn runs(path: &Path) -> Result<Vec<PathBuf>> {
 
 /// Returns whether two models have the same network, input, preprocessing and classes. Version, weights, plan and pixel size
 /// may differ.
-fn alike(a: &ModelCard, b: &ModelCard) -> bool {
+pub(crate) fn alike(a: &ModelCard, b: &ModelCard) -> bool {
     let same = ModelCard {
         furrow: a.furrow.clone(),
         weights: a.weights.clone(),

@@ -24,6 +24,7 @@
 //! | `fit` | trains a plan into a folder; resumable |
 //! | `adapt` | continues the training of a network on photographs without labels |
 //! | `plants` | adds a decoder to a network that separates plants one by one |
+//! | `average` | mean of the weights of several runs |
 //! | `calibrated`, `evaluate` | class-bias calibration; scores of predictions against the ground truth |
 //! | [`TrainedModel`], [`Results`], [`Report`] | weights and model card; loss curve and validation passes; scores |
 //! | [`Ensemble`] | runs with several seeds whose probabilities are averaged |
@@ -44,6 +45,7 @@
 
 #[cfg(feature = "torch")]
 pub mod adapt;
+pub mod average;
 pub mod baseline;
 pub mod crop;
 pub mod data;

@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
+use furrow_train::average::average;
 use furrow_train::crop::exported;
 use furrow_train::deploy::{onnx, torchscript};
 use furrow_train::fit::settings::parse_size;
@@ -24,6 +25,10 @@ pub(crate) struct Args {
     /// Image size of a TorchScript export; by default the network's training size. ONNX exports take images of any size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
+    /// Run whose weights are averaged with those of RUN; may be given several times. Runs must agree in network, classes, bands and
+    /// sizes, and should start from the same weights (`train fit --init`): means of other networks are useless.
+    #[arg(long, value_name = "RUN")]
+    average: Vec<PathBuf>,
     /// Crop that the exported network is for, by any name of its species; may be given several times. The network must take the crop as
     /// an input. Without it, or with auto, the exported network labels every crop species as crop.
     #[arg(long = "crop", value_name = "NAME")]
@@ -43,7 +48,7 @@ enum Format {
 
 /// Writes the network.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let trained = exported(TrainedModel::open(&args.run)?, &args.crops)?;
+    let trained = exported(average(TrainedModel::open(&args.run)?, &args.average)?, &args.crops)?;
     let usual = match args.format {
         Format::Onnx => "network.onnx",
         Format::Torchscript => "network.pt",
