@@ -33,7 +33,9 @@ pub(super) fn plants(field: &Field, items: &[Item<'_>]) -> Text {
     let written: Vec<Text> = of.par_iter().map(|(number, items)| plant(field, *number, items)).collect();
     let mut text = Text::at(1);
     text.open("Xform", "plants", &["kind = \"group\"".into()]);
-    written.iter().for_each(|plant| text.append(plant));
+    for plant in &written {
+        text.append(plant);
+    }
     text.close();
     text
 }
@@ -53,7 +55,9 @@ pub(super) fn others(field: &Field, items: &[Item<'_>]) -> Text {
             items.into_iter().map(|item| (names.unique(kind_name(field, item.kind)), item)).collect();
         let written: Vec<Text> = named.par_iter().map(|(name, item)| mesh(field, name, **item, None, 2)).collect();
         text.open("Xform", name, &["kind = \"component\"".into()]);
-        written.iter().for_each(|mesh| text.append(mesh));
+        for mesh in &written {
+            text.append(mesh);
+        }
         text.close();
     }
     text

@@ -22,7 +22,9 @@ impl Text {
         let mut text = Self { out: "#usda 1.0\n".into(), depth: 0 };
         text.line("(");
         text.depth += 1;
-        metadata.iter().for_each(|line| text.line(line));
+        for line in metadata {
+            text.line(line);
+        }
         text.depth -= 1;
         text.line(")");
         text
@@ -81,7 +83,9 @@ impl Text {
         }
         self.line(format_args!("{line} ("));
         self.depth += 1;
-        metadata.iter().for_each(|line| self.line(line));
+        for line in metadata {
+            self.line(line);
+        }
         self.depth -= 1;
         self.line(")");
     }
@@ -97,7 +101,10 @@ pub(super) fn quoted(text: &str) -> String {
             '\n' => out += "\\n",
             '\r' => out += "\\r",
             '\t' => out += "\\t",
-            c if c.is_ascii_control() => out += &format!("\\x{:02x}", u32::from(c)),
+            c if c.is_ascii_control() => {
+                // Writing to a string cannot fail.
+                let _ = write!(out, "\\x{:02x}", u32::from(c));
+            }
             c => out.push(c),
         }
     }
