@@ -80,9 +80,6 @@ impl std::fmt::Display for Destination {
     }
 }
 
-/// Polling interval for a running command.
-const EVERY: Duration = Duration::from_millis(20);
-
 /// Returns the names of the units whose local files were removed after they were pushed.
 pub(crate) fn freed(set: &Set) -> BTreeSet<String> {
     let Ok(entries) = std::fs::read_dir(set.folder.join("pushed")) else { return BTreeSet::new() };
@@ -183,7 +180,7 @@ impl Push {
             }
             let until = Instant::now() + pause;
             while Instant::now() < until && !stop.load(Ordering::Relaxed) {
-                std::thread::sleep(EVERY);
+                std::thread::sleep(process::EVERY);
             }
             pause *= 4;
         }

@@ -1,6 +1,5 @@
 //! One process with a time limit, which ends with its children when the run is stopped.
 
-use super::EVERY;
 use furrow_base::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -9,6 +8,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// Polling interval for a running process, and for a stop.
+pub(super) const EVERY: Duration = Duration::from_millis(20);
 
 /// When a process is ended.
 pub(super) struct Limits<'a> {
