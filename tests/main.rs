@@ -110,6 +110,6 @@ mod stream;
 mod table;
 mod technique;
 mod textures;
-#[cfg(unix)]
 mod usd;
+#[cfg(unix)]
 mod watch;

@@ -45,10 +45,12 @@ def distribute(
     """Render a dataset that `trace dataset plan` made on the workers of `executor`, then write the files of the whole.
 
     Workers need the package and the same `folder`. `threads` is the number of threads of a worker, 0 for all cores. A shard
-    that is interrupted, or whose disk fails, is submitted up to `tries` times. Images that are complete are kept, so a call after
-    any failure renders the rest.
+    that is interrupted, or whose disk fails, is submitted up to `tries` times; other errors are raised at once. Images that are
+    complete are kept, so a call after any failure renders the rest.
     """
-    place = os.path.abspath(folder)
+    if shards < 1 or tries < 1 or threads < 0:
+        raise ValueError("shards and tries are at least 1, threads at least 0")
+    place = os.path.abspath(os.fspath(folder))
 
     def submit(shard: int) -> Task:
         return executor.submit(render_shard, place, shard, shards, threads)

@@ -98,7 +98,16 @@ impl FileSet {
 
     /// Adds one of thousands of files: it is flushed in [`finish`](Self::finish), together with others.
     pub fn add_unflushed(&mut self, path: &Path, bytes: &[u8]) -> Result<()> {
-        self.add_written(path, |path| unflushed(path, |file| file.write_all(bytes).map_err(Error::io(path))))?;
+        self.add_streamed(path, |file| file.write_all(bytes).map_err(Error::io(path)))
+    }
+
+    /// Adds a file that `write` writes in pieces. It is flushed in [`finish`](Self::finish), together with others.
+    pub fn add_streamed(
+        &mut self,
+        path: &Path,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> Result<()>,
+    ) -> Result<()> {
+        self.add_written(path, |path| unflushed(path, write))?;
         self.unflushed.push(self.waiting.len() - 1);
         Ok(())
     }

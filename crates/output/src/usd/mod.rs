@@ -22,11 +22,12 @@ mod skeleton;
 mod stage;
 mod text;
 
-use super::appearance::{Strength, Surfaces};
+use super::appearance::{Appearance, Strength, Surfaces};
 use super::{Export, unsupported, write_together};
-use furrow_base::Result;
+use furrow_base::{Error, Result};
 use furrow_field::Field;
 use parts::Item;
+use std::io::Write;
 use std::path::Path;
 use text::{Text, quoted};
 
@@ -35,43 +36,56 @@ const LAYERS: [&str; 3] = ["plants.usda", "ground.usda", "materials.usda"];
 
 /// Writes a field into `folder`. Leaves and stems with joints get skeletons. `scene.usda` is written last.
 pub fn write(folder: &Path, field: &Field) -> Result<Export> {
-    let (files, warnings) = encode(field)?;
-    let paths = write_together(folder, |together| {
-        files.iter().try_for_each(|(name, bytes)| together.add_unflushed(&folder.join(name), bytes))
-    })?;
-    Ok(Export { paths, warnings, amount: None })
-}
-
-/// Files of the export: path in the folder, and content.
-type Files = Vec<(String, Vec<u8>)>;
-
-/// Returns the files of a field, and warnings about the features that they cannot represent.
-fn encode(field: &Field) -> Result<(Files, Vec<String>)> {
     let scene = &field.scene;
     let mut surfaces = Surfaces::new(scene, Strength::InImages);
     // Parts without triangles are omitted.
     let parts = scene.parts.iter().zip(&field.kinds).filter(|(part, _)| !part.mesh.triangles.is_empty());
     let items: Vec<Item<'_>> =
         parts.map(|(part, kind)| Item { part, kind: *kind, material: surfaces.add(part) }).collect();
-    let appearance = surfaces.draw()?;
-    let materials = material::scope(&appearance.surfaces, &appearance.images);
-    let transmits = appearance.surfaces.iter().any(|surface| surface.factors.share > 0.0);
-    let images = appearance.images.into_iter().enumerate();
-    let mut files: Files = images.map(|(k, image)| (material::file(k, &image), image.bytes)).collect();
-    for (name, prims) in LAYERS.into_iter().zip([parts::plants(field, &items), parts::others(field, &items), materials])
-    {
-        files.push((name.to_owned(), layer(field, &[], &prims)));
-    }
-    let mut prims = Text::at(1);
-    stage::camera(scene, &mut prims);
-    let sky = stage::lights(scene, &mut prims)?;
-    files.extend(sky.map(|bytes| (stage::SKY.to_owned(), bytes)));
-    files.push(("scene.usda".to_owned(), layer(field, &LAYERS, &prims)));
-    Ok((files, warnings(field, transmits)))
+    let Appearance { images, surfaces } = surfaces.draw()?;
+    let mut stage = Text::at(1);
+    stage::camera(scene, &mut stage);
+    let sky = stage::lights(scene, &mut stage)?;
+    let paths = write_together(folder, |together| {
+        for (k, image) in images.iter().enumerate() {
+            together.add_unflushed(&folder.join(material::file(k, image)), &image.bytes)?;
+        }
+        if let Some(sky) = &sky {
+            together.add_unflushed(&folder.join(stage::SKY), sky)?;
+        }
+        let [plants, ground, materials] = LAYERS;
+        let mut add = |name, layers: &[&str], prims: &dyn Fn(&mut Layer<'_>) -> Result<()>| {
+            let path = folder.join(name);
+            together.add_streamed(&path, |out| layer(field, layers, &mut Layer { out, path: &path }, prims))
+        };
+        add(plants, &[], &|layer| parts::plants(field, &items, layer))?;
+        add(ground, &[], &|layer| parts::others(field, &items, layer))?;
+        add(materials, &[], &|layer| layer.add(&material::scope(&surfaces, &images)))?;
+        add("scene.usda", &LAYERS, &|layer| layer.add(&stage))
+    })?;
+    let transmits = surfaces.iter().any(|surface| surface.factors.share > 0.0);
+    Ok(Export { paths, warnings: warnings(field, transmits), amount: None })
 }
 
-/// Returns a layer with these prims below `/field`.
-fn layer(field: &Field, below: &[&str], prims: &Text) -> Vec<u8> {
+/// File of a layer. It is written in pieces: the text of a field takes gigabytes.
+struct Layer<'a> {
+    out: &'a mut (dyn Write + Send),
+    path: &'a Path,
+}
+
+impl Layer<'_> {
+    fn add(&mut self, text: &Text) -> Result<()> {
+        self.out.write_all(text.bytes()).map_err(Error::io(self.path))
+    }
+}
+
+/// Writes a layer with these prims below `/field`.
+fn layer(
+    field: &Field,
+    below: &[&str],
+    layer: &mut Layer<'_>,
+    prims: &dyn Fn(&mut Layer<'_>) -> Result<()>,
+) -> Result<()> {
     let mut metadata = vec![
         "customLayerData = {".to_owned(),
         format!("    string creator = {}", quoted(concat!("furrow ", env!("CARGO_PKG_VERSION")))),
@@ -85,11 +99,11 @@ fn layer(field: &Field, below: &[&str], prims: &Text) -> Vec<u8> {
         let names: Vec<String> = below.iter().map(|name| format!("@./{name}@")).collect();
         metadata.push(format!("subLayers = [{}]", names.join(", ")));
     }
-    let mut text = Text::layer(&metadata);
-    text.open("Xform", "field", &["kind = \"assembly\"".into()]);
-    text.append(prims);
-    text.close();
-    text.finish()
+    let mut head = Text::layer(&metadata);
+    head.open("Xform", "field", &["kind = \"assembly\"".into()]);
+    layer.add(&head)?;
+    prims(layer)?;
+    layer.add(&Text::end(0))
 }
 
 /// Returns warnings about features that the format cannot represent.

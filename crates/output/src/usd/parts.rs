@@ -1,8 +1,9 @@
 //! Plants, ground and other objects: one mesh for each part, with its labels.
 
-use super::material;
 use super::skeleton::Skeleton;
 use super::text::{Names, Text, integers, number, quoted, quoted_list, tuples};
+use super::{Layer, material};
+use furrow_base::Result;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{ToFloat, Vec3};
 use furrow_field::{Field, PartKind, PlantRecord};
@@ -23,26 +24,21 @@ pub(super) struct Item<'a> {
 /// Semantic labels: the kind of label, and the label.
 type Labels = Vec<(&'static str, String)>;
 
-/// Returns the plants with their parts, in the order of their numbers.
-pub(super) fn plants(field: &Field, items: &[Item<'_>]) -> Text {
+/// Number of prims whose text is made at once, on all threads.
+const AT_ONCE: usize = 64;
+
+/// Writes the plants with their parts, in the order of their numbers.
+pub(super) fn plants(field: &Field, items: &[Item<'_>], layer: &mut Layer<'_>) -> Result<()> {
     let mut of: BTreeMap<u32, Vec<Item<'_>>> = BTreeMap::new();
     for item in items.iter().filter(|item| item.part.tag.plant > 0) {
         of.entry(item.part.tag.plant).or_default().push(*item);
     }
     let of: Vec<(u32, Vec<Item<'_>>)> = of.into_iter().collect();
-    let written: Vec<Text> = of.par_iter().map(|(number, items)| plant(field, *number, items)).collect();
-    let mut text = Text::at(1);
-    text.open("Xform", "plants", &["kind = \"group\"".into()]);
-    for plant in &written {
-        text.append(plant);
-    }
-    text.close();
-    text
+    group("plants", "group", &of, layer, |(number, items)| plant(field, *number, items))
 }
 
-/// Returns the parts that belong to no plant: `ground` with soil, stones and litter, and `objects` with all others.
-pub(super) fn others(field: &Field, items: &[Item<'_>]) -> Text {
-    let mut text = Text::at(1);
+/// Writes the parts that belong to no plant: `ground` with soil, stones and litter, and `objects` with all others.
+pub(super) fn others(field: &Field, items: &[Item<'_>], layer: &mut Layer<'_>) -> Result<()> {
     let is_ground = |item: &&Item<'_>| matches!(item.kind, PartKind::Soil | PartKind::Debris(_));
     let (ground, objects): (Vec<&Item<'_>>, Vec<&Item<'_>>) =
         items.iter().filter(|item| item.part.tag.plant == 0).partition(is_ground);
@@ -53,14 +49,27 @@ pub(super) fn others(field: &Field, items: &[Item<'_>]) -> Text {
         let mut names = Names::default();
         let named: Vec<(String, &Item<'_>)> =
             items.into_iter().map(|item| (names.unique(kind_name(field, item.kind)), item)).collect();
-        let written: Vec<Text> = named.par_iter().map(|(name, item)| mesh(field, name, **item, None, 2)).collect();
-        text.open("Xform", name, &["kind = \"component\"".into()]);
-        for mesh in &written {
-            text.append(mesh);
-        }
-        text.close();
+        group(name, "component", &named, layer, |(name, item)| mesh(field, name, **item, None, 2))?;
     }
-    text
+    Ok(())
+}
+
+/// Writes a prim below `/field` with the texts of `items` in it.
+fn group<T: Sync>(
+    name: &str,
+    kind: &str,
+    items: &[T],
+    layer: &mut Layer<'_>,
+    text: impl Fn(&T) -> Text + Sync,
+) -> Result<()> {
+    let mut head = Text::at(1);
+    head.open("Xform", name, &[format!("kind = {}", quoted(kind))]);
+    layer.add(&head)?;
+    for items in items.chunks(AT_ONCE) {
+        let texts: Vec<Text> = items.par_iter().map(&text).collect();
+        texts.iter().try_for_each(|text| layer.add(text))?;
+    }
+    layer.add(&Text::end(1))
 }
 
 /// Returns one plant. With joints it is a `SkelRoot`.

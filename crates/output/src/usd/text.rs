@@ -35,6 +35,13 @@ impl Text {
         Self { out: String::new(), depth }
     }
 
+    /// Returns the end of a prim that is `depth` levels below the root of its layer.
+    pub(super) fn end(depth: usize) -> Self {
+        let mut text = Self::at(depth);
+        text.line("}");
+        text
+    }
+
     /// Begins a prim with a type, a name and metadata.
     pub(super) fn open(&mut self, kind: &str, name: &str, metadata: &[String]) {
         self.line_with(format_args!("def {kind} {}", quoted(name)), metadata);
@@ -72,8 +79,8 @@ impl Text {
     }
 
     /// Returns the text.
-    pub(super) fn finish(self) -> Vec<u8> {
-        self.out.into_bytes()
+    pub(super) fn bytes(&self) -> &[u8] {
+        self.out.as_bytes()
     }
 
     /// Adds a line with metadata, which begin on it: OpenUSD does not read them from the next line.
@@ -278,6 +285,7 @@ mod tests {
         text.close();
         let expected = "#usda 1.0\n(\n    upAxis = \"Z\"\n)\ndef Xform \"field\"\n{\n    def Mesh \"leaf_1\" (\n        \
                         kind = \"component\"\n    )\n    {\n        int a = 1\n    }\n}\n";
-        assert_eq!(String::from_utf8(text.finish()).unwrap(), expected);
+        assert_eq!(text.out, expected);
+        assert_eq!(Text::end(1).bytes(), b"    }\n");
     }
 }
