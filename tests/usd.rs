@@ -9,7 +9,6 @@ use crate::common::program::{SMALL, names, scratch, trace};
 use crate::common::python::{ask, python};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// Succeeds if the client is installed.
 const PROBE: &str = "from pxr import UsdSemantics, UsdSkel, UsdValidation; import numpy, OpenEXR";
@@ -60,7 +59,6 @@ fn the_client_finds_each_damage() {
     let Some(python) = python(PROBE) else { return };
     let (keep, _) = scratch();
     let [usd, glb] = both(SMALL, &["--skins"], keep.path());
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/usd/check.py");
     let damages = [
         ("plants.usda", "labels:class = [\"crop\"]", "labels:class = [\"weed\"]"),
         ("plants.usda", "semantics:labels:leaf = [\"1\"]", "semantics:labels:leaf = [\"2\"]"),
@@ -83,17 +81,9 @@ fn the_client_finds_each_damage() {
         ("scene.usda", "(0, -1, 0, 0)", "(0, 1, 0, 0)"),
         ("scene.usda", "upAxis = \"Z\"", "upAxis = \"Y\""),
     ];
-    for (name, from, to) in damages {
-        let path = Path::new(&usd).join(name);
-        let whole = fs::read_to_string(&path).unwrap();
-        let damaged = whole.replacen(from, to, 1);
-        assert_ne!(damaged, whole, "{name} has no `{from}`");
-        fs::write(&path, damaged).unwrap();
-        let answer = Command::new(&python).arg(&script).args([&usd, &glb]).output().unwrap();
-        assert!(!answer.status.success(), "{name}: `{to}` is accepted");
-        fs::write(&path, whole).unwrap();
-    }
-    ask(&python, "usd/check.py", &[&usd, &glb]);
+    let damages = damages.iter().flat_map(|(name, from, to)| [*name, *from, *to]);
+    let arguments: Vec<&str> = [&*usd, &*glb].into_iter().chain(damages).collect();
+    ask(&python, "usd/check.py", &arguments);
 }
 
 /// Expected: the same files whatever the number of threads, each in its place; a warning names what is lost.

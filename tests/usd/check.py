@@ -1,8 +1,12 @@
-"""Opens USD/scene.usda with usd-core 26.11 and compares it with SCENE.glb of the same field: meshes, labels, materials, camera, lights, skeletons."""
+"""Opens USD/scene.usda with usd-core 26.11 and compares it with SCENE.glb of the same field: meshes, labels, materials, camera, lights, skeletons.
+
+Arguments: both, then file, text and other text of each damage that the comparison must find.
+"""
 
 import collections
 import json
 import math
+import os
 import struct
 import sys
 from pathlib import Path
@@ -296,21 +300,49 @@ def check_skeletons(stage, plants):
     return worst
 
 
+def check(folder, glb):
+    """Compares the export with the GLB, and returns a summary."""
+    stage = Usd.Stage.Open(str(folder / "scene.usda"))
+    assert stage.GetDefaultPrim().GetPath() == "/field"
+    assert UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 1
+    data = stage.GetRootLayer().customLayerData
+    assert data["provenance"] == glb.document["asset"]["extras"]["provenance"] and data["creator"] == glb.document["asset"]["generator"]
+    prims, plants = check_meshes(stage, glb)
+    check_camera(stage, glb)
+    total, sun = check_lights(stage, glb)
+    lamps = any(prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight) for prim in stage.Traverse())
+    domes = any(prim.IsA(UsdLux.DomeLight) for prim in stage.Traverse())
+    if domes and not lamps:
+        white = check_sky(stage, total, sun)
+        assert abs(white - 1) < 0.01, white
+    errors = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators()).Validate(stage)
+    assert not errors, [error.GetErrorAsString() for error in errors]
+    rest = check_skeletons(stage, plants) if "skins" in glb.document else 0
+    return (f"usd: {len(prims)} meshes of {len(plants)} plants agree with the GLB, at rest within {rest:.1e} m")
+
+
+def is_found(folder, glb, name, before, after):
+    """Returns whether the check fails if a piece of a file is replaced. In a process of its own, because OpenUSD keeps layers."""
+    file = folder / name
+    whole = file.read_text()
+    damaged = whole.replace(before, after, 1)
+    assert damaged != whole, f"{name} has no `{before}`"
+    child = os.fork()
+    if child == 0:
+        file.write_text(damaged)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        try:
+            check(folder, glb)
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    file.write_text(whole)
+    return code != 0
+
+
 folder, glb = Path(sys.argv[1]), Glb(sys.argv[2])
-stage = Usd.Stage.Open(str(folder / "scene.usda"))
-assert stage.GetDefaultPrim().GetPath() == "/field"
-assert UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 1
-data = stage.GetRootLayer().customLayerData
-assert data["provenance"] == glb.document["asset"]["extras"]["provenance"] and data["creator"] == glb.document["asset"]["generator"]
-prims, plants = check_meshes(stage, glb)
-check_camera(stage, glb)
-total, sun = check_lights(stage, glb)
-lamps = any(prim.IsA(UsdLux.RectLight) or prim.IsA(UsdLux.DiskLight) for prim in stage.Traverse())
-domes = any(prim.IsA(UsdLux.DomeLight) for prim in stage.Traverse())
-if domes and not lamps:
-    white = check_sky(stage, total, sun)
-    assert abs(white - 1) < 0.01, white
-errors = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators()).Validate(stage)
-assert not errors, [error.GetErrorAsString() for error in errors]
-rest = check_skeletons(stage, plants) if "skins" in glb.document else 0
-print(f"usd: {len(prims)} meshes of {len(plants)} plants agree with the GLB, at rest within {rest:.1e} m")
+damages = sys.argv[3:]
+for damage in zip(*[iter(damages)] * 3):
+    assert is_found(folder, glb, *damage), f"{damage} is accepted"
+print(check(folder, glb))
