@@ -187,6 +187,21 @@ fn classes_and_limits_may_be_asked_for_later_and_are_counted() {
     same(&tree(&late), &tree(&early));
 }
 
+/// Rationale: masks and boxes of whole plants come from the renderer, so that new classes render the images again.
+/// Expected: all files but the timing log are as if the classes had been given at the start, and none is left over.
+#[test]
+fn masks_and_boxes_of_whole_plants_follow_later_classes() {
+    let (_keep, late) = scratch();
+    let (_keep, early) = scratch();
+    let formats = ["--format", "amodal,bop,coco,kitti"];
+    let labels = ["--classes", "soil; CHEAL; beet=BEAVX", "--min-pixels", "60"];
+    succeed(make(&late, "2", &formats));
+    succeed(verb("finish", &late, &labels));
+    succeed(make(&early, "2", &[&formats[..], &labels].concat()));
+    same(&tree(&late), &tree(&early));
+    succeed(verb("verify", &late, &["--quiet"]));
+}
+
 #[test]
 fn what_a_set_does_not_have_is_refused_with_nothing_changed() {
     let (_keep, data) = scratch();

@@ -29,7 +29,10 @@ class Executor(Protocol):
 
 def _run(*words: str) -> None:
     path = program()
-    made = subprocess.run([path, *words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    try:
+        made = subprocess.run([path, *words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    except OSError as error:
+        raise FurrowError(f"{path}: {error}", "missing") from error
     if made.returncode != 0:
         raise ended(f"{path} {' '.join(words)}", made.returncode, made.stderr.decode(errors="replace"))
 
@@ -50,13 +53,15 @@ def distribute(
     """
     if shards < 1 or tries < 1 or threads < 0:
         raise ValueError("shards and tries are at least 1, threads at least 0")
-    place = os.path.abspath(os.fspath(folder))
+    place = os.path.abspath(os.fsdecode(folder))
 
     def submit(shard: int) -> Task:
         return executor.submit(render_shard, place, shard, shards, threads)
 
-    tasks: Dict[int, Task] = {shard: submit(shard) for shard in range(shards)}
+    tasks: Dict[int, Task] = {}
     try:
+        for shard in range(shards):
+            tasks[shard] = submit(shard)
         for shard in range(shards):
             for left in reversed(range(tries)):
                 try:

@@ -3,11 +3,13 @@
 Arguments: the program `trace`, a scene file, an empty folder.
 """
 
+import http.server
 import json
 import logging
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 # Requests from the fifth on must be signed with a key that may do what they ask; the first four make the key and the bucket.
@@ -89,10 +91,34 @@ client("iam", key, secret).put_role_policy(RoleName="night", PolicyName="all", P
 lent = client("sts", key, secret).assume_role(RoleArn=role, RoleSessionName="night")["Credentials"]
 names = {"AWS_ACCESS_KEY_ID": "AccessKeyId", "AWS_SESSION_TOKEN": "SessionToken"}
 temporary = {variable: lent[name] for variable, name in names.items()}
-(data / "pushed/000001.json").unlink()
+# Another address gets everything.
 run(*order, "--push", "s3://fields/again", code=0, secret=lent["SecretAccessKey"], **temporary)
-assert bucket.list_objects_v2(Bucket="fields", Prefix="again/images/000001/")["KeyCount"] > 5
+assert bucket.list_objects_v2(Bucket="fields", Prefix="again/")["KeyCount"] == len(there)
 
 # A second run pushes nothing: it succeeds with a store that refuses everything.
-run(*order, "--push", f"s3://fields/{prefix}", *once, code=0, AWS_ENDPOINT_URL_S3="http://127.0.0.1:9")
+run(*order, "--push", "s3://fields/again", *once, code=0, AWS_ENDPOINT_URL_S3="http://127.0.0.1:9")
+
+
+# A redirect stores nothing, and no other protocol is used, whatever the endpoint says.
+class Redirect(http.server.BaseHTTPRequestHandler):
+    def do_PUT(self):
+        self.rfile.read(int(self.headers["Content-Length"]))
+        self.send_response(301)
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    def log_message(self, *words):
+        pass
+
+
+elsewhere = http.server.HTTPServer(("127.0.0.1", 0), Redirect)
+threading.Thread(target=elsewhere.serve_forever, daemon=True).start()
+wrong = f"http://127.0.0.1:{elsewhere.server_port}"
+moved = run(*order, "--push", "s3://fields/moved", *once, "--push-free", code=1, AWS_ENDPOINT_URL_S3=wrong)
+assert "status 301" in moved and (data / "images/000000/rgb.png").is_file(), moved
+for other in ("ftp://127.0.0.1", "file:///tmp", "127.0.0.1:9"):
+    assert "no address of http" in run(*order, "--push", "s3://fields/x", code=2, AWS_ENDPOINT_URL_S3=other)
+# What was removed after a push cannot be pushed elsewhere.
+run(*order, "--push", "s3://fields/again", "--push-free", code=0)
+assert "was pushed to s3://fields/again and removed here" in run(*order, "--push", "s3://fields/other", *once, code=2)
 server.stop()

@@ -20,6 +20,7 @@ use crate::read::packs::Packing;
 use crate::read::set::Set;
 use crate::{File, format};
 use furrow_base::error::Kind;
+use furrow_base::input::below;
 use furrow_base::math::{RoundTo, ToFloat, ToInt};
 use furrow_base::{Error, Result};
 use furrow_field::assemble::BuildProgress;
@@ -29,6 +30,7 @@ use furrow_job::{Renderer, ResultOrder, SceneFile, Schedule, Threads};
 use furrow_render::render::RenderMonitor;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -390,7 +392,8 @@ impl Run<'_> {
         if self.callbacks.now.load(Ordering::Relaxed) {
             return Err(Error::interrupted());
         }
-        let before = if task == Task::Formats { ChecksumRecord::read(folder, index) } else { None };
+        let old = ChecksumRecord::read(folder, index);
+        let before = old.clone().filter(|_| task == Task::Formats);
         let mut there = before.as_ref().map(|before| before.files.clone()).unwrap_or_default();
         there.extend(self.of_first_light(index));
         there.retain(|path, _| native::is_native(path));
@@ -405,10 +408,29 @@ impl Run<'_> {
             checksums.files.extend(before.files.into_iter().filter(|(path, _)| kept(path)));
         }
         checksums.write(folder)?;
+        if let Some(old) = old {
+            self.remove_stale(&old, &checksums)?;
+        }
         self.profiler.enter(Phase::Other);
         let seconds = self.tell_time(begin, times.grow);
         let hash = checksums.image_hash()?;
         self.timing_log.add(&Row::Image(ImageTiming::new(index, hash, seconds, &times, self.at_once, self.threads)))
+    }
+
+    /// Removes the files of formats that an image had and no longer has, such as masks of plants below a new limit.
+    fn remove_stale(&self, old: &ChecksumRecord, new: &ChecksumRecord) -> Result<()> {
+        let Set { folder, recipe, .. } = self.set;
+        let is_stale = |path: &&String| {
+            !new.files.contains_key(*path) && recipe.formats.iter().any(|format| in_format(path, format))
+        };
+        for path in old.files.keys().filter(is_stale) {
+            let path = below(folder, path)?;
+            match std::fs::remove_file(&path) {
+                Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::io(&path)(e)),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Returns the files of the image that shows the same view under the field's own light; none if it is this image or does not

@@ -45,6 +45,10 @@ pub(crate) fn remaining(set: &Set, checksums: &ChecksumRecord) -> Result<Task> {
     let other_labels = checksums.labelling != set.recipe.labelling.fingerprint()?;
     let mut task = if other_labels { Task::Formats } else { Task::Done };
     for (name, format) in format::all(&set.recipe)? {
+        // Their labels come from what only the renderer has, so they cannot be written again from the image's files.
+        if other_labels && (format.needs_masks() || format.needs_boxes()) {
+            return Ok(Task::All);
+        }
         if format.has_images(&set.recipe) && !checksums.files.keys().any(|path| in_format(path, name)) {
             if format.needs_film() {
                 return Ok(Task::All);

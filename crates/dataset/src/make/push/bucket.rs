@@ -8,7 +8,7 @@
 //! Source: Amazon S3 API Reference, "PutObject" and "Authenticating Requests"; `curl --help aws-sigv4`.
 
 use super::credentials::Credentials;
-use super::process::{self, Failure, Limits};
+use super::process::{self, Ended, Limits};
 use crate::read::checksum::Checksum;
 use furrow_base::input::below;
 use furrow_base::{Error, Result};
@@ -28,8 +28,10 @@ pub struct Bucket {
 const MOST_BYTES: u64 = 5 << 30;
 /// Oldest version of `curl` that signs the hash of the contents, tested.
 const OLDEST_CURL: (u32, u32) = (7, 88);
-/// Begin of the line in which `curl` reports the name of a file that failed.
-const FAILED: &str = "furrow: failed: ";
+/// Begin of the line in which `curl` reports the HTTP status and the name of each file.
+const STATUS: &str = "furrow: ";
+/// Longest answer of a store in an error, characters.
+const SHOWN: usize = 300;
 
 /// Returns the address of a bucket without its scheme, or `None` for any other text.
 pub(super) fn address(text: &str) -> Option<&str> {
@@ -69,6 +71,7 @@ impl Bucket {
     /// Fails if there are no access keys, or no `curl` that can sign requests.
     pub(super) fn check_machine() -> Result<()> {
         Credentials::find(&variable)?;
+        Place::of("bucket", &variable)?;
         let needs = format!("install curl {}.{} or newer, or give --push a command", OLDEST_CURL.0, OLDEST_CURL.1);
         let Ok(printed) = Command::new("curl").arg("--version").output() else {
             return Err(Error::misuse("--push to s3 needs the program curl").help(needs));
@@ -84,7 +87,7 @@ impl Bucket {
 
     /// Uploads files of a folder once. Returns a description of the failure if one fails.
     pub(super) fn send(&self, folder: &Path, files: &[String], limits: &Limits<'_>) -> Result<Option<String>> {
-        let place = Place::of(&self.name, &variable);
+        let place = Place::of(&self.name, &variable)?;
         let credentials = Credentials::find(&variable)?;
         let mut orders = Vec::new();
         for file in files {
@@ -104,8 +107,10 @@ impl Bucket {
         let mut curl = Command::new("curl");
         // `--disable`, which must come first: no ~/.curlrc changes what is sent.
         curl.args(["--disable", "--silent", "--show-error", "--fail-early", "--config", "-"]);
-        let failure = process::run(&mut curl, orders.join("next\n").as_bytes(), limits)?;
-        Ok(failure.map(|failure| self.describe(&failure)))
+        let ended = process::run(&mut curl, orders.join("next\n").as_bytes(), limits)?;
+        // curl takes a redirect for success.
+        let is_stored = ended.output.lines().filter(|line| line.starts_with("furrow: 2")).count() == files.len();
+        Ok((ended.failure.is_some() || !is_stored).then(|| self.describe(&ended)))
     }
 
     /// Returns the part of curl's configuration that uploads one file.
@@ -124,8 +129,8 @@ impl Bucket {
             say("header", &format!("x-amz-security-token: {token}"));
         }
         say("connect-timeout", "60");
-        say("proto", "http,https");
-        say("write-out", &format!("%{{onerror}}\n{FAILED}{}\n", self.key(file).replace('%', "%%")));
+        say("proto", "=http,https");
+        say("write-out", &format!("\n{STATUS}%{{http_code}} {}\n", self.key(file).replace('%', "%%")));
         order + "fail-with-body\ngloboff\n"
     }
 
@@ -135,18 +140,24 @@ impl Bucket {
     }
 
     /// Describes a failure with what the store answered, or else with curl's message.
-    fn describe(&self, Failure { how, timed_out, output }: &Failure) -> String {
-        let key = output.lines().find_map(|line| line.strip_prefix(FAILED));
-        let place = key.map_or_else(|| self.to_string(), |key| format!("s3://{}/{key}", self.name));
+    fn describe(&self, Ended { failure, timed_out, output }: &Ended) -> String {
+        let statuses = output.lines().filter_map(|line| line.strip_prefix(STATUS)?.split_once(' '));
+        let failed = statuses.rev().find(|(status, _)| !status.starts_with('2'));
+        let place = failed.map_or_else(|| self.to_string(), |(_, key)| format!("s3://{}/{key}", self.name));
+        let how = failure.as_deref().unwrap_or("was not stored");
         if *timed_out {
             return format!("the upload to {place} {how}");
         }
-        let message = || output.lines().rev().find_map(|line| line.strip_prefix("curl: ")).unwrap_or(how);
-        match (element(output, "Code"), element(output, "Message")) {
-            (Some(code), Some(message)) => format!("{place}: {code}: {message}"),
-            (Some(code), None) => format!("{place}: {code}"),
-            _ => format!("{place}: {}", message()),
-        }
+        let message = output.lines().rev().find_map(|line| line.strip_prefix("curl: "));
+        let words = match (element(output, "Code"), element(output, "Message"), failed) {
+            (Some(code), Some(message), _) => format!("{code}: {message}"),
+            (Some(code), None, _) => code.to_owned(),
+            (.., Some((status, _))) if message.is_none() => format!("the store answered with status {status}"),
+            _ => message.unwrap_or(how).to_owned(),
+        };
+        // The answer of a store is not to be trusted with a terminal.
+        let plain: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).take(SHOWN).collect();
+        format!("{place}: {plain}")
     }
 }
 
@@ -167,16 +178,23 @@ struct Place {
 impl Place {
     /// Returns the place of a bucket by the variables that Amazon's programs know: `AWS_REGION`, `AWS_DEFAULT_REGION`,
     /// `AWS_ENDPOINT_URL_S3`, `AWS_ENDPOINT_URL`. Without a region, it is us-east-1.
-    fn of(bucket: &str, variable: &dyn Fn(&str) -> Option<String>) -> Self {
+    fn of(bucket: &str, variable: &dyn Fn(&str) -> Option<String>) -> Result<Self> {
         let first = |names: [&str; 2]| names.into_iter().find_map(variable);
         let region = first(["AWS_REGION", "AWS_DEFAULT_REGION"]).unwrap_or_else(|| "us-east-1".into());
-        let address = match first(["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL"]) {
+        let endpoint = first(["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL"]);
+        if let Some(endpoint) = &endpoint
+            && !["http://", "https://"].iter().any(|scheme| endpoint.starts_with(scheme))
+        {
+            return Err(Error::misuse(format!("the endpoint `{endpoint}` is no address of http or https"))
+                .help("export AWS_ENDPOINT_URL=https://HOST, or leave it out for Amazon's own"));
+        }
+        let address = match endpoint {
             Some(endpoint) => format!("{}/{bucket}", endpoint.trim_end_matches('/')),
             // A certificate for *.s3.… does not cover names with dots.
             None if bucket.contains('.') => format!("https://s3.{region}.amazonaws.com/{bucket}"),
             None => format!("https://{bucket}.s3.{region}.amazonaws.com"),
         };
-        Self { region, address }
+        Ok(Self { region, address })
     }
 }
 
@@ -233,6 +251,7 @@ mod tests {
     fn buckets_are_reached_by_region_or_endpoint() {
         let place = |bucket: &str, variables: &[(&str, &str)]| {
             Place::of(bucket, &|name| variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).into()))
+                .unwrap()
         };
         let of = |region: &str, address: &str| Place { region: region.into(), address: address.into() };
         assert_eq!(place("abc", &[]), of("us-east-1", "https://abc.s3.us-east-1.amazonaws.com"));
@@ -257,14 +276,19 @@ mod tests {
     #[test]
     fn failures_say_what_the_store_answered() {
         let bucket = Bucket { name: "abc".into(), prefix: "p".into() };
-        let failed = |output: &str, timed_out| {
-            bucket.describe(&Failure { how: "ended with 22".into(), timed_out, output: output.into() })
+        let failed = |output: &str, failure: Option<&str>, timed_out| {
+            bucket.describe(&Ended { failure: failure.map(str::to_owned), timed_out, output: output.into() })
         };
-        let answer = "<?xml?><Error><Code>NoSuchBucket</Code><Message>none</Message></Error>\nfurrow: failed: p/x.png\ncurl: (22) 404";
-        assert_eq!(failed(answer, false), "s3://abc/p/x.png: NoSuchBucket: none");
-        let lost = "curl: (6) Could not resolve host: h\n\nfurrow: failed: p/a\n";
-        assert_eq!(failed(lost, false), "s3://abc/p/a: (6) Could not resolve host: h");
-        assert_eq!(failed("", false), "s3://abc/p: ended with 22");
-        assert_eq!(failed("", true), "the upload to s3://abc/p ended with 22");
+        let answer =
+            "<Error><Code>NoSuch</Code><Message>no\u{1b}[31mne</Message></Error>\nfurrow: 404 p/x.png\ncurl: (22) 404";
+        assert_eq!(failed(answer, Some("ended with 22"), false), "s3://abc/p/x.png: NoSuch: no [31mne");
+        let lost = "curl: (6) Could not resolve host: h\n\nfurrow: 000 p/a\n";
+        assert_eq!(failed(lost, Some("ended with 6"), false), "s3://abc/p/a: (6) Could not resolve host: h");
+        assert_eq!(
+            failed("furrow: 200 p/a\n\nfurrow: 301 p/b\n", None, false),
+            "s3://abc/p/b: the store answered with status 301"
+        );
+        assert_eq!(failed("", Some("ended with 2"), false), "s3://abc/p: ended with 2");
+        assert_eq!(failed("", Some("took longer than 1 s"), true), "the upload to s3://abc/p took longer than 1 s");
     }
 }

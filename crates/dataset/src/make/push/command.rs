@@ -71,14 +71,10 @@ fn run(command: &str, dir: &Path, limits: &Limits<'_>) -> Result<Option<String>>
     let filled = filled(command, place);
     let mut shell = Command::new("sh");
     shell.arg("-c").arg(&filled);
-    let failure = process::run(&mut shell, b"", limits)?;
-    Ok(failure.map(|failure| {
-        let last = failure.output.trim().lines().last().unwrap_or("it printed nothing");
-        if failure.timed_out {
-            format!("`{filled}` {}", failure.how)
-        } else {
-            format!("`{filled}` {}: {last}", failure.how)
-        }
+    let ended = process::run(&mut shell, b"", limits)?;
+    Ok(ended.failure.map(|how| {
+        let last = ended.output.trim().lines().last().unwrap_or("it printed nothing");
+        if ended.timed_out { format!("`{filled}` {how}") } else { format!("`{filled}` {how}: {last}") }
     }))
 }
 

@@ -118,13 +118,23 @@ impl Push {
     /// Pushes a finished unit, unless it was already pushed with its current contents. Ignores unfinished units.
     pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: &AtomicBool) -> Result<()> {
         let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
-        let note = |freed| PushRecord { unit: unit.name(), sha256: hash.clone(), freed };
+        let to = match &self.to {
+            Destination::Bucket(bucket) => bucket.to_string(),
+            Destination::Command(_) => String::new(),
+        };
+        let note = |freed| PushRecord { unit: unit.name(), sha256: hash.clone(), freed, to: to.clone() };
         let path = unit.record_path(&set.folder);
         refuse_links(&set.folder, Path::new("pushed"))?;
+        let is_elsewhere = |note: &PushRecord| !note.to.is_empty() && !to.is_empty() && note.to != to;
         match unit.noted(set, &hash) {
+            Some(note) if note.freed && is_elsewhere(&note) => {
+                let what = format!("{} was pushed to {} and removed here", unit.name(), note.to);
+                let help = "give --push the same address, or make the dataset again in another folder";
+                return Err(Error::misuse(what).help(help).in_file(&set.folder));
+            }
             Some(PushRecord { freed: true, .. }) => return Ok(()),
-            Some(_) => {}
-            None => {
+            Some(note) if !is_elsewhere(&note) => {}
+            _ => {
                 match self.send(set, unit, &files, stop) {
                     // Another run may have pushed the unit in the meantime and removed its local files.
                     Err(e) if e.is_not_found() && unit.noted(set, &hash).is_some_and(|note| note.freed) => {

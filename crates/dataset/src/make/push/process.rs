@@ -20,21 +20,21 @@ pub(super) struct Limits<'a> {
     pub(super) stop: &'a AtomicBool,
 }
 
-/// Failure of a process.
-pub(super) struct Failure {
-    /// How it ended, as the rest of a sentence.
-    pub(super) how: String,
+/// How a process ended.
+pub(super) struct Ended {
+    /// Its failure, as the rest of a sentence; `None` for success.
+    pub(super) failure: Option<String>,
     pub(super) timed_out: bool,
     /// End of its output.
     pub(super) output: String,
 }
 
 /// Number of bytes at the end of a process's output that are kept.
-const MOST_OUTPUT: u64 = 4000;
+const MOST_OUTPUT: u64 = 1 << 20;
 
-/// Runs a process with this standard input. Returns its failure if it fails or exceeds the time limit. If the run is stopped, ends the
+/// Runs a process with this standard input until it ends or exceeds the time limit. If the run is stopped, ends the
 /// process and its children and returns an error.
-pub(super) fn run(command: &mut Command, input: &[u8], limits: &Limits<'_>) -> Result<Option<Failure>> {
+pub(super) fn run(command: &mut Command, input: &[u8], limits: &Limits<'_>) -> Result<Ended> {
     // Input and output are files, because a full pipe would block one of both sides. They have no name.
     let file = || tempfile::tempfile().map_err(Error::io(&std::env::temp_dir()));
     let (mut asked, mut captured) = (file()?, file()?);
@@ -61,20 +61,16 @@ pub(super) fn run(command: &mut Command, input: &[u8], limits: &Limits<'_>) -> R
         }
         std::thread::sleep(EVERY);
     };
-    if ended.is_some_and(|ended| ended.success()) {
-        return Ok(None);
-    }
     let mut text = Vec::new();
     let length = captured.stream_position().unwrap_or(0);
     let _ = captured.seek(SeekFrom::Start(length.saturating_sub(MOST_OUTPUT)));
     let _ = captured.take(MOST_OUTPUT).read_to_end(&mut text);
-    let how = match (ended, limits.timeout) {
-        (None, timeout) => format!("took longer than {} s", timeout.unwrap_or_default().as_secs()),
-        (Some(ended), _) => {
-            format!("ended with {}", ended.code().map_or("a signal".into(), |code| code.to_string()))
-        }
+    let failure = match ended {
+        None => Some(format!("took longer than {} s", limits.timeout.unwrap_or_default().as_secs())),
+        Some(ended) if ended.success() => None,
+        Some(ended) => Some(format!("ended with {}", ended.code().map_or("a signal".into(), |code| code.to_string()))),
     };
-    Ok(Some(Failure { how, timed_out, output: String::from_utf8_lossy(&text).into_owned() }))
+    Ok(Ended { failure, timed_out, output: String::from_utf8_lossy(&text).into_owned() })
 }
 
 /// Time between SIGTERM and SIGKILL for a command that is ended.

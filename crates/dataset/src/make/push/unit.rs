@@ -105,6 +105,9 @@ pub(super) struct PushRecord {
     pub(super) sha256: String,
     /// Whether its local files were removed.
     pub(super) freed: bool,
+    /// Address of the bucket; empty for a command, whose destination is not known.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) to: String,
 }
 
 /// Adds the paths of all files below the folder `within` of the dataset to `files`.
