@@ -16,6 +16,7 @@
 //!
 //! All layers are text: no crate that this compiler builds writes the binary form. `usdcat -o` converts them.
 
+mod layer;
 mod material;
 mod parts;
 mod skeleton;
@@ -24,10 +25,10 @@ mod text;
 
 use super::appearance::{Appearance, Strength, Surfaces};
 use super::{Export, unsupported, write_together};
-use furrow_base::{Error, Result};
+use furrow_base::Result;
 use furrow_field::Field;
+use layer::Layer;
 use parts::Item;
-use std::io::Write;
 use std::path::Path;
 use text::{Text, quoted};
 
@@ -56,7 +57,7 @@ pub fn write(folder: &Path, field: &Field) -> Result<Export> {
         let [plants, ground, materials] = LAYERS;
         let mut add = |name, layers: &[&str], prims: &dyn Fn(&mut Layer<'_>) -> Result<()>| {
             let path = folder.join(name);
-            together.add_streamed(&path, |out| layer(field, layers, &mut Layer { out, path: &path }, prims))
+            together.add_streamed(&path, |out| write_layer(field, layers, &mut Layer { out, path: &path }, prims))
         };
         add(plants, &[], &|layer| parts::plants(field, &items, layer))?;
         add(ground, &[], &|layer| parts::others(field, &items, layer))?;
@@ -67,20 +68,8 @@ pub fn write(folder: &Path, field: &Field) -> Result<Export> {
     Ok(Export { paths, warnings: warnings(field, transmits), amount: None })
 }
 
-/// File of a layer. It is written in pieces: the text of a field takes gigabytes.
-struct Layer<'a> {
-    out: &'a mut (dyn Write + Send),
-    path: &'a Path,
-}
-
-impl Layer<'_> {
-    fn add(&mut self, text: &Text) -> Result<()> {
-        self.out.write_all(text.bytes()).map_err(Error::io(self.path))
-    }
-}
-
 /// Writes a layer with these prims below `/field`.
-fn layer(
+fn write_layer(
     field: &Field,
     below: &[&str],
     layer: &mut Layer<'_>,

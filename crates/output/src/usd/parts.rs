@@ -1,8 +1,9 @@
 //! Plants, ground and other objects: one mesh for each part, with its labels.
 
+use super::layer::Layer;
+use super::material;
 use super::skeleton::Skeleton;
 use super::text::{Names, Text, integers, number, quoted, quoted_list, tuples};
-use super::{Layer, material};
 use furrow_base::Result;
 use furrow_base::geometry::Mesh;
 use furrow_base::math::{ToFloat, Vec3};
