@@ -7,6 +7,7 @@
 
 use crate::common::dataset::{fail, path, same, succeed, tree, verb};
 use crate::common::program::{SMALL, scratch, small_text, trace};
+use furrow_dataset::format::NAMES;
 use furrow_dataset::model::record::{Plant, Record};
 use furrow_dataset::model::sample::IGNORE;
 use furrow_dataset::read::native;
@@ -188,12 +189,14 @@ fn classes_and_limits_may_be_asked_for_later_and_are_counted() {
 }
 
 /// Rationale: masks and boxes of whole plants come from the renderer, so that new classes render the images again.
-/// Expected: all files but the timing log are as if the classes had been given at the start, and none is left over.
+/// Expected: in every format, all files but the timing log are as if the classes had been given at the start, and none
+/// is left over.
 #[test]
-fn masks_and_boxes_of_whole_plants_follow_later_classes() {
+fn every_format_follows_later_classes() {
     let (_keep, late) = scratch();
     let (_keep, early) = scratch();
-    let formats = ["--format", "amodal,bop,coco,kitti"];
+    let formats = NAMES.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(",");
+    let formats = ["--format", &formats];
     let labels = ["--classes", "soil; CHEAL; beet=BEAVX", "--min-pixels", "60"];
     succeed(make(&late, "2", &formats));
     succeed(verb("finish", &late, &labels));

@@ -116,5 +116,5 @@ fn a_wheel_takes_libtorch_of_the_package_torch() {
     assert!(code == Some(1) && words.contains("torch is 2.10.0, but train needs 2.11.0"), "{words}");
     fs::remove_dir_all(site.join("torch")).expect("a folder");
     let (code, words) = ran(&mut train(&["zoo"]));
-    assert!(code == Some(1) && words.contains("libtorch was not found: pip install torch"), "{words}");
+    assert!(code == Some(1) && words.contains("libtorch was not found: pip install torch==2.11.0"), "{words}");
 }

@@ -95,6 +95,14 @@ temporary = {variable: lent[name] for variable, name in names.items()}
 run(*order, "--push", "s3://fields/again", code=0, secret=lent["SecretAccessKey"], **temporary)
 assert bucket.list_objects_v2(Bucket="fields", Prefix="again/")["KeyCount"] == len(there)
 
+# A pack has more files in its formats than one process of curl uploads.
+packed = folder / "packed"
+many = [*order[:3], "8", *order[4:7], "1", "--format", "voc,kitti,yolo,yolo-detect,phenobench", "--pack", "8", "--quiet"]
+run(*many, "--out", str(packed), "--push", "s3://fields/packed", code=0)
+here = [path for path in packed.rglob("*") if path.is_file() and path.parent.name not in ("ledger", "pushed")]
+listed = bucket.list_objects_v2(Bucket="fields", Prefix="packed/")["KeyCount"]
+assert listed == len(here) > 80, (listed, len(here))
+
 # A second run pushes nothing: it succeeds with a store that refuses everything.
 run(*order, "--push", "s3://fields/again", *once, code=0, AWS_ENDPOINT_URL_S3="http://127.0.0.1:9")
 
@@ -118,7 +126,7 @@ moved = run(*order, "--push", "s3://fields/moved", *once, "--push-free", code=1,
 assert "status 301" in moved and (data / "images/000000/rgb.png").is_file(), moved
 for other in ("ftp://127.0.0.1", "file:///tmp", "127.0.0.1:9"):
     assert "no address of http" in run(*order, "--push", "s3://fields/x", code=2, AWS_ENDPOINT_URL_S3=other)
-# What was removed after a push cannot be pushed elsewhere.
+# Images that were removed after a push cannot be pushed elsewhere.
 run(*order, "--push", "s3://fields/again", "--push-free", code=0)
 assert "was pushed to s3://fields/again and removed here" in run(*order, "--push", "s3://fields/other", *once, code=2)
 server.stop()

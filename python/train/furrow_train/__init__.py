@@ -24,23 +24,31 @@ def libtorch() -> Optional[Path]:
     return next((folder for folder in folders if (folder / "libtorch_cpu.so").is_file()), None)
 
 
-def _mismatch() -> Optional[str]:
-    """Return what is wrong with the version of torch. Another one has other symbols, or other behaviour."""
+def _wanted() -> str:
+    """Return the version of torch that the program was built with."""
+    required = metadata.requires("furrow-train") or []
+    return next(name for name in required if name.startswith("torch==")).split("==")[1]
+
+
+def _fault(folder: Optional[Path]) -> Optional[str]:
+    """Return what is wrong with the package torch. Another version has other symbols, or other behaviour."""
+    if folder is None:
+        return f"libtorch was not found: pip install torch=={_wanted()}"
     try:
-        wanted = next(r for r in metadata.requires("furrow-train") or [] if r.startswith("torch==")).split("==")[1]
         # 2.11.0+cpu is a build of 2.11.0.
         found = metadata.version("torch").split("+")[0]
-    except (metadata.PackageNotFoundError, StopIteration):
+    except metadata.PackageNotFoundError:
         return None
+    wanted = _wanted()
     return None if found == wanted else f"torch is {found}, but train needs {wanted}: pip install torch=={wanted}"
 
 
 def main() -> NoReturn:
     """Become the program, with this process's arguments."""
     folder = libtorch()
-    wrong = "libtorch was not found: pip install torch" if folder is None else _mismatch()
-    if folder is None or wrong:
-        sys.exit(f"error: {wrong}")
+    fault = _fault(folder)
+    if fault:
+        sys.exit(f"error: {fault}")
     others = os.environ.get("LD_LIBRARY_PATH")
     libraries = f"{folder}:{others}" if others else str(folder)
     os.execve(program(), [str(program()), *sys.argv[1:]], {**os.environ, "LD_LIBRARY_PATH": libraries})

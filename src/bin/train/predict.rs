@@ -45,8 +45,7 @@ pub(crate) struct Args {
     /// (`train plants`) separates plants that touch; for a network without one, a plant is a connected region of plant pixels.
     #[arg(long)]
     plants: bool,
-    /// Table of points on some plants of known class (CSV: image, x, y, class), from which the classes in all images are corrected. About
-    /// ten crop plants and ten weeds in two or three images are enough. x and y are pixels from the left and the top, class is crop or
+    /// Table of points on some plants of known class (CSV: image, x, y, class); they correct the classes in all images. About ten crop plants and ten weeds in two or three images are enough. x and y are pixels from the left and the top, class is crop or
     /// weed. Needs the refinement appearance; without --refine it is colour,plants,rows,appearance.
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,

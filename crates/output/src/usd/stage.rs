@@ -66,7 +66,7 @@ fn focal(camera: &Camera) -> f64 {
     of_lens.or(camera.focal_mm().map(|mm| 1e-3 * mm)).unwrap_or(FOCAL)
 }
 
-/// Returns the exposure, in stops, at which a white horizontal surface under all lights has the value 1.
+/// Returns the exposure, in stops, that gives a white horizontal surface under all lights the value 1.
 fn exposure(lights: &[Light]) -> f32 {
     let irradiance = lights.iter().fold(Spectrum::ZERO, |sum, light| sum + light.horizontal_irradiance());
     let luminance = irradiance.0.truncate().element_sum() / 3.0 / PI * LUMENS.to_f32();

@@ -28,7 +28,11 @@ pub struct Bucket {
 const MOST_BYTES: u64 = 5 << 30;
 /// Oldest version of `curl` that signs the hash of the contents, tested.
 const OLDEST_CURL: (u32, u32) = (7, 88);
-/// Begin of the line in which `curl` reports the HTTP status and the name of each file.
+/// Number of files that one process uploads. A pack with its formats has thousands.
+const AT_ONCE: usize = 64;
+/// Longest time without a byte, seconds, after which an upload fails.
+const STALLED_S: u32 = 300;
+/// Begin of curl's line with the HTTP status and the name of a file.
 const STATUS: &str = "furrow: ";
 /// Longest answer of a store in an error, characters.
 const SHOWN: usize = 300;
@@ -87,10 +91,19 @@ impl Bucket {
 
     /// Uploads files of a folder once. Returns a description of the failure if one fails.
     pub(super) fn send(&self, folder: &Path, files: &[String], limits: &Limits<'_>) -> Result<Option<String>> {
+        for files in files.chunks(AT_ONCE) {
+            if let Some(failure) = self.send_some(folder, files, limits)? {
+                return Ok(Some(failure));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Uploads a few files in one process.
+    fn send_some(&self, folder: &Path, files: &[String], limits: &Limits<'_>) -> Result<Option<String>> {
         let place = Place::of(&self.name, &variable)?;
         let credentials = Credentials::find(&variable)?;
-        let mut orders = Vec::new();
-        for file in files {
+        let orders = files.iter().map(|file| {
             let path = below(folder, file)?;
             let sum = Checksum::of_file(&path).map_err(Error::io(&path))?;
             if sum.bytes > MOST_BYTES {
@@ -102,12 +115,13 @@ impl Bucket {
                     .in_file(&path)
                     .help("give --out another name")
             })?;
-            orders.push(self.order(&place, &credentials, file, path, &sum.sha256));
-        }
+            Ok(self.order(&place, &credentials, file, path, &sum.sha256))
+        });
+        let orders = orders.collect::<Result<Vec<String>>>()?.join("next\n");
         let mut curl = Command::new("curl");
         // `--disable`, which must come first: no ~/.curlrc changes what is sent.
         curl.args(["--disable", "--silent", "--show-error", "--fail-early", "--config", "-"]);
-        let ended = process::run(&mut curl, orders.join("next\n").as_bytes(), limits)?;
+        let ended = process::run(&mut curl, orders.as_bytes(), limits)?;
         // curl takes a redirect for success.
         let is_stored = ended.output.lines().filter(|line| line.starts_with("furrow: 2")).count() == files.len();
         Ok((ended.failure.is_some() || !is_stored).then(|| self.describe(&ended)))
@@ -129,6 +143,8 @@ impl Bucket {
             say("header", &format!("x-amz-security-token: {token}"));
         }
         say("connect-timeout", "60");
+        say("speed-limit", "1");
+        say("speed-time", &STALLED_S.to_string());
         say("proto", "=http,https");
         say("write-out", &format!("\n{STATUS}%{{http_code}} {}\n", self.key(file).replace('%', "%%")));
         order + "fail-with-body\ngloboff\n"
@@ -270,7 +286,7 @@ mod tests {
         let place = Place { region: "r".into(), address: "http://h/abc".into() };
         let credentials = Credentials { id: "i".into(), secret: "s".into(), token: Some("t".into()) };
         let order = bucket.order(&place, &credentials, "x\ny%", "/d/x\ny%", "00");
-        assert_eq!(order.lines().count(), 11, "{order}");
+        assert_eq!(order.lines().count(), 13, "{order}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Access keys of S3, from the places in which Amazon's own programs look: environment variables, then a profile of
+//! Access keys of S3, found as Amazon's own programs do: environment variables, then a profile of
 //! `~/.aws/credentials`. Source: AWS SDKs and Tools Reference Guide, "Credentials" and "Environment variables".
 
 use furrow_base::input::read_text;

@@ -132,6 +132,8 @@ impl Push {
                 let help = "give --push the same address, or make the dataset again in another folder";
                 return Err(Error::misuse(what).help(help).in_file(&set.folder));
             }
+            // A run may have been killed before it had removed the files.
+            Some(PushRecord { freed: true, .. }) if self.free => return free(set, &files),
             Some(PushRecord { freed: true, .. }) => return Ok(()),
             Some(note) if !is_elsewhere(&note) => {}
             _ => {
