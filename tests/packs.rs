@@ -368,6 +368,33 @@ fn a_push_that_hangs_is_ended_with_all_it_has_started() {
     assert!(!late.exists(), "a subprocess of the command continued");
 }
 
+/// A batch system announces with USR1 that the time is nearly up, while the push of a finished image fails and is repeated
+/// with pauses. Expected: no other attempt; code 75 with the state of the dataset, and the next run pushes the image.
+#[test]
+fn a_push_that_fails_ends_with_the_time_of_a_job() {
+    let (_keep, data) = scratch();
+    let (_also, there) = scratch();
+    fs::create_dir_all(&there).expect("a folder");
+    let to = path(&there);
+    let fails = format!("case {{dir}} in */recipe) cp -r {{dir}}/. {to};; *) echo >> {to}.tried; exit 1;; esac");
+    let mut make = trace(&["dataset", "--scene", PLANT, "--quiet", "--width", "48", "--spp", "1", "--count", "1"]);
+    make.args(["--push", &fails, "--push-tries", "9", "--out"]).arg(&data).stderr(std::process::Stdio::piped());
+    let run = make.spawn().expect("a run");
+    let tried = there.with_extension("tried");
+    while !tried.is_file() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let pid = run.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-s", "USR1", &pid]).status().expect("kill").success());
+    let ended = run.wait_with_output().expect("the run ends");
+    let message = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(75), "{message}");
+    assert!(message.contains("all images are complete, but not all are copied"), "{message}");
+    assert!(fs::read_to_string(tried).expect("attempts").lines().count() < 4, "{message}");
+    succeed(verb("render", &data, &["--quiet", "--push", &format!("cp -r {{dir}}/. {to}")]));
+    assert!(there.join("images/000000/rgb.png").is_file());
+}
+
 /// The same for images in folders, and for files common to all images.
 #[test]
 fn folders_are_pushed_too() {

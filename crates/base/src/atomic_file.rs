@@ -13,10 +13,14 @@ use live::recorded;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::{NamedTempFile, TempPath};
 
 /// Name prefix of unfinished files.
 const UNFINISHED: &str = ".furrow-";
+
+/// Time without a change after which an unfinished file belongs to no running program.
+const ABANDONED: Duration = Duration::from_secs(24 * 3600);
 
 /// Number of times a file is rewritten after another program has removed its temporary file. A clean-up removes it only
 /// once.
@@ -288,11 +292,29 @@ pub fn remove_unfinished(folder: &Path) -> Result<()> {
 
 /// Removes unfinished files from this folder only; returns its subfolders.
 pub fn remove_unfinished_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    remove_older(folder, Duration::ZERO)
+}
+
+/// Removes the unfinished files of killed programs from a folder that other programs may be writing into: those that were
+/// not changed for a day.
+pub fn remove_abandoned_in(folder: &Path) -> Result<()> {
+    remove_older(folder, ABANDONED).map(drop)
+}
+
+/// Removes unfinished files of at least this age from a folder; returns its subfolders.
+fn remove_older(folder: &Path, age: Duration) -> Result<Vec<PathBuf>> {
+    let is_young = |about: &fs::Metadata| {
+        let changed = about.modified().ok().and_then(|changed| changed.elapsed().ok());
+        !age.is_zero() && changed.is_none_or(|changed| changed < age)
+    };
     let mut within = Vec::new();
     for entry in fs::read_dir(folder).map_err(Error::io(folder))? {
         let entry = entry.map_err(Error::io(folder))?;
         let path = entry.path();
         let unfinished = is_unfinished(&entry.file_name());
+        if unfinished && unless_gone(entry.metadata()).map_err(Error::io(&path))?.is_none_or(|about| is_young(&about)) {
+            continue;
+        }
         let Some(kind) = unless_gone(entry.file_type()).map_err(Error::io(&path))? else { continue };
         let removed = match (kind.is_dir(), unfinished) {
             (true, true) => unless_gone(fs::remove_dir_all(&path)),
@@ -325,6 +347,20 @@ mod tests {
             fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
         all.sort();
         all
+    }
+
+    /// Expected: a file that was changed a minute ago stays, one of last week goes, and files with other names stay.
+    #[test]
+    fn files_without_a_writer_are_removed_after_a_day() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, age_s) in [(".furrow-new", 60), (".furrow-old", 7 * 86400), ("kept", 7 * 86400)] {
+            let file = File::create(folder.path().join(name)).unwrap();
+            file.set_modified(std::time::SystemTime::now() - Duration::from_secs(age_s)).unwrap();
+        }
+        remove_abandoned_in(folder.path()).unwrap();
+        assert_eq!(names(folder.path()), [".furrow-new", "kept"]);
+        remove_unfinished_in(folder.path()).unwrap();
+        assert_eq!(names(folder.path()), ["kept"]);
     }
 
     #[test]

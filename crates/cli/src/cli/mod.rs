@@ -125,7 +125,7 @@ pub fn crop(text: &str) -> Result<Window, String> {
     }
 }
 
-/// Checks that files can be written into `folder`, before hours are spent on computing them.
+/// Checks that files can be written into `folder`, before hours are spent on computing them. Removes what killed programs left there.
 pub fn check_folder(folder: &Path) -> Result<()> {
     let help = "give --out a folder; it is created if it does not exist";
     // A dangling link exists but is not a folder.
@@ -153,7 +153,12 @@ pub fn check_folder(folder: &Path) -> Result<()> {
         }
         // The disk is full or failed: the same command may succeed later.
         _ => Error::io(there)(e),
-    })
+    })?;
+    if there == folder {
+        // What cannot be removed is no reason not to write.
+        let _ = furrow_base::atomic_file::remove_abandoned_in(folder);
+    }
+    Ok(())
 }
 
 /// Help for a folder that takes no files.

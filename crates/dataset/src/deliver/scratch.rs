@@ -14,7 +14,7 @@ use crate::File;
 use crate::make::begin::write_changed;
 use crate::make::generate::{Callbacks, Delivery, OpenPacks, Shard, Work, generate_for};
 use crate::make::pack::store;
-use crate::make::push::{Push, Unit, free};
+use crate::make::push::{Push, Stop, Unit, free};
 use crate::make::task::{Task, task};
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::{ChecksumRecord, write_files};
@@ -73,7 +73,7 @@ fn lock(folder: &Path, shard: Shard, callbacks: &Callbacks<'_>) -> Result<Lock> 
 fn generate_there(home: &Set, folder: &Path, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     work.push.map_or(Ok(()), |push| push.clear(home))?;
     let here = copy(home, folder)?;
-    let run = Run { home, here, shard: work.shard, push: work.push, stop: callbacks.now };
+    let run = Run { home, here, shard: work.shard, push: work.push, stop: callbacks.stop() };
     run.push(Unit::Recipe)?;
     let there = Threads::new(work.threads)?.install(|| run.at_home())?;
     run.push_again(&there, callbacks.soon)?;
@@ -118,7 +118,7 @@ struct Run<'a> {
     here: Set,
     shard: Shard,
     push: Option<&'a Push>,
-    stop: &'a AtomicBool,
+    stop: Stop<'a>,
 }
 
 impl Run<'_> {

@@ -7,7 +7,7 @@
 
 use crate::make::meter;
 use crate::make::pack::store;
-use crate::make::push::{Push, Unit};
+use crate::make::push::{Push, Stop, Unit};
 use crate::make::render::{CachedField, Times, render, renderer, scene_file};
 use crate::make::task::{Task, in_format, task};
 use crate::make::time_left::TimeLeft;
@@ -116,6 +116,13 @@ pub struct Callbacks<'a> {
     pub now: &'a Arc<AtomicBool>,
 }
 
+impl Callbacks<'_> {
+    /// Flags for pushes.
+    pub(crate) fn stop(&self) -> Stop<'_> {
+        Stop { soon: self.soon, now: self.now }
+    }
+}
+
 /// Destination of the finished images of a run.
 pub(crate) struct Delivery<'a> {
     /// Returns `true` if an image is already at the destination.
@@ -145,7 +152,7 @@ pub(crate) fn fitting(scene: &SceneFile, index: u64, memory: Option<u64>) -> usi
 /// error, such as a full disk, ends the run at once. Completed images are kept in all cases.
 pub fn generate(set: &Set, work: &Work<'_>, callbacks: &Callbacks<'_>) -> Result<()> {
     work.push.map_or(Ok(()), |push| push.clear(set))?;
-    let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.now));
+    let deliver = |unit: Unit| work.push.map_or(Ok(()), |push| push.unit(set, unit, callbacks.stop()));
     deliver(Unit::Recipe)?;
     generate_for(set, work, callbacks, &Delivery { has: &|_| false, deliver: &deliver, home: &set.folder })
 }
@@ -227,8 +234,11 @@ pub(crate) fn generate_for(
         run.timing_log.add(&Row::RunStart(RunStart { began_s: now(), images: tasks.len(), at_once, threads }))?;
     }
     let (mut made, mut failures) = (0, BTreeMap::new());
+    // Images that are complete, of which some may not be delivered yet.
+    let complete = AtomicUsize::new(0);
     let make = |(index, task): &(u64, Task), threads: &Threads, kept: &mut CachedField| {
         threads.install(|| run.image(*index, *task, threads, kept))?;
+        complete.fetch_add(1, Ordering::Relaxed);
         if open.made(set, *index)? { sent(Unit::of(set, *index)) } else { Ok(()) }
     };
     let schedule = Schedule::new(fields.into_iter(), ResultOrder::AsFinished);
@@ -263,7 +273,14 @@ pub(crate) fn generate_for(
     }
     noted?;
     refused?;
-    if lacking == 0 { Ok(()) } else { Err(interrupted(delivery.home, wanted - lacking, wanted)) }
+    let there = wanted - tasks.len() + complete.into_inner();
+    match lacking {
+        0 => Ok(()),
+        _ if there == wanted => Err(Error::stopped("stopped: all images are complete, but not all are copied")
+            .help("the same command copies the rest")
+            .in_file(delivery.home)),
+        _ => Err(interrupted(delivery.home, there, wanted)),
+    }
 }
 
 /// Returns the error of a stopped run, with the number of complete images (`there`) and of requested images (`wanted`).

@@ -51,7 +51,8 @@ pub(crate) fn run(args: &Args, signals: &Signals) -> Result<Vec<PathBuf>> {
         Ok::<_, furrow_base::Error>(files)
     })?;
     if let Some(push) = &push {
-        push::whole(&set, push, signals.catch())?;
+        let (soon, now) = signals.catch_graceful();
+        push::whole(&set, push, push::Stop { soon, now })?;
     }
     Ok(files)
 }

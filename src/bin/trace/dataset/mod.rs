@@ -80,6 +80,9 @@ struct PlanArgs {
     /// Number of threads; 0 for one per core. The files do not depend on it.
     #[arg(long, default_value_t = 0, value_parser = threads)]
     threads: usize,
+    /// Print nothing but errors, warnings and the results.
+    #[arg(long)]
+    quiet: bool,
 }
 
 #[derive(clap::Args)]
@@ -99,12 +102,12 @@ struct MakeArgs {
 /// Runs a dataset command. Returns the paths of the main files.
 pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
     match &cli.verb {
-        Some(Verb::Plan(PlanArgs { order, estimate: true, price, threads })) => {
-            cost_estimate::run(order.images.folder(), order.order()?, *threads, false, *price, signals)
+        Some(Verb::Plan(PlanArgs { order, estimate: true, price, threads, quiet })) => {
+            cost_estimate::run(order.images.folder(), order.order()?, *threads, *quiet, *price, signals)
         }
-        Some(Verb::Plan(PlanArgs { order, estimate: false, threads, .. })) => {
-            let set = furrow_job::Threads::new(*threads)?.install(|| order::run(order, false, signals))?;
-            order::print_plants(&set, false)?;
+        Some(Verb::Plan(PlanArgs { order, estimate: false, threads, quiet, .. })) => {
+            let set = furrow_job::Threads::new(*threads)?.install(|| order::run(order, *quiet, signals))?;
+            order::print_plants(&set, *quiet)?;
             Ok(vec![set.folder.join(furrow_dataset::model::recipe::FILE)])
         }
         Some(Verb::Render(args)) => render::run(args, signals),
@@ -145,7 +148,8 @@ pub(crate) fn run(cli: &Cli, signals: &Signals) -> Result<Vec<PathBuf>> {
                 Ok::<_, Error>(files)
             })?;
             if let Some(push) = &push {
-                furrow_dataset::make::push::whole(&set, push, signals.catch())?;
+                let (soon, now) = signals.catch_graceful();
+                furrow_dataset::make::push::whole(&set, push, furrow_dataset::make::push::Stop { soon, now })?;
             }
             Ok(files)
         }

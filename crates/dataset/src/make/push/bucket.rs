@@ -92,6 +92,7 @@ impl Bucket {
     /// Uploads files of a folder once. Returns a description of the failure if one fails.
     pub(super) fn send(&self, folder: &Path, files: &[String], limits: &Limits<'_>) -> Result<Option<String>> {
         for files in files.chunks(AT_ONCE) {
+            limits.stop.check()?;
             if let Some(failure) = self.send_some(folder, files, limits)? {
                 return Ok(Some(failure));
             }

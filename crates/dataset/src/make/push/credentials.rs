@@ -58,17 +58,20 @@ impl Credentials {
     }
 }
 
-/// Returns a value of a section of an INI file.
+/// Returns a value of a section of an INI file; `None` if it is missing or empty. Capitals in names of values do not matter.
 fn value(text: &str, section: &str, key: &str) -> Option<String> {
     let mut is_inside = false;
     for line in text.lines().map(str::trim).filter(|line| !line.starts_with(['#', ';'])) {
-        if let Some(name) = line.strip_prefix('[') {
-            is_inside = name.trim_end_matches(']').trim() == section;
+        if let Some((name, _)) = line.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+            is_inside = name.trim() == section;
         } else if is_inside
             && let Some((name, value)) = line.split_once('=')
-            && name.trim() == key
+            && name.trim().eq_ignore_ascii_case(key)
         {
-            return Some(value.trim().to_owned());
+            // As Amazon's programs: a comment begins with a space. Keys contain none.
+            let value =
+                [" #", "\t#", " ;", "\t;"].iter().fold(value, |value, mark| value.split(mark).next().unwrap_or(value));
+            return Some(value.trim().to_owned()).filter(|value| !value.is_empty());
         }
     }
     None
@@ -87,7 +90,8 @@ mod tests {
     fn keys_come_from_variables_or_a_profile() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("credentials");
-        let text = "# keys\n[default]\naws_access_key_id = A\naws_secret_access_key=b=/+\n\n[ robot ]\naws_access_key_id=R\n\
+        let text = "# keys\n[default] # mine\naws_access_key_id = A\naws_secret_access_key=b=/+\naws_session_token =\n\n[ robot ]\n\
+                    AWS_ACCESS_KEY_ID=R ; old\n\
                     aws_secret_access_key = s\naws_session_token = t\n[half]\naws_access_key_id=H\n";
         std::fs::write(&file, text).unwrap();
         let file = ("AWS_SHARED_CREDENTIALS_FILE", file.to_str().unwrap());

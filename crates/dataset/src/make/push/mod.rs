@@ -16,6 +16,7 @@ mod bucket;
 mod command;
 mod credentials;
 mod process;
+mod stop;
 mod unit;
 
 use crate::model::recipe::compact;
@@ -28,11 +29,11 @@ use furrow_output::{remove_unfinished_in, write_atomically};
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub use bucket::Bucket;
 pub use command::ShellCommand;
+pub use stop::Stop;
 use unit::PushRecord;
 pub(crate) use unit::Unit;
 
@@ -102,7 +103,7 @@ pub(crate) fn refuse_freed(set: &Set) -> Result<()> {
 }
 
 /// Pushes the files that `finish` wrote.
-pub fn whole(set: &Set, push: &Push, stop: &AtomicBool) -> Result<()> {
+pub fn whole(set: &Set, push: &Push, stop: Stop<'_>) -> Result<()> {
     push.unit(set, Unit::Whole, stop)
 }
 
@@ -116,7 +117,7 @@ impl Push {
     }
 
     /// Pushes a finished unit, unless it was already pushed with its current contents. Ignores unfinished units.
-    pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: &AtomicBool) -> Result<()> {
+    pub(crate) fn unit(&self, set: &Set, unit: Unit, stop: Stop<'_>) -> Result<()> {
         let Some((files, hash)) = unit.contents(set)? else { return Ok(()) };
         let to = match &self.to {
             Destination::Bucket(bucket) => bucket.to_string(),
@@ -172,10 +173,11 @@ impl Push {
     }
 
     /// Tries to push a unit until it succeeds, at most `tries` times with growing pauses.
-    fn send(&self, set: &Set, unit: Unit, files: &[String], stop: &AtomicBool) -> Result<()> {
+    fn send(&self, set: &Set, unit: Unit, files: &[String], stop: Stop<'_>) -> Result<()> {
         let folder = std::path::absolute(&set.folder).map_err(Error::io(&set.folder))?;
         let mut pause = Duration::from_secs(1);
         for tried in 1..=self.tries {
+            stop.check()?;
             let limits = process::Limits { timeout: self.timeout, stop };
             let failure = match &self.to {
                 Destination::Bucket(bucket) => bucket.send(&folder, files, &limits)?,
@@ -191,7 +193,8 @@ impl Push {
                 Some(_) => {}
             }
             let until = Instant::now() + pause;
-            while Instant::now() < until && !stop.load(Ordering::Relaxed) {
+            while Instant::now() < until {
+                stop.check()?;
                 std::thread::sleep(process::EVERY);
             }
             pause *= 4;

@@ -1,12 +1,13 @@
 //! One process with a time limit, which ends with its children when the run is stopped.
 
+use super::stop::{Stop, interrupted};
 use furrow_base::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Polling interval for a running process, and for a stop.
@@ -16,8 +17,8 @@ pub(super) const EVERY: Duration = Duration::from_millis(20);
 pub(super) struct Limits<'a> {
     /// Time limit; `None` for no limit.
     pub(super) timeout: Option<Duration>,
-    /// Raised when the run is stopped.
-    pub(super) stop: &'a AtomicBool,
+    /// Whether the run is stopped.
+    pub(super) stop: Stop<'a>,
 }
 
 /// How a process ended.
@@ -50,9 +51,9 @@ pub(super) fn run(command: &mut Command, input: &[u8], limits: &Limits<'_>) -> R
         if let Some(ended) = child.try_wait().map_err(Error::io(Path::new(&program)))? {
             break Some(ended);
         }
-        if limits.stop.load(Ordering::Relaxed) {
+        if limits.stop.now.load(Ordering::Relaxed) {
             end(&mut child);
-            return Err(Error::interrupted());
+            return Err(interrupted());
         }
         timed_out = limits.timeout.is_some_and(|timeout| begin.elapsed() > timeout);
         if timed_out {
