@@ -5,7 +5,9 @@ use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_optics::texture::decoded_image::{self, CUT_SHORT, DecodedImage, is_cut_short, over_white};
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
-use image::{DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageResult, RgbImage, imageops};
+use image::{
+    DynamicImage, ExtendedColorType, GenericImageView, GrayImage, ImageDecoder, ImageResult, RgbImage, Rgba, imageops,
+};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -25,6 +27,8 @@ pub struct Photo<T> {
     pub stored_size: (u32, u32),
     /// Number of pixels that are transparent in the file.
     pub transparent: u64,
+    /// Whether the file has colours; false if all of its pixels are grey.
+    pub is_colored: bool,
 }
 
 /// Reads a PNG or JPEG photograph of any depth as 8-bit sRGB.
@@ -40,9 +44,11 @@ pub fn open_gray_photo(path: &Path) -> Result<Photo<u8>> {
 
 fn photo_of<T>(picture: DecodedImage, values: impl FnOnce(DynamicImage) -> Vec<T>) -> Photo<T> {
     let (orientation, stored_size) = (picture.orientation, picture.stored_size());
+    let is_gray = |pixels: &DynamicImage| pixels.pixels().all(|(.., Rgba([r, g, b, _]))| r == g && g == b);
+    let is_colored = picture.pixels.color().has_color() && !is_gray(&picture.pixels);
     let (flat, transparent) = over_white(picture.pixels);
     let size = (flat.width(), flat.height());
-    Photo { size, pixels: values(flat), orientation, stored_size, transparent }
+    Photo { size, pixels: values(flat), orientation, stored_size, transparent, is_colored }
 }
 
 /// Reads a photograph like [`open_photo`]: width, height, pixels.

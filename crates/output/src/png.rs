@@ -35,12 +35,13 @@ pub enum ImageData<'a> {
 impl ImageData<'_> {
     /// Returns filter and compression level of images whose pixels are noisy or repeated; `None` for the defaults, which
     /// compress label maps well.
-    fn effort(&self) -> Option<(Filter, u8)> {
+    fn effort(&self) -> Option<(Filter, DeflateCompression)> {
+        use DeflateCompression::Level;
         match self {
             // The default level takes 1.5 to 10 times longer for files that are at most 5 % smaller.
-            Self::Rgb(_) | Self::Rgba(_) | Self::Rgb16(_) => Some((Filter::Adaptive, 2)),
-            Self::EnlargedRgba(_) => Some((Filter::Up, 2)),
-            Self::Brightness(_) => Some((Filter::Adaptive, 1)),
+            Self::Rgb(_) | Self::Rgba(_) | Self::Rgb16(_) => Some((Filter::Adaptive, Level(2))),
+            Self::EnlargedRgba(_) => Some((Filter::Up, Level(1))),
+            Self::Brightness(_) => Some((Filter::Adaptive, Level(1))),
             Self::Linear(_) | Self::Gray(_) | Self::Gray16(_) | Self::Numbers(_) | Self::Indexed(..) => None,
         }
     }
@@ -79,7 +80,7 @@ pub(super) fn encode_with(
     let mut encoder = png::Encoder::with_info(&mut bytes, info).map_err(failed)?;
     if let Some((filter, level)) = picture.effort() {
         encoder.set_filter(filter);
-        encoder.set_deflate_compression(DeflateCompression::Level(level));
+        encoder.set_deflate_compression(level);
     }
     let data = match picture {
         ImageData::Rgb(pixels) => {

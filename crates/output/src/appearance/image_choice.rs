@@ -4,7 +4,7 @@
 //! field, which take minutes to compute and more memory than viewers have. Most conditions are, within a few percent, a
 //! factor on the image of the species. Such leaves share that image, and the factor becomes part of the material. The
 //! mean colour of each leaf is then exact, and single marks are missing. Leaves with stronger marks, and leaves with
-//! holes, whose opacity is their own, keep images of their own.
+//! holes, whose opacity is their own, share images with few others (`variants`).
 
 use furrow_base::geometry::AlphaMask;
 use furrow_base::math::{ToInt, Vec3};
@@ -18,9 +18,9 @@ const GRID: u32 = 32;
 const TOLERANCE: f32 = 6.0;
 /// Largest difference of the diffuse transmission factor f. Programs without transmission show 1 / (1 − f) of a leaf's
 /// brightness.
-const SHARE_TOLERANCE: f32 = 0.04;
+pub(super) const SHARE_TOLERANCE: f32 = 0.04;
 /// Largest factor on an image. A larger one would exceed 1 on the brightest texels.
-const LARGEST_FACTOR: f32 = 2.0;
+pub(super) const LARGEST_FACTOR: f32 = 2.0;
 /// Mean reflectance or transmittance below which a band counts as black and has no factor.
 const BLACK: f32 = 1e-3;
 
@@ -49,6 +49,20 @@ impl<'a> ImageChoice<'a> {
     /// Returns the images of a material, with colours of its own.
     pub(super) fn own(material: &'a Material) -> Self {
         Self { swatch: material.swatch(), relief: material.healthy_swatch() }
+    }
+
+    /// Whether the material has colours of its own although its species has an image.
+    pub(super) fn differs_from_species(&self) -> bool {
+        self.relief.is_some()
+    }
+
+    /// Returns these images with the colours of another leaf of the species, times factors on reflected and transmitted
+    /// R, G, B.
+    pub(super) fn with_colors_of(self, mut other: Swatch<'a>, [reflected, transmitted]: [Vec3; 2]) -> Self {
+        let own = self.swatch;
+        (other.relief, other.roughness, other.back_paleness) = (own.relief, own.roughness, own.back_paleness);
+        (other.tint, other.tint_transmitted, other.mean) = (reflected, transmitted, own.mean);
+        Self { swatch: other, ..self }
     }
 
     /// Returns the swatch whose relief the material has.

@@ -5,6 +5,7 @@
 
 mod image_choice;
 mod images;
+mod variants;
 
 use furrow_base::Result;
 use furrow_base::geometry::AlphaMask;
@@ -17,6 +18,7 @@ use images::{Colors, SharedColors};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use variants::Sketch;
 
 /// Identity of an image of colours. For a plain material, which has none, the number of the surface.
 type ColorKey = [usize; 2];
@@ -151,7 +153,40 @@ impl<'a> Surfaces<'a> {
             };
             (material, choice)
         };
-        masks.into_par_iter().map(choice).collect()
+        let choices: BTreeMap<u32, ImageChoice<'a>> = masks.par_iter().map(|(k, mask)| choice((*k, *mask))).collect();
+        self.with_variants(choices, &masks)
+    }
+
+    /// Limits the number of leaves of each species that have colours of their own.
+    fn with_variants(
+        &self,
+        choices: BTreeMap<u32, ImageChoice<'a>>,
+        masks: &BTreeMap<u32, Option<&'a Arc<AlphaMask>>>,
+    ) -> BTreeMap<u32, ImageChoice<'a>> {
+        let mut species: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+        for (material, choice) in choices.iter().filter(|(_, choice)| choice.differs_from_species()) {
+            species.entry(choice.relief().relief_key).or_default().push(*material);
+        }
+        let sketch = |material: u32| Sketch::of(&choices[&material].swatch, masks[&material].map(|mask| &**mask));
+        // Material of the leaf whose colours each later leaf has, and factors on them.
+        let mut shared: BTreeMap<u32, (u32, [Vec3; 2])> = BTreeMap::new();
+        for leaves in species.into_values() {
+            let (first, later) = leaves.split_at(leaves.len().min(variants::MOST));
+            let sketches: Vec<Sketch> = first.par_iter().map(|material| sketch(*material)).collect();
+            let found = later.par_iter().filter_map(|material| {
+                let (k, factors) = variants::nearest(&sketch(*material), sketches.iter())?;
+                Some((*material, (first[k], factors)))
+            });
+            shared.par_extend(found);
+        }
+        let chosen = choices.into_iter().map(|(material, choice)| match shared.get(&material) {
+            Some((other, factors)) => {
+                let other = self.scene.materials[other.to_usize()].swatch();
+                (material, choice.with_colors_of(other, *factors))
+            }
+            None => (material, choice),
+        });
+        chosen.collect()
     }
 
     fn dye(&self, choices: &BTreeMap<u32, ImageChoice<'a>>, material: u32, tint: Vec3) -> Dye {

@@ -133,7 +133,7 @@ fn mesh(part: &Part, material: usize, pack: &mut Pack) -> Mesh {
         name: Some(name(tag)),
         primitives: vec![Primitive {
             attributes: attributes.into_iter().map(|(what, accessor)| (what.to_owned(), accessor)).collect(),
-            indices: Some(pack.indices(&mesh.triangles)),
+            indices: Some(pack.indices(&mesh.triangles, mesh.positions.len())),
             material: Some(material),
             ..Primitive::default()
         }],

@@ -2,7 +2,7 @@
 
 use crate::skinning::tidy;
 use furrow_base::geometry::JointWeights;
-use furrow_base::math::{DMat4, ToFloat, Vec2, Vec3};
+use furrow_base::math::{DMat4, ToFloat, ToInt, Vec2, Vec3};
 use furrow_grow::model::document::{
     ARRAY_BUFFER, Accessor, Buffer, BufferView, Document, ELEMENT_ARRAY_BUFFER, FLOAT, UNSIGNED_INT, UNSIGNED_SHORT,
 };
@@ -82,11 +82,20 @@ impl Pack {
         self.accessors.len() - 1
     }
 
-    /// Adds triangle indices and returns the index of their accessor.
-    pub(super) fn indices(&mut self, of: &[[u32; 3]]) -> usize {
+    /// Adds triangle indices of a mesh with so many vertices and returns the index of their accessor. They take two bytes each
+    /// if the largest is below 65535, which some programs reserve.
+    pub(super) fn indices(&mut self, of: &[[u32; 3]], vertices: usize) -> usize {
         let at = self.indices.len();
-        self.indices.extend(of.as_flattened().iter().flat_map(|i| i.to_le_bytes()));
-        self.accessor(INDICES, at, of.len() * 3, "SCALAR");
+        let all = of.as_flattened().iter();
+        let is_short = u16::try_from(vertices).is_ok();
+        if is_short {
+            self.indices.extend(all.flat_map(|i| i.to_u16().to_le_bytes()));
+            self.indices.resize(self.indices.len().next_multiple_of(4), 0);
+        } else {
+            self.indices.extend(all.flat_map(|i| i.to_le_bytes()));
+        }
+        let accessor = self.accessor(INDICES, at, of.len() * 3, "SCALAR");
+        accessor.component_type = if is_short { UNSIGNED_SHORT } else { UNSIGNED_INT };
         self.accessors.len() - 1
     }
 
