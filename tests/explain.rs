@@ -73,10 +73,56 @@ fn what_is_not_there_is_refused_with_the_nearest() {
     }
     assert_eq!(trace(&["explain", "xyzzy"]).status.code(), Some(2));
     // A word that is no path lists what contains it.
-    let found = message(&trace(&["explain", "corn"]));
-    assert_eq!(found.split_once('\n').unwrap().1, message(&trace(&["explain", "--search", "corn"])));
+    for word in ["corn", "sun angle"] {
+        let found = message(&trace(&["explain", word]));
+        assert_eq!(found.split_once('\n').unwrap().1, message(&trace(&["explain", "--search", word])));
+    }
+    let output = String::from_utf8(trace(&["explain", "oat"]).stderr).unwrap();
+    assert!(output.contains("there is no `oat`") && output.contains("`trace species` lists the species"), "{output}");
     let words = message(&trace(&["explain", "distribution"]));
     assert!(words.contains("LogNormal") && words.contains("median"), "{words}");
+}
+
+/// Words that users of the documentation typed, each with the line that it must find; those of species come first.
+#[test]
+fn words_of_users_find_what_they_mean() {
+    for (word, line) in [
+        ("row spacing", "crops.rows.spacing_m"),
+        ("Reihenabstand", "crops.rows.spacing_m"),
+        ("sun angle", "lights.Daylight.sun.Angles.elevation_deg"),
+        ("field of view", "camera.Pinhole.intrinsics.FieldOfView"),
+        ("camera height", "camera.JaiAd130.height_m"),
+        ("height", "camera.JaiAd130.height_m"),
+        ("wet soil", "soil.moisture"),
+        ("wet", "soil.moisture"),
+        ("image width", "camera.Pinhole.size"),
+        ("missing plants", "crops.rows.emergence"),
+        ("weed density", "models.spread.per_m2"),
+        ("depth of field", "camera.Pinhole.aperture"),
+        ("residue", "soil.litter"),
+        ("cloudy", "lights.Overcast"),
+    ] {
+        let found = message(&trace(&["explain", word]));
+        assert!(found.lines().any(|l| l.split("  ").any(|part| part.trim() == line)), "{word}: {found}");
+    }
+    for (word, species) in [
+        ("potatoes", "potato"),
+        ("Bohnen", "bean"),
+        ("judia", "bean"),
+        ("Moehre", "carrot"),
+        ("Gansefuss", "chenopodium"),
+        ("pomme-de-terre", "potato"),
+        ("Zuckerrube", "sugar_beet"),
+        ("ble", "wheat"),
+        ("Raps", "rape"),
+    ] {
+        let found = message(&trace(&["explain", word]));
+        assert!(
+            found.lines().nth(1).is_some_and(|l| l.starts_with(&format!("species: {species:?}"))),
+            "{word}: {found}"
+        );
+        assert!(furrow_field::shipped::species(word).is_ok_and(|file| file.is_some()), "{word}");
+    }
 }
 
 #[test]
@@ -91,7 +137,7 @@ fn every_command_that_an_error_names_answers() {
         };
         for command in text.lines().filter_map(|line| line.strip_prefix(" see:  trace explain")) {
             let answer = furrow_cli::reference::answer(command.trim(), &references, "trace");
-            assert!(answer.is_ok(), "{}: {command}: {}", path.display(), answer.unwrap_err());
+            assert!(answer.is_ok(), "{}: {command}: {}", path.display(), answer.err().unwrap());
             asked += 1;
         }
     }

@@ -463,21 +463,22 @@ pub(super) fn of(stem: &str) -> &'static [&'static str] {
 
 /// Returns `true` if both names are the same but for case, spaces, hyphens, apostrophes and accents.
 pub(super) fn same(a: &str, b: &str) -> bool {
-    folded(a) == folded(b)
+    folded(a, true) == folded(b, true) || folded(a, false) == folded(b, false)
 }
 
-/// Returns a name in small letters, without accents and signs; umlauts as two letters, as in `Zuckerruebe`.
-fn folded(name: &str) -> String {
+/// Returns a name in small letters, without accents and signs; umlauts as two letters, as in `Zuckerruebe`, or without their
+/// dots, as on keyboards that lack them.
+fn folded(name: &str, has_umlauts: bool) -> String {
     let letter = |c: char| match c {
-        'ä' => "ae",
-        'ö' => "oe",
-        'ü' => "ue",
+        'ä' if has_umlauts => "ae",
+        'ö' if has_umlauts => "oe",
+        'ü' if has_umlauts => "ue",
         'ß' => "ss",
-        'á' | 'à' | 'â' => "a",
+        'ä' | 'á' | 'à' | 'â' => "a",
         'é' | 'è' | 'ê' => "e",
         'í' | 'ï' | 'î' => "i",
-        'ó' | 'ô' => "o",
-        'ú' | 'û' => "u",
+        'ö' | 'ó' | 'ô' => "o",
+        'ü' | 'ú' | 'û' => "u",
         'ñ' => "n",
         'ç' => "c",
         _ => "",

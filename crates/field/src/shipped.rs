@@ -119,10 +119,16 @@ pub fn is_ambiguous(name: &str) -> Result<bool> {
     Ok(!is_file && called(&all_species()?.0, name).len() > 1)
 }
 
-/// Returns the species that have this name; if there is none, those that have a name with this word.
-fn called<'a>(all: &'a [Shipped], wanted: &str) -> Vec<&'a Shipped> {
-    let exact: Vec<&Shipped> = all.iter().filter(|species| species.is_called(wanted)).collect();
-    if exact.is_empty() { all.iter().filter(|species| species.has_word(wanted)).collect() } else { exact }
+/// Endings of plurals in English, French, Spanish and German.
+const PLURALS: [&str; 4] = ["es", "s", "en", "n"];
+
+/// Returns the species that have this name; if there is none, those of which it is the plural, or that have a name with this word.
+pub fn called<'a>(all: &'a [Shipped], wanted: &str) -> Vec<&'a Shipped> {
+    let exact = |name: &str| all.iter().filter(|species| species.is_called(name)).collect::<Vec<_>>();
+    let singulars = PLURALS.iter().filter_map(|ending| wanted.strip_suffix(ending));
+    let long = singulars.filter(|name| name.chars().count() >= SHORTEST_WORD);
+    let found = std::iter::once(wanted).chain(long).map(exact).find(|found| !found.is_empty());
+    found.unwrap_or_else(|| all.iter().filter(|species| species.has_word(wanted)).collect())
 }
 
 /// Returns the error about a name that no species has.

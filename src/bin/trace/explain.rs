@@ -4,8 +4,8 @@ use furrow_base::input::shipped;
 use furrow_base::ron_file::RonFile;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
-use furrow_cli::reference::{answer, distribution, scene, search, species, texture};
-use furrow_field::shipped::all_species;
+use furrow_cli::reference::{Answer, Reference, answer, distribution, scene, search, species, texture};
+use furrow_field::shipped::{Shipped, all_species, called};
 use std::path::PathBuf;
 
 /// The path to explain.
@@ -25,28 +25,54 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
     let references = [scene(), species(), texture(), distribution()];
     if let Some(word) = &args.search {
-        let found = search(word, &references, &shipped_files()?);
+        let found = found(word, &references)?;
         if found.is_empty() {
-            return Err(Error::misuse(format!("nothing contains `{word}`")).help("`trace explain` lists all paths"));
+            return Err(Error::misuse(format!("nothing contains `{word}`")).help(NOTHING));
         }
         print_found(found)?;
-    } else {
-        let path = args.path.as_deref().unwrap_or_default();
-        match answer(path, &references, "trace") {
-            Ok(text) => {
-                cli::print(&text)?;
+        return Ok(Vec::new());
+    }
+    let path = args.path.as_deref().unwrap_or_default();
+    match answer(path, &references, "trace") {
+        Ok(Answer { text, is_ambiguous }) => {
+            cli::print(&text)?;
+            if is_ambiguous && !path.contains('.') {
+                cli::print(&format!("\nEntries about `{path}`:\n"))?;
+                print_found(found(path, &references)?)?;
             }
-            Err(error) => {
-                let found = if path.contains('.') { Vec::new() } else { search(path, &references, &shipped_files()?) };
-                if found.is_empty() {
-                    return Err(error);
-                }
-                cli::print(&format!("no path is named `{path}`; these entries contain it:\n"))?;
-                print_found(found)?;
+        }
+        Err(error) if path.contains('.') => return Err(error),
+        Err(_) => {
+            let found = found(path, &references)?;
+            if found.is_empty() {
+                return Err(Error::misuse(format!("there is no `{path}`")).help(NOTHING));
             }
+            cli::print(&format!("Entries about `{path}`:\n"))?;
+            print_found(found)?;
         }
     }
     Ok(Vec::new())
+}
+
+/// Help where a word finds nothing.
+const NOTHING: &str = "`trace explain` lists all paths, `trace species` lists the species that ship; others are files of your own \
+                       (docs/guide/species.md) or models";
+
+/// Returns the lines about a word: the species that a scene file finds by it, then what contains it.
+fn found(word: &str, references: &[Reference]) -> Result<Vec<(String, String)>> {
+    let all = all_species()?.0;
+    let mut lines: Vec<(String, String)> = called(&all, word).into_iter().map(line).collect();
+    for other in search(word, references, &shipped_files(&all)?) {
+        if !lines.contains(&other) {
+            lines.push(other);
+        }
+    }
+    Ok(lines)
+}
+
+/// Returns the line of a species: what a scene file writes for it, and all its names.
+fn line(species: &Shipped) -> (String, String) {
+    (format!("species: {:?}", species.stem()), species.names().join(", "))
 }
 
 /// Prints a line for each entry.
@@ -56,16 +82,14 @@ fn print_found(found: Vec<(String, String)>) -> Result<()> {
 }
 
 /// Returns the shipped scene files with their first comments, the species with all their names, and the soil textures.
-fn shipped_files() -> Result<Vec<(String, String)>> {
+fn shipped_files(all_species: &[Shipped]) -> Result<Vec<(String, String)>> {
     let mut all = Vec::new();
     for name in shipped::scene_names()? {
         let text = RonFile::read(&shipped::scene_file(name.clone().into())).map(|page| page.text).unwrap_or_default();
         let comment = text.lines().map_while(|line| line.strip_prefix("//")).collect::<String>();
         all.push((format!("trace --scene {name}"), comment.trim().to_owned()));
     }
-    for species in all_species()?.0 {
-        all.push((format!("species: {:?}", species.stem()), species.names().join(", ")));
-    }
+    all.extend(all_species.iter().map(line));
     let soils = shipped::soil_textures()?;
     all.extend(soils.iter().map(|file| (file.display().to_string(), "soil texture".to_owned())));
     Ok(all)

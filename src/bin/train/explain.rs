@@ -15,7 +15,7 @@ pub(crate) struct Args {
 
 /// Prints the explanation.
 pub(crate) fn run(args: &Args) -> Result<Vec<PathBuf>> {
-    let words = answer(args.path.as_deref().unwrap_or_default(), &[experiment()], "train")?;
+    let words = answer(args.path.as_deref().unwrap_or_default(), &[experiment()], "train")?.text;
     cli::print(&words)?;
     Ok(Vec::new())
 }

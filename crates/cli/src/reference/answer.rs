@@ -4,12 +4,21 @@ use super::walk::{Reference, joined};
 use furrow_base::ron_file::nearest;
 use furrow_base::{Error, Result};
 
+/// Answer to a path.
+pub struct Answer {
+    /// The section or entry, or a list of paths.
+    pub text: String,
+    /// Whether several paths end in the name.
+    pub is_ambiguous: bool,
+}
+
 /// Returns the section or entry of a path; for an empty path, the tree of all paths. A path starts with a kind of file, such as `species`;
 /// otherwise the first kind is used. A single name, or the end of a path, is found anywhere; if it is ambiguous, all matches are listed.
-pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<String> {
+pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<Answer> {
+    let one = |text: String| Answer { text, is_ambiguous: false };
     let (first, rest) = path.split_once('.').unwrap_or((path, ""));
     let chosen = references.iter().find(|of| of.root == first);
-    let Some(default) = chosen.or(references.first()) else { return Ok(String::new()) };
+    let Some(default) = chosen.or(references.first()) else { return Ok(one(String::new())) };
     let inside = if chosen.is_some() { rest } else { path };
     if path.is_empty() || chosen.is_some() && rest.is_empty() {
         let others: Vec<&str> = references.iter().map(|of| of.root).filter(|root| *root != default.root).collect();
@@ -17,14 +26,14 @@ pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<Str
             [] => String::new(),
             of => format!("\nOther files: {program} explain {}\n", of.join(&format!(", {program} explain "))),
         };
-        return Ok(format!(
+        return Ok(one(format!(
             "{}\n\n{}\nDetails of one path: {program} explain PATH\n{more}",
             default.title,
             default.tree()
-        ));
+        )));
     }
     if let Some((section, entry)) = default.find(inside) {
-        return Ok(default.explain(section, entry));
+        return Ok(one(default.explain(section, entry)));
     }
     let name = inside.rsplit('.').next().unwrap_or(inside);
     let candidates = if chosen.is_some() { std::slice::from_ref(default) } else { references };
@@ -35,7 +44,7 @@ pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<Str
     let found: Vec<(&Reference, String)> = found.into_iter().filter(|(_, path)| matches(path)).collect();
     match found.as_slice() {
         [(of, path)] => match of.find(path) {
-            Some((section, entry)) => Ok(of.explain(section, entry)),
+            Some((section, entry)) => Ok(one(of.explain(section, entry))),
             None => Err(unknown(path, "", program)),
         },
         [] => {
@@ -47,7 +56,8 @@ pub fn answer(path: &str, references: &[Reference], program: &str) -> Result<Str
                 .iter()
                 .map(|(of, path)| if of.root == default.root { path.clone() } else { joined(of.root, path) })
                 .collect();
-            Ok(format!("{name} occurs in several places:\n  {}\n", paths.join("\n  ")))
+            let text = format!("{name} occurs in several places:\n  {}\n", paths.join("\n  "));
+            Ok(Answer { text, is_ambiguous: true })
         }
     }
 }

@@ -18,7 +18,7 @@ mod terminal;
 mod tests;
 mod walk;
 
-pub use answer::answer;
+pub use answer::{Answer, answer};
 pub use manual::manual;
 pub use search::search;
 pub use section::{Entry, Section};
