@@ -406,6 +406,36 @@ fn a_page_gives_class_place_size_and_number() {
     );
 }
 
+/// Expected: labels of a file that contradict each other or name no class are refused with the node, if the scene file gives no
+/// class of its own.
+#[test]
+fn labels_that_contradict_each_other_are_refused() {
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).unwrap();
+    let labelled = |one: Value, other: Value, class: &str| {
+        let (mut document, bytes) = triangle(|_| ());
+        document["nodes"] =
+            json!([{ "mesh": 0, "name": "a", "extras": one }, { "mesh": 0, "name": "b", "extras": other }]);
+        document["scenes"] = json!([{ "nodes": [0, 1] }]);
+        write(&folder, "m.gltf", document.to_string());
+        write(&folder, "the bytes.bin", &bytes);
+        placed(&folder, &format!("(file: \"m.gltf\"{class})"))
+    };
+    let crop = || json!({ "class": "crop", "plant": 1, "leaf": 1 });
+    assert!(labelled(crop(), json!({ "class": "soil" }), "").is_ok());
+    for (other, words) in [
+        (json!({ "class": "weed", "plant": 1 }), "plant 1 is a weed in `b`, but not in `a`"),
+        (json!({ "class": "soil", "plant": 5 }), "`b` is soil, but has the number"),
+        (json!({ "class": "crop" }), "`b` is a crop, but has no number"),
+        (json!({ "class": "tree" }), "`b` has the unknown class `tree`"),
+        (json!({ "class": "crop", "plant": -1 }), "the label of `b` is wrong"),
+    ] {
+        let error = labelled(crop(), other.clone(), "").err().unwrap().to_string();
+        assert!(error.contains(words), "{error}");
+        assert!(labelled(crop(), other, ", class: Weed").is_ok());
+    }
+}
+
 #[test]
 fn a_model_stands_on_the_ground_and_counts_after_the_plants() {
     let (_keep, folder) = scratch();

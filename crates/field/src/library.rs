@@ -362,7 +362,7 @@ impl Library {
         let full = self.need(page, path)?;
         let bytes = input::read(&full, input::LARGEST).map_err(|refusal| refusal.into_error(&full))?;
         self.files.insert(full.clone(), Sha256::digest(&bytes).into());
-        let read = input::utf8_lossy(&bytes).and_then(|text| measured::reflectance(&text));
+        let read = input::utf8(&bytes).and_then(measured::reflectance);
         read.map_err(|e| at_its_place(page, path, "", e.in_file(full)))
     }
 

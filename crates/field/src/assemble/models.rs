@@ -11,7 +11,7 @@ use crate::desc::ModelDesc;
 use crate::library::Library;
 use crate::{PartKind, PlantRecord};
 use furrow_base::geometry::{Mesh, Placement};
-use furrow_base::math::{Mat3, Spectrum, ToInt, Vec3};
+use furrow_base::math::{Mat3, Spectrum, ToFloat, ToInt, Vec3};
 use furrow_base::ron_file::{Num, RonFile, Step};
 use furrow_base::sampling::Purpose;
 use furrow_base::sampling::rng::mix;
@@ -83,8 +83,15 @@ impl Entry<'_> {
         if reach.is_finite() && reach <= FARTHEST {
             return Ok(());
         }
-        let words = format!("`{part}` of this model is {size:.0} m large or too far from the origin");
-        let fault = Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001");
+        let fault = if size > FARTHEST {
+            let words = format!("`{part}` of this model is {size:.0} m large");
+            Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001")
+        } else {
+            let words = format!(
+                "`{part}` of this model reaches {reach:.0} m from the field's origin; at most {FARTHEST} m are possible"
+            );
+            Error::input(words).help("move it to the origin in your program, or give another position_m")
+        };
         Err(drawn.page.blame(&self.place(), fault))
     }
 }
@@ -117,12 +124,56 @@ pub(super) fn models(
 /// Loads the file of model `k` of the scene file and checks that it has a class.
 pub(super) fn load(page: &RonFile, library: &mut Library, k: usize, desc: &ModelDesc) -> Result<Arc<Model>> {
     let model = library.model(page, desc)?;
+    let place = [Step::Field("models"), Step::Item(k)];
+    if let Some(fault) = if desc.class.is_none() { label_fault(&model) } else { None } {
+        let help = "correct the extras in your program, such as {\"class\": \"crop\", \"plant\": 1, \"leaf\": 2}, or add class: Crop or Weed";
+        return Err(page.blame(&place, Error::input(fault).help(help)));
+    }
     if desc.class.is_none() && !model.parts.iter().any(|p| known(p.label.as_ref()).is_some()) {
         let fault = Error::input("this model's file defines no class")
             .help("add class: Crop, class: Weed, or class: Soil for an object that is not a plant");
-        return Err(page.blame(&[Step::Field("models"), Step::Item(k)], fault));
+        return Err(page.blame(&place, fault));
     }
     Ok(model)
+}
+
+/// Warns of models of an unusual size, before they are placed.
+pub(super) fn warn_of_sizes(page: &RonFile, library: &mut Library, models: &[ModelDesc]) -> Result<()> {
+    for (k, desc) in models.iter().enumerate() {
+        let model = load(page, library, k, desc)?;
+        let (least, most) = desc.scale.usual();
+        let extent = size(model.parts.iter().map(|part| &part.mesh)).map(|size| size * (0.5 * (least + most)).to_f32());
+        if let Some(words) = extent.and_then(|size| odd_size(size, desc.class)) {
+            library.warn(page, &desc.file, &words)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns what is wrong with the labels of a model file: an unknown class, or numbers that contradict the class.
+fn label_fault(model: &Model) -> Option<String> {
+    if model.label_fault.is_some() {
+        return model.label_fault.clone();
+    }
+    let mut classes: BTreeMap<u32, (Class, &str)> = BTreeMap::new();
+    for part in &model.parts {
+        let (Some(label), name) = (&part.label, &part.name) else { continue };
+        let Some(class) = Class::named(&label.class) else {
+            return Some(format!("`{name}` has the unknown class `{}`: there are soil, crop and weed", label.class));
+        };
+        match (class, label.plant, label.leaf) {
+            (Class::Soil, 0, 0) => {}
+            (Class::Soil, ..) => return Some(format!("`{name}` is soil, but has the number of a plant or leaf")),
+            (_, 0, _) => return Some(format!("`{name}` is a {}, but has no number of a plant from 1", label.class)),
+            (_, plant, _) => {
+                let (first, other) = *classes.entry(plant).or_insert((class, name));
+                if first != class {
+                    return Some(format!("plant {plant} is a {} in `{name}`, but not in `{other}`", label.class));
+                }
+            }
+        }
+    }
+    None
 }
 
 /// Loads the file of a model and creates its materials.
@@ -164,7 +215,7 @@ fn place(
     let foot = Vec3::new(x, y, ground.height(x, y) + desc.lift_m.draw32(&mut stream));
     let mut plants: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     let meshes = meshes(drawn, *k, &PlacedModel { model: model.clone(), turn, scale, foot });
-    if let Some(words) = size(&meshes).and_then(|size| odd_size(size, desc.class)) {
+    if let Some(words) = size(meshes.iter().map(|mesh| &**mesh)).and_then(|size| odd_size(size, desc.class)) {
         library.warn(drawn.page, &desc.file, &words)?;
     }
     let tags = entry.tags(drawn, numbered)?;
@@ -199,7 +250,8 @@ fn sow(
 ) -> Result<Vec<PlantRecord>> {
     let Entry { k, desc, model, .. } = entry;
     let meshes: Vec<Arc<Mesh>> = model.parts.iter().map(|part| Arc::new(part.mesh.clone())).collect();
-    let (templates, extent) = (templates(entry, &meshes, &entry.tags(drawn, 0)?), size(&meshes).unwrap_or(0.0));
+    let (templates, extent) =
+        (templates(entry, &meshes, &entry.tags(drawn, 0)?), size(meshes.iter().map(|mesh| &**mesh)).unwrap_or(0.0));
     let vertices = || meshes.iter().flat_map(|mesh| &mesh.positions);
     let radius = vertices().map(|p| p.truncate().length()).fold(0.0, f32::max);
     let height = vertices().map(|p| p.z).fold(0.0, f32::max);
@@ -274,8 +326,8 @@ pub(super) fn plants_in(desc: &ModelDesc, model: &Model) -> usize {
 }
 
 /// Returns the largest side of the box around meshes, metres; `None` without vertices.
-fn size(meshes: &[Arc<Mesh>]) -> Option<f32> {
-    let bounds = meshes.iter().filter_map(|mesh| mesh.bounds());
+fn size<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> Option<f32> {
+    let bounds = meshes.filter_map(Mesh::bounds);
     let (lo, hi) = bounds.reduce(|(lo, hi), (low, high)| (lo.min(low), hi.max(high)))?;
     Some((hi - lo).max_element())
 }
@@ -284,7 +336,9 @@ fn size(meshes: &[Arc<Mesh>]) -> Option<f32> {
 fn odd_size(size: f32, class: Option<Class>) -> Option<String> {
     let largest = if matches!(class, Some(Class::Crop | Class::Weed)) { LARGEST_PLANT_M } else { LARGEST_M };
     if size > largest {
-        Some(format!("it is {size:.0} m large; lengths are in metres: a file in millimetres needs scale: 0.001"))
+        Some(format!(
+            "it is {size:.0} m large; lengths are in metres: a file in millimetres needs scale: 0.001, one in centimetres scale: 0.01"
+        ))
     } else if size < SMALLEST_M {
         Some(format!("it is {size:.2e} m large; lengths are in metres: scale enlarges it"))
     } else {

@@ -44,6 +44,8 @@ pub struct Model {
     pub pictures: Need,
     /// Contents of the file that the model lacks, in the order of the file.
     pub warnings: Vec<String>,
+    /// The first object with a class that is no label, and what is wrong.
+    pub label_fault: Option<String>,
 }
 
 /// Part of a model.

@@ -164,7 +164,7 @@ pub struct ReliefDesc {
     /// Longest wavelength, metres.
     pub longest_m: Vary<Positive<1000>>,
     /// Slope of the whole field, degrees, in a random direction.
-    pub tilt_deg: Vary<NonNegative<90>>,
+    pub tilt_deg: Vary<NonNegative<45>>,
     /// Furrow and ridge along the rows.
     pub row: RowReliefDesc,
     /// Wheel tracks along the rows; default none.

@@ -40,8 +40,8 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
         let number = |column: usize| row.get(column).and_then(|cell| cell.parse::<f64>().ok());
         match (number(0), number(1)) {
             (Some(nm), Some(share)) => points.push((nm, share)),
-            // A first row without numbers is a header.
-            _ if line == 1 => {}
+            // A first row that begins with a letter is a header.
+            _ if line == 1 && row.get(0).is_some_and(|cell| cell.starts_with(char::is_alphabetic)) => {}
             _ => return Err(wrong(format!("row {line} is not two numbers"))),
         }
     }

@@ -146,14 +146,17 @@ fn format(start: &[u8]) -> Result<ImageFormat, Fault> {
         [0x89, b'P', b'N', b'G', ..] => return Ok(ImageFormat::Png),
         [0xff, 0xd8, ..] => return Ok(ImageFormat::Jpeg),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => "WebP",
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => "TIFF or raw",
+        [b'I', b'I', 42 | 43, 0, ..]
+        | [b'M', b'M', 0, 42 | 43, ..]
+        | [b'F', b'U', b'J', b'I', b'F', b'I', b'L', b'M', ..] => "TIFF or raw",
         [b'G', b'I', b'F', b'8', ..] => "GIF",
         [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => "BMP",
         [b'#', b'?', ..] => "Radiance HDR",
         [0x76, 0x2f, 0x31, 0x01, ..] => "OpenEXR",
         [0xff, 0x0a, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] => "JPEG XL",
-        [0, 0, 0, 12, b'j', b'P', b' ', b' ', ..] => "JPEG 2000",
+        [0, 0, 0, 12, b'j', b'P', b' ', b' ', ..] | [0xff, 0x4f, 0xff, 0x51, ..] => "JPEG 2000",
         _ if brand == b"ftypavif" => "AVIF",
+        _ if brand == b"ftypcrx " => "Canon raw",
         _ if brand.starts_with(b"ftyp") => "HEIC",
         _ => return Err(Fault::new("this is not an image; PNG and JPEG can be read", "")),
     };

@@ -96,6 +96,12 @@ pub struct Header {
 }
 
 impl Header {
+    /// Returns `false` if the file has no alpha channel.
+    pub fn may_have_alpha(&self) -> bool {
+        // Grey or colours with alpha, of 8 or 16 bits; also grey of 16 bits.
+        [2, 4, 8].contains(&self.bytes)
+    }
+
     /// Reads the header of a file. `None` if it is not a readable image or exceeds the limits; decoding then reports
     /// the error.
     pub fn of_file(path: &Path) -> Option<Self> {

@@ -82,6 +82,9 @@ fn choose(headers: &[Header]) -> Result<Choice, String> {
         if with(&["RY"]).iter().chain(&with(&["BY"])).any(|(_, at)| *at == part) {
             return Err("it stores luminance and chroma (Y, RY, BY); save it with channels R, G and B".into());
         }
+        if with(&["X", "Z"]).iter().any(|(_, at)| *at == part) {
+            return Err("it stores CIE XYZ (channels X, Y and Z); save it with channels R, G and B".into());
+        }
         (("", part), ["Y"; 3])
     } else {
         return Err("it has no channels R, G and B".into());
@@ -216,6 +219,8 @@ mod tests {
         let named =
             |all: &[(String, f32)]| found(&all.iter().map(|(name, first)| (name.as_str(), *first)).collect::<Vec<_>>());
         assert_eq!(named(&four(&one)), Ok(([0.0, 1.0, 2.0], Some(vec![3.0, 4.0]))));
+        let xyz = found(&[("X", 1.0), ("Y", 1.0), ("Z", 1.0)]);
+        assert!(xyz.is_err_and(|what| what.contains("CIE XYZ")));
         let both = named(&[four(&one), four(&other)].concat());
         assert!(both.is_err_and(|what| what.contains("`Noise`, `View.Combined`")));
         assert_eq!(found(&[("Y", 4.0)]), Ok(([4.0; 3], None)));

@@ -40,7 +40,18 @@ impl<'a> Accessors<'a> {
             let data: Cow<'a, [u8]> = match &buffer.uri {
                 None => match own {
                     Some(own) if i == 0 => own.into(),
-                    _ => return Err(format!("buffer {i} has no bytes").into()),
+                    _ => {
+                        let meshopt = "EXT_meshopt_compression";
+                        let only = if document.extensions_used.iter().any(|name| name == meshopt) {
+                            format!(": its data is compressed with {meshopt}, which cannot be read")
+                        } else {
+                            String::new()
+                        };
+                        return Err(ModelError {
+                            what: format!("buffer {i} has no bytes{only}"),
+                            help: "export it without compression and extensions",
+                        });
+                    }
                 },
                 Some(uri) => match follow(uri)? {
                     Target::Bytes(data) => data.into(),

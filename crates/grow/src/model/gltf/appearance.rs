@@ -139,7 +139,13 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
         let mut slots = Slots::default();
         let slot = info.as_ref().map(|info| Slot::of(info.tex_coord, &info.extensions)).transpose()?;
         let picture = match info.filter(|_| slots.takes(slot.as_ref())) {
-            Some(info) => Some(self.texture(info.index, cutoff <= 0.0)?),
+            Some(info) => {
+                if cutoff <= 0.0 && self.has_holes(info.index)? {
+                    let words = "the alpha mode OPAQUE shows transparent parts of the picture; MASK cuts them away";
+                    self.notes.about(words, &name);
+                }
+                Some(self.texture(info.index, cutoff <= 0.0)?)
+            }
             None => None,
         };
         let mut appearance = Appearance {
@@ -194,6 +200,8 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
                 }
             }
             let color = of.diffuse_transmission_color_factor.unwrap_or([1.0; 3]);
+            warn_of_color([of.diffuse_transmission_factor; 3], &appearance.surface.name, &mut self.notes);
+            warn_of_color(color, &appearance.surface.name, &mut self.notes);
             appearance.pass(fraction(of.diffuse_transmission_factor), color.map(fraction), picture);
         } else if let Some(share) = material.extensions.get(TRANSMISSION) {
             let share = number(share, "transmissionFactor").unwrap_or(0.0);
@@ -237,6 +245,15 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
         Ok(Pictured { image, texture })
     }
 
+    /// Returns whether a picture has texels that are more transparent than opaque.
+    fn has_holes(&mut self, index: usize) -> Result<bool, ModelError> {
+        let data = self.bytes(self.image(index)?.0)?.1;
+        // Faults of the picture are reported when it is read.
+        let texture = || Texture::decode(&data, ColorSpace::Srgb).ok();
+        Ok(Header::of(&data).is_some_and(|header| header.may_have_alpha())
+            && texture().is_some_and(|texture| texture.alpha_mask().is_some()))
+    }
+
     /// Returns the index of a texture's image, and its wrap modes.
     fn image(&self, texture: usize) -> Result<(usize, [u32; 2]), ModelError> {
         let of = item(&self.document.textures, texture, "texture")?;
@@ -254,8 +271,22 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
     }
 
     fn decode(&mut self, (image, wrap, opaque): Key, space: ColorSpace) -> Result<Texture, ModelError> {
+        let (name, data) = self.bytes(image)?;
+        let need = if space == ColorSpace::Srgb { Header::color } else { Header::normals };
+        self.files.count(&name, &data, need)?;
+        let decode = if opaque { Texture::decode_opaque } else { Texture::decode };
+        let decoded = decode(&data, space).map_err(|what| format!("its picture {name}: {what}"))?;
+        Ok(decoded.wrapped_by(wrap.map(|code| match code {
+            CLAMP_TO_EDGE => Wrap::Clamp,
+            MIRRORED_REPEAT => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        })))
+    }
+
+    /// Returns the name of an image for messages, and the bytes of its file.
+    fn bytes(&mut self, image: usize) -> Result<(String, Cow<'a, [u8]>), ModelError> {
         let source = item(&self.document.images, image, "image")?;
-        let data: Cow<'_, [u8]> = match (&source.uri, source.buffer_view) {
+        let data: Cow<'a, [u8]> = match (&source.uri, source.buffer_view) {
             (Some(uri), _) => match follow(uri)? {
                 Target::Bytes(data) => data.into(),
                 Target::File(name) => self.files.named(&name)?.into(),
@@ -267,16 +298,7 @@ impl<'a, 'f> AppearanceReader<'a, 'f> {
             (None, None) => return Err(format!("image {image} has no bytes").into()),
         };
         let name = source.uri.as_deref().filter(|u| !u.starts_with("data:")).or(source.name.as_deref());
-        let name = name.map_or_else(|| format!("image {image}"), |n| format!("`{n}`"));
-        let need = if space == ColorSpace::Srgb { Header::color } else { Header::normals };
-        self.files.count(&name, &data, need)?;
-        let decode = if opaque { Texture::decode_opaque } else { Texture::decode };
-        let decoded = decode(&data, space).map_err(|what| format!("its picture {name}: {what}"))?;
-        Ok(decoded.wrapped_by(wrap.map(|code| match code {
-            CLAMP_TO_EDGE => Wrap::Clamp,
-            MIRRORED_REPEAT => Wrap::Mirror,
-            _ => Wrap::Repeat,
-        })))
+        Ok((name.map_or_else(|| format!("image {image}"), |n| format!("`{n}`")), data))
     }
 }
 

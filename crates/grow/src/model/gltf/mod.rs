@@ -114,8 +114,14 @@ impl Reader<'_> {
             let node = &self.document.nodes[index];
             let Some(mesh) = node.mesh else { continue };
             let mesh = item(&self.document.meshes, mesh, "mesh")?;
-            let label = label(&node.extras).or_else(|| label(&mesh.extras));
             let name = node.name.as_ref().or(mesh.name.as_ref()).cloned().unwrap_or_else(|| format!("node {index}"));
+            let label = match label(&node.extras).transpose().or_else(|| label(&mesh.extras).transpose()).transpose() {
+                Ok(label) => label,
+                Err(fault) => {
+                    model.label_fault.get_or_insert_with(|| format!("the label of `{name}` is wrong: {fault}"));
+                    None
+                }
+            };
             let to = world[index];
             let pose = match node.skin {
                 Some(skin) => {
@@ -222,6 +228,9 @@ impl Reader<'_> {
                 let (n, p) = (mesh.normals.len(), mesh.positions.len());
                 return Err(format!("`{name}` has {p} vertices and {n} normals").into());
             }
+            if let Some(i) = mesh.normals.iter().position(|normal| !normal.is_finite()) {
+                return Err(format!("normal {i} of `{name}` is not a finite number").into());
+            }
         }
         self.warn_of_colors(primitive, name)?;
         let bound = if pose.is_some() { bound(accessors, primitive, mesh.positions.len())? } else { Vec::new() };
@@ -281,6 +290,13 @@ fn triangles(mode: u32, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
     })
 }
 
-fn label(extras: &serde_json::Value) -> Option<Label> {
-    serde_json::from_value(extras.clone()).ok()
+/// Returns the label in the extras of a node or mesh: those with a class. The error says what is wrong with it.
+fn label(extras: &serde_json::Value) -> Result<Option<Label>, String> {
+    if extras.get("class").is_none() {
+        return Ok(None);
+    }
+    let mut label: Label = serde_json::from_value(extras.clone()).map_err(|e| e.to_string())?;
+    // Scene files write classes with a capital.
+    label.class = label.class.to_lowercase();
+    Ok(Some(label))
 }

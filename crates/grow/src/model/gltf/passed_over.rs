@@ -81,7 +81,7 @@ pub(super) fn warn_of_material(material: &Material, name: &str, notes: &mut Note
     if !material.extensions.contains_key(SPECULAR_GLOSSINESS) {
         if pbr.metallic_roughness_texture.is_some() {
             notes.about("passed over: pictures of metal and roughness", name);
-        } else if pbr.metallic_factor.unwrap_or(1.0) > 0.5 {
+        } else if pbr.metallic_factor.unwrap_or(1.0) > 0.0 {
             notes.about("passed over: metal, whose base colour becomes its reflectance", name);
         }
     }

@@ -53,6 +53,35 @@ fn corner(model: &Model, uv: Vec2) -> Vec3 {
     mesh.positions[mesh.uvs.iter().position(|t| *t == uv).unwrap()]
 }
 
+/// Expected: labels are read with classes in any capitals; what is no label is named, and other extras are none.
+#[test]
+fn labels_are_read_or_what_is_wrong_is_named() {
+    let labelled = |extras: Value| square(|document, _| document["nodes"][0]["extras"] = extras).unwrap();
+    let model = labelled(json!({ "class": "Weed", "plant": 2, "leaf": 1 }));
+    let label = model.parts[0].label.as_ref().unwrap();
+    assert_eq!((label.class.as_str(), label.plant, label.leaf, &model.label_fault), ("weed", 2, 1, &None));
+    assert!(labelled(json!({ "colour": 1 })).label_fault.is_none());
+    for extras in
+        [json!({ "class": "crop", "plant": "2" }), json!({ "class": "crop", "plant": 2.5 }), json!({ "class": 3 })]
+    {
+        let fault = labelled(extras).label_fault.unwrap();
+        assert!(fault.contains("the label of `leaf` is wrong"), "{fault}");
+    }
+}
+
+/// Expected: transparent texels that OPAQUE shows are warned of, and not with MASK.
+#[test]
+fn transparent_texels_of_an_opaque_material_are_warned_of() {
+    let warnings = |mode: Option<&str>| {
+        let model = square(|document, bytes| {
+            pictured(document, bytes);
+            document["materials"][0]["alphaMode"] = json!(mode);
+        });
+        model.unwrap().warnings.into_iter().filter(|words| words.contains("OPAQUE shows transparent")).count()
+    };
+    assert_eq!([warnings(None), warnings(Some("OPAQUE")), warnings(Some("MASK"))], [1, 1, 0]);
+}
+
 #[test]
 fn a_plain_square_has_no_warnings() {
     let model = square(|_, _| ()).unwrap();
@@ -110,6 +139,7 @@ fn a_normal_map_needs_the_coordinates_of_the_colour() {
     let read = |normal: Value| {
         let model = square(|d, b| {
             pictured(d, b);
+            d["materials"][0]["alphaMode"] = json!("MASK");
             d["materials"][0]["normalTexture"] = normal;
         });
         let mut model = model.unwrap();

@@ -6,8 +6,14 @@ use std::borrow::Cow;
 /// Returns the text of a file. Bytes that are not UTF-8 are taken for ISO 8859-1, which older Windows programs write.
 /// Returns an error message for UTF-16.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
+    if bytes.starts_with(&[0xff, 0xfe, 0, 0]) {
+        return Err(utf_32());
+    }
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err("its text is UTF-16; save it as UTF-8".into());
+    }
+    if bytes.starts_with(&[0, 0, 0xfe, 0xff]) {
+        return Err(utf_32());
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if let Ok(text) = std::str::from_utf8(bytes) {
@@ -16,6 +22,10 @@ pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     let latin = |line: &[u8]| line.iter().map(|byte| char::from(*byte)).collect();
     let line = |line: &[u8]| std::str::from_utf8(line).map_or_else(|_| latin(line), str::to_owned);
     Ok(bytes.split(|byte| *byte == b'\n').map(line).collect::<Vec<String>>().join("\n").into())
+}
+
+fn utf_32() -> String {
+    "its text is UTF-32; save it as UTF-8".into()
 }
 
 /// A statement: the number of its first line, its keyword, and the rest without surrounding spaces.
@@ -59,9 +69,10 @@ impl Statement<'_> {
         self.rest.split_whitespace().take_while(|word| !word.starts_with('#'))
     }
 
-    /// Reads a number.
+    /// Reads a number, which must be finite.
     pub(super) fn number(&self, word: &str) -> Result<f64, String> {
-        word.parse().map_err(|_| self.wrong(&format!("`{word}` is not a number")))
+        let number: f64 = word.parse().map_err(|_| self.wrong(&format!("`{word}` is not a number")))?;
+        if number.is_finite() { Ok(number) } else { Err(self.wrong(&format!("`{word}` is not a finite number"))) }
     }
 
     /// Reads a number of a material, which must be finite in single precision.

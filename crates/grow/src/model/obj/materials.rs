@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Keywords that do not concern the diffuse colour, or repeat it.
-const HARMLESS: [&str; 14] =
-    ["Ka", "Ks", "Ni", "illum", "sharpness", "Km", "map_Ka", "map_Ks", "map_Ns", "map_aat", "Tf", "Ps", "Pc", "Pcr"];
+const HARMLESS: [&str; 11] =
+    ["Ka", "Ks", "Ni", "illum", "sharpness", "Km", "map_Ka", "map_Ks", "map_Ns", "map_aat", "Tf"];
 
 /// A picture and how it is laid.
 #[derive(Clone, Debug, PartialEq)]
@@ -305,9 +305,13 @@ fn map(of: &Statement<'_>, material: &str, notes: &mut Notes) -> Result<Map, Str
     Ok(map)
 }
 
-/// Replaces backslashes in a path by slashes.
+/// Replaces backslashes in a path by slashes. Of a path on a drive of another machine, only the file's name is left.
 fn slashed(path: &str) -> String {
-    path.replace('\\', "/")
+    let path = path.replace('\\', "/");
+    match path.as_bytes() {
+        [drive, b':', ..] if drive.is_ascii_alphabetic() => path.rsplit('/').next().unwrap_or_default().to_owned(),
+        _ => path,
+    }
 }
 
 /// Returns the mask where a grey texture is brighter than one half; `None` if it is so everywhere.

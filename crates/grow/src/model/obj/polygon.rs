@@ -27,9 +27,14 @@ pub(super) fn triangles(corners: &[DVec3]) -> Cut {
     let fan = || (2..corners.len()).map(|i| [0, i - 1, i]).collect();
     let normal = normal(corners);
     let area = normal.length();
-    // A polygon without area has no inside, and coordinates that are not finite are reported later.
-    if corners.len() == 3 || area.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) || !area.is_finite() {
+    if corners.len() == 3 {
         return Cut::Whole(fan());
+    }
+    // Twice the area of the fan's triangles, whichever way each turns.
+    let covered: f64 = (2..corners.len()).map(|i| normal_of([corners[0], corners[i - 1], corners[i]]).length()).sum();
+    // A polygon of width 0 has no inside; one whose sides cross may have lobes of equal area, which cancel.
+    if area.partial_cmp(&(ROUNDING * covered)) != Some(std::cmp::Ordering::Greater) {
+        return if covered > 0.0 { Cut::Crossed(fan()) } else { Cut::Whole(fan()) };
     }
     // Coordinates in the polygon's plane.
     let across = normal.any_orthogonal_vector().normalize();
@@ -45,13 +50,33 @@ pub(super) fn triangles(corners: &[DVec3]) -> Cut {
     if n > MOST_CORNERS {
         return Cut::TooMany;
     }
+    if sides_cross(&flat, -least) {
+        return Cut::Crossed(fan());
+    }
     clip(&flat).map_or_else(|| Cut::Crossed(fan()), Cut::Whole)
+}
+
+/// Returns the normal of a triangle, whose length is twice the triangle's area.
+fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
+/// Returns whether two sides of a polygon cross between their ends; `least` is the smallest area of a triangle, twice, that is no
+/// rounding error.
+fn sides_cross(flat: &[[f64; 2]], least: f64) -> bool {
+    let n = flat.len();
+    let side = |i: usize| [flat[i], flat[(i + 1) % n]];
+    let apart = |[a, b]: [[f64; 2]; 2], [p, q]: [[f64; 2]; 2]| {
+        let (one, other) = (turn(a, b, p), turn(a, b, q));
+        one.min(other) < -least && one.max(other) > least
+    };
+    (0..n).any(|i| (i + 2..n).any(|j| apart(side(i), side(j)) && apart(side(j), side(i))))
 }
 
 /// Returns the normal of a polygon, whose length is twice the polygon's area (Newell's method).
 pub(super) fn normal(corners: &[DVec3]) -> DVec3 {
     let first = corners[0];
-    (2..corners.len()).map(|i| (corners[i - 1] - first).cross(corners[i] - first)).sum()
+    (2..corners.len()).map(|i| normal_of([first, corners[i - 1], corners[i]])).sum()
 }
 
 /// Returns twice the signed area of a triangle; positive if it turns left.
@@ -117,6 +142,23 @@ mod tests {
     }
 
     const L: [(f64, f64); 6] = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)];
+
+    /// Expected: quadrilaterals whose sides cross are reported, also if their lobes have the same area, whichever corner comes
+    /// first; one of width 0 is whole.
+    #[test]
+    fn sides_that_cross_are_reported() {
+        let bow = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)];
+        let uneven = [(0.0, 0.0), (3.0, 2.0), (3.0, 0.0), (0.0, 1.0)];
+        for flat in [bow, uneven] {
+            for first in 0..4 {
+                let mut flat = flat;
+                flat.rotate_left(first);
+                let cut = triangles(&tilted(&flat));
+                assert!(matches!(cut, Cut::Crossed(_)), "{flat:?}: {cut:?}");
+            }
+        }
+        assert!(matches!(triangles(&tilted(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)])), Cut::Whole(_)));
+    }
 
     /// Expected: the triangles have the area of the polygon, whichever corner comes first and whichever way it turns.
     #[test]

@@ -14,13 +14,15 @@ use super::opencv::OpenCv;
 use furrow_base::math::RoundTo;
 use furrow_base::{Error, Result};
 
-/// Names of the camera matrix: those of OpenCV's samples, of ROS, and of scripts.
-const MATRIX: [&str; 5] = ["camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx"];
+/// Names of the camera matrix: those of OpenCV's samples, of ROS 1 and 2, and of scripts.
+const MATRIX: [&str; 6] = ["camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "k", "mtx"];
 /// Names of the distortion coefficients.
-const COEFFICIENTS: [&str; 6] =
-    ["distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "dist"];
+const COEFFICIENTS: [&str; 7] =
+    ["distortion_coefficients", "distCoeffs", "dist_coeffs", "Distortion_Coefficients", "D", "d", "dist"];
 /// Names of the image's width and height.
 const SIZE: [[&str; 2]; 2] = [["image_width", "image_Width"], ["image_height", "image_Height"]];
+/// Largest focal length, pixels.
+const MOST_FOCAL: f64 = 1e6;
 /// Largest side of a calibrated image, pixels.
 const MOST_PIXELS: f64 = 1e6;
 /// Largest relative difference between the aspect ratios of the calibration and of the image.
@@ -58,6 +60,13 @@ impl Calibration {
         }
         let find = |names: &[&str]| all.iter().find(|entry| names.contains(&entry.key.as_str()));
         let need = |names: &[&str], what: &str| {
+            let mut others = all.iter().filter(|entry| names.contains(&entry.key.as_str()));
+            if let (Some(one), Some(other)) = (others.next(), others.next())
+                && one.matrix().ok() != other.matrix().ok()
+            {
+                let words = format!("is another {what} than that of {} in line {}", one.key, one.line);
+                return Err(other.fault(words).help("keep one of the two"));
+            }
             find(names).ok_or_else(|| {
                 Error::input(format!("the file has no {}", names[0]))
                     .help(format!("write the {what} with fs.write(\"{}\", …)", names[0]))
@@ -75,6 +84,10 @@ impl Calibration {
         }
         if fx <= 0.0 || fy <= 0.0 {
             return Err(entry.fault("has focal lengths that are not above 0").help("calibrate again"));
+        }
+        if fx > MOST_FOCAL || fy > MOST_FOCAL {
+            let words = format!("has a focal length above {MOST_FOCAL} pixels");
+            return Err(entry.fault(words).help("focal lengths are in pixels"));
         }
         let entry = need(&COEFFICIENTS, "distortion coefficients")?;
         let coefficients = entry.matrix()?;
@@ -380,6 +393,8 @@ mod tests {
         same(&yaml(&FIVE, "").replace('\n', "\r\n"));
         let ros = yaml(&FIVE, "").replace(" !!opencv-matrix", "");
         same(&ros);
+        // Names of ROS 2.
+        same(&ros.replace("camera_matrix:", "k:").replace("distortion_coefficients:", "d:"));
         let named = Calibration::read(&format!("{ros}distortion_model: plumb_bob\n")).unwrap();
         assert_eq!(named.fisheye, Some(false));
         let (focal, centre, _) = expected.lens((320, 240), false).unwrap();
@@ -436,6 +451,11 @@ mod tests {
             (good.replace("322.5, 0.", "322.5"), "line 5: camera_matrix has 8 numbers, not 3 × 3"),
             (good.replace("500., 0.,", "500., 0.1,"), "line 5: camera_matrix is not of the form"),
             (good.replace("500.", "-500."), "focal lengths"),
+            (good.replace("500.", "1e12"), "a focal length above 1000000 pixels"),
+            (
+                format!("{good}K: [600, 0, 322.5, 0, 510, 238.25, 0, 0, 1]\n"),
+                "K is another camera matrix than that of camera_matrix in line 5",
+            ),
             (
                 good.replace("data: [ -0.21", "data: [ -0.21, 1"),
                 "line 10: distortion_coefficients has 6 numbers, not 1 × 5",
