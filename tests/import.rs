@@ -142,6 +142,52 @@ fn masks_of_numbers_come_in_pixel_by_pixel() {
     assert!(String::from_utf8_lossy(&film.stderr).contains("layers"));
 }
 
+/// Pictures outside the folders that are read, infrared images in colour, and an image that two splits list. Expected: a warning
+/// with their number for each; folders of splits may have capitals.
+#[test]
+fn what_a_source_leaves_out_is_warned_of() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    numbered(root);
+    let [images, masks, nir] = ["images", "masks", "nir"].map(|name| root.join(name));
+    for folder in [&images, &masks, &nir] {
+        std::fs::rename(folder.join("train"), folder.join("Train")).unwrap();
+    }
+    std::fs::create_dir_all(images.join("other")).unwrap();
+    for name in ["other/d.png", "e.png"] {
+        write_png(&images.join(name), W, H, &ImageData::Rgb(&photo(7)), "").unwrap();
+    }
+    let first = std::fs::read_dir(nir.join("Train")).unwrap().next().unwrap().unwrap().path();
+    write_png(&first, W, H, &ImageData::Rgb(&photo(7)), "").unwrap();
+    let arguments = ["--format", "masks", "--images", text(&images), "--masks", text(&masks), "--mask-suffix", "_mask"];
+    let output = import(&out, &[&arguments[..], &["--nir", text(&nir)]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("2 pictures were left out, such as e.png"), "{said}");
+    assert!(said.contains("its infrared image has colours"), "{said}");
+    assert_eq!(Set::open(&out).unwrap().recipe.count, 3);
+}
+
+/// A folder of COCO files with one that is not named after a split, and one image in two of them. Expected: a warning for each.
+#[test]
+fn files_beside_those_of_splits_are_warned_of() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    std::fs::create_dir_all(root.join("annotations")).unwrap();
+    std::fs::create_dir_all(root.join("images")).unwrap();
+    write_png(&root.join("images/a.png"), W, H, &ImageData::Rgb(&photo(1)), "").unwrap();
+    let document = r#"{"images": [{"id": 1, "file_name": "a.png"}], "categories": [{"id": 1, "name": "crop"}],
+        "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "segmentation": [[1, 1, 6, 1, 6, 6, 1, 6]]}]}"#;
+    for name in ["instances_train", "instances_val", "custom"] {
+        std::fs::write(root.join(format!("annotations/{name}.json")), document).unwrap();
+    }
+    let output = import(&out, &["--format", "coco", "--from", text(root)]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("1 files were left out, such as custom.json"), "{said}");
+    assert!(said.contains("1 images are in more than one split"), "{said}");
+}
+
 #[test]
 fn masks_of_colours_and_jpeg_images_come_in() {
     let (kept, out) = scratch();
@@ -604,7 +650,9 @@ fn photographs_are_turned_as_viewers_show_them() {
             assert_eq!(r > b, is_red(i), "{orientation}: pixel {i}");
         }
         let warned = &samples[0].record.warnings;
-        assert_eq!(warned, &[format!("the photograph was turned by its EXIF orientation {orientation}")]);
+        let turned = format!("the photograph was turned by its EXIF orientation {orientation}");
+        let colored = "its infrared image has colours, of which the brightness was read".to_owned();
+        assert_eq!(warned, &[turned.clone(), colored, format!("infrared image: {turned}")]);
         if orientation == 6 {
             write_png(&root.join("masks/a.png"), 32, 16, &ImageData::Gray(&mask), "").unwrap();
             let words = refused(&root.join("other"), &arguments);

@@ -45,7 +45,7 @@ impl ExpectedPlants {
     /// Returns the distribution as a sentence.
     pub fn words(&self) -> String {
         let Self { median, low, high, fields } = *self;
-        let about = format!("expected plants in an image: {}", number(median));
+        let about = format!("expected plants in view of an image: {}", number(median));
         let range = format!("{} to {}", number(low), number(high));
         match fields {
             1 => about,
@@ -96,14 +96,12 @@ mod tests {
         assert_eq!((even.low, even.median, even.high), (10.5, 14.95, 19.4));
         assert_eq!(even.warning(), None);
         let wide = ExpectedPlants::of((0..100).map(f64::from).collect()).unwrap();
-        assert!(
-            wide.warning().unwrap().starts_with(
-                "expected plants in an image: 49.5 (median; 90 % of the fields: 5 to 94), a factor of 18.8"
-            )
-        );
+        assert!(wide.warning().unwrap().starts_with(
+            "expected plants in view of an image: 49.5 (median; 90 % of the fields: 5 to 94), a factor of 18.8"
+        ));
         let few = ExpectedPlants::of(vec![19.5, 11.1]).unwrap();
-        assert_eq!(few.words(), "expected plants in an image: 15.3 (median of 2 fields with 11.1 to 19.5)");
-        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "expected plants in an image: 7");
+        assert_eq!(few.words(), "expected plants in view of an image: 15.3 (median of 2 fields with 11.1 to 19.5)");
+        assert_eq!(ExpectedPlants::of(vec![7.0]).unwrap().words(), "expected plants in view of an image: 7");
         // Fields with less than one plant count as one, so the ratio stays finite.
         assert_eq!(ExpectedPlants::of(vec![0.0, 0.2, 0.1, 2.0]).unwrap().spread(), 2.0);
         assert_eq!(ExpectedPlants::of(Vec::new()), None);

@@ -10,7 +10,7 @@ use furrow_base::{Error, Result};
 use std::path::PathBuf;
 
 /// Returns the network whose weights are the means of those of `first` and of the runs in these folders; its card is that
-/// of `first`. Fails if the runs differ in network, classes, bands or sizes.
+/// of `first`. Fails if the runs differ in network, classes, bands, sizes or pixel size.
 pub fn average(first: TrainedModel, others: &[PathBuf]) -> Result<TrainedModel> {
     if others.is_empty() {
         return Ok(first);
@@ -22,11 +22,12 @@ pub fn average(first: TrainedModel, others: &[PathBuf]) -> Result<TrainedModel> 
         let other = TrainedModel::open(folder)?;
         let is_same = |(a, b): (&Array, &Array)| a.name == b.name && a.shape == b.shape;
         if !alike(&card, &other.card)
+            || card.pixel_mm != other.card.pixel_mm
             || values.len() != other.values.len()
             || !values.iter().zip(&other.values).all(is_same)
         {
             return Err(Error::input("this run does not match the first: their weights cannot be averaged")
-                .help("runs must agree in network, classes, bands and sizes, and should start from the same weights (`train fit --init`)")
+                .help("runs must agree in network, classes, bands, sizes and `pixel_mm`, and should start from the same weights (`train fit --init`)")
                 .in_file(folder));
         }
         for (sum, array) in sums.iter_mut().zip(&other.values) {

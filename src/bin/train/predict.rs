@@ -118,6 +118,13 @@ impl Job<'_> {
     /// the network for any field beside them. Returns the paths of the files written.
     pub(crate) fn run(&self, trained: &Ensemble, out: &Path) -> Result<Vec<PathBuf>> {
         let pictures = input_images::find(self.images, &trained.card.input, self.bands)?;
+        if let [first, others @ ..] = &input_images::passed_over(self.images)[..] {
+            let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+            furrow_cli::message!(
+                "warning: images in subfolders are passed over: {}{more}; name these folders too",
+                first.display()
+            );
+        }
         let predicted = self.predict(trained, &pictures, out)?;
         let found = Implausible::of(&trained.card, &predicted.pixels);
         let mut paths = outcome(predicted, pictures.len())?;

@@ -4,7 +4,7 @@ use super::SourceImage;
 use crate::model::split::Split;
 use furrow_base::{Error, Result};
 use furrow_output::Photo;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Extensions of image files.
@@ -44,12 +44,13 @@ pub(super) fn pictures(folder: &Path, suffix: &str) -> Result<BTreeMap<String, P
 
 /// Returns the image files of the split folders in `folder`, or of `folder` itself if it has none.
 pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<SourceImage, PathBuf>> {
-    let mut all = BTreeMap::new();
-    for (name, split) in SPLITS {
-        let below = folder.join(name);
-        if below.is_dir() {
-            let found = pictures(&below, suffix)?;
-            all.extend(found.into_iter().map(|(name, path)| (SourceImage { split: Some(split), name }, path)));
+    let mut all: BTreeMap<SourceImage, PathBuf> = BTreeMap::new();
+    for (below, split) in split_folders(folder)? {
+        for (name, path) in pictures(&below, suffix)? {
+            if let Some(other) = all.insert(SourceImage { split: Some(split), name }, path.clone()) {
+                let words = format!("{} and {} have the same name and split", other.display(), path.display());
+                return Err(Error::input(words).help("rename one of them, or remove it"));
+            }
         }
     }
     if all.is_empty() {
@@ -59,15 +60,58 @@ pub(super) fn listed(folder: &Path, suffix: &str) -> Result<BTreeMap<SourceImage
     Ok(all)
 }
 
-/// Returns a warning that counts the pictures of other formats in a folder and in the folders of its splits.
-pub(super) fn unread(folder: &Path) -> Option<String> {
-    let folders = [folder.to_path_buf()].into_iter().chain(SPLITS.iter().map(|(name, _)| folder.join(name)));
-    let entries = folders.filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().filter_map(Result::ok);
-    let is_other = |path: &PathBuf| {
-        path.extension().is_some_and(|ending| OTHERS.contains(&ending.to_string_lossy().to_lowercase().as_str()))
-    };
-    let count = entries.map(|entry| entry.path()).filter(is_other).count();
-    (count > 0).then(|| format!("{}: {count} pictures that are neither PNG nor JPEG were left out", folder.display()))
+/// Returns the folders in `folder` that are named after a split, in any capitals.
+fn split_folders(folder: &Path) -> Result<Vec<(PathBuf, Split)>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(Error::reading(folder))? {
+        let path = entry.map_err(Error::reading(folder))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        let split = SPLITS.iter().find(|(of, _)| *of == name).map(|(_, split)| *split);
+        found.extend(split.filter(|_| path.is_dir()).map(|split| (path, split)));
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Largest depth of subfolders that are searched for pictures that are left out.
+const MOST_DEPTH: usize = 4;
+
+/// Returns warnings that count the pictures in a folder and below that are left out: those of other formats, and those that
+/// are not among `read` although their names end in `suffix`.
+pub(super) fn unread<'a>(folder: &Path, suffix: &str, read: impl Iterator<Item = &'a PathBuf>) -> Vec<String> {
+    let read: BTreeSet<&PathBuf> = read.collect();
+    let (mut others, mut elsewhere) = (0_usize, Vec::new());
+    let mut open = vec![(folder.to_path_buf(), 0)];
+    while let Some((within, depth)) = open.pop() {
+        for entry in std::fs::read_dir(within).ok().into_iter().flatten().filter_map(Result::ok) {
+            let path = entry.path();
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) && depth < MOST_DEPTH {
+                open.push((path, depth + 1));
+                continue;
+            }
+            let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            others += usize::from(OTHERS.contains(&ending.as_str()));
+            if PICTURES.contains(&ending.as_str()) && stem.ends_with(suffix) && !read.contains(&path) {
+                elsewhere.push(path);
+            }
+        }
+    }
+    elsewhere.sort();
+    let place = folder.display();
+    let mut warnings = Vec::new();
+    if others > 0 {
+        warnings.push(format!("{place}: {others} pictures that are neither PNG nor JPEG were left out"));
+    }
+    if let Some(first) = elsewhere.first() {
+        warnings.push(format!(
+            "{place}: {} pictures were left out, such as {}: images are read in this folder, or, if there are such, in its \
+             folders train, val and test",
+            elsewhere.len(),
+            first.strip_prefix(folder).unwrap_or(first).display()
+        ));
+    }
+    warnings
 }
 
 /// Returns a file's length in bytes. Name and length identify a file without reading it.
@@ -89,7 +133,7 @@ pub(super) struct Shot<T> {
 
 /// Returns a photograph with warnings about what was changed to read it.
 pub(super) fn photograph<T>(photo: Photo<T>) -> Shot<T> {
-    let Photo { size, pixels, orientation, stored_size: stored, transparent } = photo;
+    let Photo { size, pixels, orientation, stored_size: stored, transparent, .. } = photo;
     let mut warnings = Vec::new();
     if orientation != 1 {
         warnings.push(format!("the photograph was turned by its EXIF orientation {orientation}"));

@@ -115,7 +115,9 @@ impl Masks {
             list.push(one);
             files.push(Files { image, mask, nir });
         }
-        let mut warnings: Vec<String> = unread(&folders.images).into_iter().collect();
+        // Masks and infrared images in the same folder are no images that were left out.
+        let read = files.iter().flat_map(|of| [Some(&of.image), Some(&of.mask), of.nir.as_ref()]).flatten();
+        let mut warnings = unread(&folders.images, &folders.image_suffix, read);
         for (left, what, folder) in
             [(&masks, "masks", Some(&folders.masks)), (&nirs, "infrared images", folders.nir.as_ref())]
         {
@@ -168,16 +170,21 @@ impl Source for Masks {
         let (x, y, map) = furrow_output::read_map(mask)?;
         same_size(mask, (x, y), &photo)?;
         let semantics = self.semantics(mask, photo.size.0, map)?;
+        let (size, rgb, mut warnings) = (photo.size, photo.pixels.clone(), photo.warnings.clone());
         let nir = match nir {
             Some(path) => {
-                let gray = photograph(furrow_output::open_gray_photo(path)?);
+                let gray = furrow_output::open_gray_photo(path)?;
+                if gray.is_colored {
+                    warnings.push("its infrared image has colours, of which the brightness was read".into());
+                }
+                let gray = photograph(gray);
+                warnings.extend(gray.warnings.iter().map(|what| format!("infrared image: {what}")));
                 same_size(path, gray.size, &photo)?;
                 gray.pixels
             }
             None => Vec::new(),
         };
         let (plants, leaves) = (vec![0; semantics.len()], vec![0; semantics.len()]);
-        let (size, rgb, warnings) = (photo.size, photo.pixels, photo.warnings);
         Ok(Labelled { size, rgb, nir, semantics, plants, leaves, warnings, ..Labelled::default() })
     }
 }

@@ -4,6 +4,7 @@ use super::statistics::{Species, Statistics};
 use crate::format;
 use crate::model::image_files::belongs;
 use crate::model::image_format::ImageFormat;
+use crate::model::optional_maps::OptionalMap;
 use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::split::Split;
 use furrow_base::math::{ToFloat, ToInt};
@@ -183,8 +184,13 @@ pub(super) fn reading(recipe: &Recipe, nir: bool) -> Markup {
         rows.push(("coverage.png", html! { (coverage) }));
     }
     if has("geometry.exr") {
+        let keeps = |maps: [OptionalMap; 2]| maps.into_iter().any(|map| recipe.keeps(map));
+        let (depth, normals) =
+            (keeps([OptionalMap::Depth, OptionalMap::Depth32]), keeps([OptionalMap::Normals, OptionalMap::Normals16]));
         let geometry = html! {
-            code { "depth.Z" } " in metres along the optical axis, " code { "normal.X/Y/Z" } " in world coordinates"
+            @if depth { code { "depth.Z" } " in metres along the optical axis" }
+            @if depth && normals { ", " }
+            @if normals { code { "normal.X/Y/Z" } " in world coordinates" }
         };
         rows.push(("geometry.exr", geometry));
     }

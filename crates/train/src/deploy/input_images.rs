@@ -205,6 +205,23 @@ fn images(selection: &Selection, shape: &Shape) -> Result<Vec<InputImage>> {
     numbers.into_iter().map(image).collect()
 }
 
+/// Returns the subfolders with images of the folders among `inputs`, which [`find`] passes over; those with predictions are not
+/// listed.
+pub fn passed_over(inputs: &[PathBuf]) -> Vec<PathBuf> {
+    let entries =
+        |folder: &Path| std::fs::read_dir(folder).ok().into_iter().flatten().filter_map(|e| Some(e.ok()?.path()));
+    let is_image = |path: &PathBuf| {
+        let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+        ending.is_some_and(|e| ENDINGS.contains(&e.as_str())) && path.is_file()
+    };
+    let folders = inputs.iter().filter(|input| input.is_dir() && selection(input).is_ok_and(|found| found.is_none()));
+    let within = folders.flat_map(|folder| entries(folder)).filter(|path| path.is_dir());
+    let mut found: Vec<PathBuf> =
+        within.filter(|path| !path.join(PREDICTION).is_file() && entries(path).any(|path| is_image(&path))).collect();
+    found.sort();
+    found
+}
+
 /// Lists the image file `input`, or all image files directly in the folder `input` except those that are bands of others.
 fn photos(input: &Path, shape: &Shape) -> Result<Vec<PathBuf>> {
     if !input.exists() {

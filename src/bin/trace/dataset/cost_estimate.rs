@@ -101,7 +101,9 @@ fn rows(folder: &Path, cost: &CostEstimate, threads: usize, price: PriceArgs) ->
     let with = count(threads.to_u64(), "thread", "threads");
     let of_fields = if fields < images { format!(" of {}", count(fields, "field", "fields")) } else { String::new() };
     let memory = (cost.memory(CORES.to_usize()).to_f64() * SPARE / GIB).ceil().max(1.0);
-    let price = price.price_per_core_hour.map(|price| row("price", number(price * core_s / 3600.0)));
+    let price = price.price_per_core_hour.map(|price| {
+        row("price", format!("{} in the currency of --price-per-core-hour", number(price * core_s / 3600.0)))
+    });
     let shards = cost.shards(CORES);
     let mut rows = vec![
         row("from", format!("{} with {samples} samples per pixel", listed(&probes))),

@@ -39,6 +39,7 @@ pub struct Coco {
     images: Vec<Annotated>,
     words: String,
     crowds: Crowds,
+    warnings: Vec<String>,
 }
 
 /// Meaning of an annotation with `iscrowd` 1.
@@ -87,7 +88,8 @@ impl Coco {
         if crowds != Crowds::Class {
             let _ = writeln!(words, "crowds: {crowds:?}");
         }
-        let mut all = Self { listed: Vec::new(), images: Vec::new(), words, crowds };
+        let warnings = others(from);
+        let mut all = Self { listed: Vec::new(), images: Vec::new(), words, crowds, warnings };
         let mut found: Vec<(SourceImage, Annotated)> = Vec::new();
         for (split, document) in documents(from)? {
             let folder = images.map_or_else(|| beside(from, &document), Path::to_path_buf);
@@ -100,6 +102,12 @@ impl Coco {
         }
         if found.is_empty() {
             return Err(Error::input("it lists no images").in_file(from));
+        }
+        let files: BTreeSet<&Path> = paths.iter().map(|(_, path)| path.as_path()).collect();
+        let twice = paths.len() - files.len();
+        if twice > 0 {
+            let what = format!("{}: {twice} images are in more than one split", from.display());
+            all.warnings.push(format!("{what}; scores on a split with images of another are too good"));
         }
         for (one, image) in found {
             let _ = writeln!(all.words, "{one:?} {}", length(&image.path)?);
@@ -279,6 +287,28 @@ fn documents(from: &Path) -> Result<Vec<(Option<Split>, PathBuf)>> {
     Ok(found)
 }
 
+/// Returns a warning about annotation files in a folder that are not read: those without the name of a split.
+fn others(from: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(from.join("annotations")).ok().into_iter().flatten().filter_map(Result::ok);
+    let known = |name: &str| {
+        let split =
+            name.strip_prefix("instances_").or(name.strip_prefix("leaves_")).and_then(|n| n.strip_suffix(".json"));
+        split.is_some_and(|split| Split::ALL.into_iter().any(|known| known.name() == split))
+    };
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut left: Vec<String> = names.filter(|name| name.to_lowercase().ends_with(".json") && !known(name)).collect();
+    left.sort();
+    match left.first() {
+        None => Vec::new(),
+        Some(first) => vec![format!(
+            "{}: {} files were left out, such as {first}: of a folder, instances_train.json, instances_val.json and \
+             instances_test.json are read; give another file itself with --from",
+            from.join("annotations").display(),
+            left.len()
+        )],
+    }
+}
+
 /// Returns the default folder of the images of an annotation file.
 fn beside(from: &Path, document: &Path) -> PathBuf {
     let root = if from.is_file() { document.parent().unwrap_or(Path::new(".")) } else { from };
@@ -309,6 +339,10 @@ impl Source for Coco {
 
     fn words(&self) -> &str {
         &self.words
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     fn read(&self, place: usize) -> Result<Labelled> {

@@ -24,12 +24,14 @@ pub(super) fn find(document: &Path, folder: &Path, split: Option<Split>, file_na
         let of_split = split.map(|s| named(&folder.join(s.name()))).transpose()?.filter(|path| path.is_file());
         of_split.map_or_else(|| named(folder), Ok)
     };
-    let written = of(file_name)?;
-    if written.is_file() {
-        return Ok(Found { path: written, warning: None });
+    let written = of(file_name);
+    if let Some(path) = written.as_ref().ok().filter(|path| path.is_file()) {
+        return Ok(Found { path: path.clone(), warning: None });
     }
     let slashes = file_name.replace('\\', "/");
-    let decoded = percent_decoded(&slashes);
+    // Of a URL, without its query and fragment.
+    let path_end = if slashes.contains("://") { slashes.find(['?', '#']) } else { None };
+    let decoded = percent_decoded(&slashes[..path_end.unwrap_or(slashes.len())]);
     let tails: Vec<&str> = decoded.match_indices('/').map(|(at, _)| &decoded[at + 1..]).collect();
     for name in [slashes.as_str(), decoded.as_str()].into_iter().chain(tails).filter(|name| !name.is_empty()) {
         if let Some(path) = of(name).ok().filter(|path| path.is_file()) {
@@ -37,7 +39,7 @@ pub(super) fn find(document: &Path, folder: &Path, split: Option<Split>, file_na
             return Ok(Found { path, warning });
         }
     }
-    Err(Error::input(format!("its image {} is missing", written.display()))
+    Err(Error::input(format!("its image {} is missing", written?.display()))
         .help("give the folder of the images with --images")
         .in_file(document))
 }
@@ -74,6 +76,8 @@ mod tests {
             ("day%201/%c3%A4.png", "images/day 1/ä.png", true),
             ("https://host/data/day%201/ä.png", "images/day 1/ä.png", true),
             ("C:\\Users\\day 1\\ä.png", "images/day 1/ä.png", true),
+            ("/data/upload/7/day 1/ä.png", "images/day 1/ä.png", true),
+            ("https://host/day%201/ä.png?token=a/b#c", "images/day 1/ä.png", true),
             ("b%20.png", "images/b%20.png", false),
         ] {
             let found = found(name).unwrap_or_else(|error| panic!("{name}: {error}"));

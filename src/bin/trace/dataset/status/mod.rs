@@ -161,7 +161,8 @@ fn summary(status: &Status) -> String {
         parts.push(format!("{} failed", status.failures.len()));
     }
     if let Some(rate) = status.images_per_hour {
-        parts.push(format!("{} images per hour", number(rate)));
+        let each = if status.working == 0 && status.shards.len() > 1 { " and run" } else { "" };
+        parts.push(format!("{} images per hour{each}", number(rate)));
     }
     if status.is_done() {
         parts.push("all done".into());

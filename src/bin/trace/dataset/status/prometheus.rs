@@ -16,7 +16,12 @@ pub(super) fn metrics(folder: &Path, status: &Status) -> String {
         ("furrow_images_done", "gauge", "Images that are complete", Some(status.done.to_f64())),
         ("furrow_images_failed", "gauge", "Images that ended with an error", Some(status.failures.len().to_f64())),
         ("furrow_runs_active", "gauge", "Runs that are rendering", Some(status.working.to_f64())),
-        ("furrow_images_per_hour", "gauge", "Images per hour of all active runs", status.images_per_hour),
+        (
+            "furrow_images_per_hour",
+            "gauge",
+            "Images per hour of all active runs",
+            if status.working > 0 { status.images_per_hour } else { Some(0.0) },
+        ),
         ("furrow_seconds_left", "gauge", "Estimated time until all images are complete", status.left_s),
         ("furrow_core_seconds_total", "counter", "Core seconds of finished runs", Some(status.core_s)),
         ("furrow_peak_memory_bytes", "gauge", "Largest memory of a run", status.peak_bytes.map(ToFloat::to_f64)),
