@@ -90,7 +90,10 @@ class Dataset:
         """Read an image from a pack."""
         pack = self._pack(index)
         if pack not in self._members:
-            self._members[pack] = _json(self.path / "seals" / f"{pack}.json").get("members", {})
+            seal = self.path / "seals" / f"{pack}.json"
+            if not seal.is_file():
+                raise FurrowError(f"{seal}: the pack of image {index:06d} is not complete: run `trace dataset render`", "missing")
+            self._members[pack] = _json(seal).get("members", {})
         members, archive = self._members[pack], self.path / "packs" / f"{pack}.tar"
         files: Dict[str, bytes] = {}
         try:
@@ -102,7 +105,7 @@ class Dataset:
         except OSError as error:
             raise FurrowError(f"{archive}: {error}") from error
         if "record.json" not in files:
-            raise FurrowError(f"{archive}: image {index:06d} does not exist yet")
+            raise FurrowError(f"{archive}: image {index:06d} is not rendered yet: run `trace dataset render`", "missing")
         return from_files(files, f"{archive}: {index:06d}", self._left_out)
 
     def __iter__(self) -> Iterator[Any]:

@@ -35,6 +35,8 @@ class Image(Dict[str, Any]):
     """
 
     def __missing__(self, key: str) -> Any:
+        if key == "depth":
+            raise KeyError("depth: only `render` returns it; a dataset that keeps it has it in `geometry.exr`, channel `depth.Z`")
         raise KeyError(f"{key}: this image has no such map; its record lists plants and leaves with their masks")
 
     @property
@@ -162,6 +164,8 @@ ENDINGS = ("png", "jpg")
 def from_folder(folder: Path, left_out: Sequence[str], ending: str) -> Image:
     """Read the images and labels in the folder of an image, except the maps in `left_out`; photographs have this ending."""
     image = Image()
+    if not folder.is_dir():
+        raise FurrowError(f"{folder}: this image is not rendered yet: run `trace dataset render` in its dataset", "missing")
     for name, file, kind in MAPS:
         if name in left_out:
             continue

@@ -19,12 +19,18 @@ from ._errors import FurrowError, answered, ended
 
 
 def program() -> str:
-    """Return the path of `trace`: `$FURROW_TRACE`, else the program in this package, else the first on `$PATH`."""
+    """Return the path of `trace`.
+
+    It is `$FURROW_TRACE`, else the program in this package, else the one compiled in this clone, else the first on `$PATH`.
+    """
+    above = Path(__file__).parent.parent
+    compiled = above.parent / "target/release/trace"
+    own = (above / "furrow.scripts/trace", Path(sysconfig.get_path("scripts")) / "trace", compiled)
     named = os.environ.get("FURROW_TRACE")
-    own = (Path(__file__).parent.parent / "furrow.scripts/trace", Path(sysconfig.get_path("scripts")) / "trace")
     found = named or next((str(path) for path in own if path.is_file()), None) or shutil.which("trace")
     if not found:
-        raise FurrowError("the program `trace` was not found: install Furrow, or set FURROW_TRACE to its path", "missing")
+        help = "install Furrow, compile it with `cargo build --release` in its clone, or set FURROW_TRACE to its path"
+        raise FurrowError(f"the program `trace` was not found: {help}", "missing")
     return found
 
 

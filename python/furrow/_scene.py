@@ -11,7 +11,7 @@ import sys
 import tarfile
 import tempfile
 import warnings
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import (
     IO,
@@ -141,12 +141,15 @@ class Scene(Dict[str, Any]):
         scene["crops"][0]["species"] = "maize"
         image = scene.render(seed=7, spp=32)
 
-    The name in front of fields is the value "type": `Pinhole(size: (96, 72))` is `{"type": "Pinhole", "size": [96, 72]}`. A name
-    with other values is the only key: `Uniform(1, 2)` is `{"Uniform": [1, 2]}`, and the string "Uniform(1, 2)" means the same.
+    The name in front of fields is the value "type": `Pinhole(size: (96, 72))` is `{"type": "Pinhole", "size": [96, 72]}`, and
+    `{"Pinhole": {"size": [96, 72]}}` means the same. A name with other values is the only key: `Uniform(1, 2)` is
+    `{"Uniform": [1, 2]}`, and the string "Uniform(1, 2)" means the same.
     `trace explain` documents all fields. Values are checked when the scene is used. Paths are relative to `folder`.
     """
 
     def __init__(self, values: Mapping[str, Any], folder: Optional[PathLike] = None) -> None:
+        if isinstance(values, (str, os.PathLike)):
+            raise TypeError(f"a Scene is made of a dict; furrow.load({os.fspath(values)!r}) reads a file or a bundled scene")
         super().__init__(values)
         self.folder = Path(os.path.abspath(folder or "."))
         self.path: Optional[Path] = None
@@ -161,12 +164,12 @@ class Scene(Dict[str, Any]):
         """
         return _render(self._source(), options, progress)
 
-    def stream(self, **options: Unpack[StreamOptions]) -> Generator[Image, None, None]:
+    def stream(self, *, progress: bool = False, **options: Unpack[StreamOptions]) -> Generator[Image, None, None]:
         """Yield the fields of the scene like `furrow.stream`."""
         arguments = _stream_flags(options)
         if (file := self._source().get("file")) is not None:
-            return _stream(file, arguments)
-        return self._streamed(arguments)
+            return _counted(_stream(file, arguments), options.get("count"), progress)
+        return _counted(self._streamed(arguments), options.get("count"), progress)
 
     def _streamed(self, arguments: List[str]) -> Generator[Image, None, None]:
         with tempfile.TemporaryDirectory(prefix="furrow-") as folder:
@@ -296,6 +299,26 @@ def _stream(scene: str, arguments: List[str]) -> Generator[Image, None, None]:
             raise ended(command[0], code, text())
 
 
+def _counted(
+    images: Generator[Image, None, None], count: Optional[int], wanted: bool
+) -> Generator[Image, None, None]:
+    """Yield images while a bar of the package tqdm counts them, if it is installed."""
+    try:
+        tqdm = importlib.import_module("tqdm.auto").tqdm if wanted else None
+    except ImportError:
+        tqdm = None
+    if tqdm is None:
+        return images
+    return _shown(images, tqdm(total=count, unit="image"))
+
+
+def _shown(images: Generator[Image, None, None], bar: Any) -> Generator[Image, None, None]:
+    with closing(images), bar:
+        for image in images:
+            bar.update(1)
+            yield image
+
+
 def _warn_new(text: str, shown: int) -> int:
     """Issue the warnings after the first `shown`. Return the number of warnings."""
     found = messages(text)[0]
@@ -303,14 +326,16 @@ def _warn_new(text: str, shown: int) -> int:
     return len(found)
 
 
-def stream(scene: Union[PathLike, Scene], **options: Unpack[StreamOptions]) -> Generator[Image, None, None]:
+def stream(
+    scene: Union[PathLike, Scene], *, progress: bool = False, **options: Unpack[StreamOptions]
+) -> Generator[Image, None, None]:
     """Yield the fields of a scene from index `first` on, each rendered shortly before use; endless without `count`.
 
     Image k, including its record, is the same as in a dataset with the same scene file, size and samples. With several readers,
     `shard=(k, n)` selects the images of reader k of n. Other keywords are the options of `trace stream` with `_` for `-`:
-    `width=324`, `seed=3`, `denoise=True`, `threads=2`; `labels_only=True` ignores `spp`. The program runs until the generator is
-    closed or deleted. Raises `FurrowError` with the program's error message.
+    `width=324`, `seed=3`, `denoise=True`, `threads=2`; `labels_only=True` ignores `spp`. `progress` counts the images with the package
+    tqdm. The program runs until the generator is closed or deleted. Raises `FurrowError` with the program's error message.
     """
     if isinstance(scene, Scene):
-        return scene.stream(**options)
-    return _stream(os.fspath(scene), _stream_flags(options))
+        return scene.stream(progress=progress, **options)
+    return _counted(_stream(os.fspath(scene), _stream_flags(options)), options.get("count"), progress)

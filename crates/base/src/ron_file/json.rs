@@ -9,7 +9,8 @@
 //! | `(1, 2)`, `[1, 2]` | `[1, 2]` |
 //!
 //! JSON does not distinguish tuples from lists, or names from strings: the way back follows the schema of the type. A
-//! string in the place of a number or of a variant is taken as RON: `"Uniform(1, 2)"`.
+//! string in the place of a number or of a variant is taken as RON: `"Uniform(1, 2)"`. Fields may also be the value of
+//! the name: `{"Pinhole": {"size": [96, 72]}}`, and a name whose fields all have defaults may stand alone: `"Phone"`.
 
 use super::file::RonFile;
 use super::num::{DISTRIBUTIONS, name_of};
@@ -106,8 +107,10 @@ impl Printer<'_> {
         match value {
             Value::Null => "None".to_owned(),
             Value::Bool(_) | Value::Number(_) => value.to_string(),
+            Value::String(word) if has_fields(schema, word) => format!("{word}()"),
             Value::String(word) if takes_names(schema) && is_ron(word) => word.clone(),
             Value::String(text) => string(text),
+            Value::Array(items) if items.is_empty() && schema.get("properties").is_some() => "()".to_owned(),
             Value::Array(items) => self.list(schema, items, depth),
             Value::Object(fields) => self.object(schema, fields, depth),
         }
@@ -132,6 +135,12 @@ impl Printer<'_> {
         }
         let mut only = fields.iter();
         match (only.next(), only.next()) {
+            (Some((name, Value::Object(inner))), None)
+                if has_fields(schema, name) || DISTRIBUTIONS.contains(&name.as_str()) && name != "Uniform" =>
+            {
+                let of = self.resolved(of(name));
+                bracketed((&format!("{name}("), ")"), &self.fields(of, inner, depth), depth)
+            }
             (Some((name, value)), None) if name.starts_with(char::is_uppercase) => {
                 self.variant(schema, name, value, depth)
             }
@@ -195,6 +204,13 @@ fn takes_names(schema: &Value) -> bool {
     names || schema.get(KIND).is_some() && !is_text
 }
 
+/// Returns `true` if a variant of this name has named fields. Those of a struct in a variant are behind a reference.
+fn has_fields(schema: &Value, name: &str) -> bool {
+    name.starts_with(char::is_uppercase)
+        && schema.get("properties").is_none()
+        && schema::within(schema, name).is_some_and(|of| of.get("properties").is_some() && of.get("$ref").is_none())
+}
+
 /// Returns `true` for the schema of a tuple or an array, which have a fixed number of items.
 fn is_tuple(schema: &Value) -> bool {
     let size = |key: &str| schema.get(key).and_then(Value::as_u64);
@@ -241,7 +257,13 @@ mod tests {
     #[derive(Debug, Deserialize, JsonSchema, PartialEq)]
     #[serde(deny_unknown_fields)]
     enum Lens {
-        Wide { size: [u32; 2] },
+        Wide {
+            size: [u32; 2],
+        },
+        Tall {
+            #[serde(default)]
+            size: Option<u32>,
+        },
         Spectrum((f64, f64)),
         Named(String),
         OneOf(Vec<Vec<Kind>>),
@@ -276,6 +298,27 @@ mod tests {
             let other = TEXT.replace("Wide(size: (4, 3))", lens);
             let text = from_json::<Page>("Page", &serde_json::from_str(&to_json(&other)).unwrap());
             assert_eq!(read(&text), read(&other), "{lens}");
+        }
+    }
+
+    /// Expected: fields as the value of a name, and a name alone, mean the same as the usual form.
+    #[test]
+    fn other_forms_of_names_are_accepted() {
+        for (usual, other) in [
+            (r#"{"type": "Wide", "size": [4, 3]}"#, r#"{"Wide": {"size": [4, 3]}}"#),
+            (r#"{"type": "Tall"}"#, r#"{"Tall": {}}"#),
+            (r#"{"type": "Tall"}"#, r#""Tall""#),
+        ] {
+            let [usual, other] = [usual, other].map(|lens| {
+                let mut page: Map<String, Value> = serde_json::from_str(&to_json(TEXT)).unwrap();
+                page.insert("lens".into(), serde_json::from_str(lens).unwrap());
+                page.insert(
+                    "heights".into(),
+                    serde_json::json!([{"Normal": {"mean": 3, "sd": 1}}, {"Uniform": [1, 2]}]),
+                );
+                RonFile::of(&from_json::<Page>("Page", &Value::Object(page))).parse::<Page>().unwrap()
+            });
+            assert_eq!(usual, other);
         }
     }
 

@@ -217,6 +217,14 @@ impl<B: Bound> Vary<B> {
             Distribution::Normal { mean, sd, min, max } => {
                 within(&[Field("mean")], "mean", *mean)?;
                 spread(&[Field("sd")], "sd", *sd)?;
+                let widest = B::MAX - B::MIN;
+                if *sd > widest {
+                    return wrong(
+                        &[Field("sd")],
+                        format!("sd {sd} is larger than the range of possible values, {widest}"),
+                        "write a smaller one",
+                    );
+                }
                 bell("mean", *mean, *min, *max)
             }
             Distribution::LogNormal { median, sigma, min, max } => {
@@ -317,9 +325,11 @@ fn numbers(inside: &str) -> Option<Vec<&str>> {
     inside.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse::<f64>().ok().map(|_| n)).collect()
 }
 
-/// Help for a list such as `[100, 150]` in place of a number.
+/// Help for a list such as `[100, 150]`, or for `(100, 150)`, in place of a number.
 fn listed(raw: &str) -> Option<Fault> {
-    let inside = raw.trim().strip_prefix('[')?.strip_suffix(']')?;
+    let raw_list = raw.trim();
+    let brackets = [('[', ']'), ('(', ')')];
+    let inside = brackets.iter().find_map(|(open, close)| raw_list.strip_prefix(*open)?.strip_suffix(*close))?;
     let help = match numbers(inside)?.as_slice() {
         [a, b] => format!("write Uniform({a}, {b}) for anything between, or Choice([{a}, {b}]) for one of the two"),
         _ => format!("write Choice([{}]) for one of them", inside.trim()),
