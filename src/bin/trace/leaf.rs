@@ -37,10 +37,7 @@ pub(crate) struct Args {
 }
 
 fn share(text: &str) -> Result<f32, String> {
-    text.parse()
-        .ok()
-        .filter(|v: &f32| *v > 0.0 && *v <= 1.0)
-        .ok_or_else(|| "write a fraction above 0, at most 1".into())
+    text.parse().ok().filter(|v: &f32| (0.01..=1.0).contains(v)).ok_or_else(|| "write a fraction from 0.01 to 1".into())
 }
 
 /// Cuts the leaf out. Returns the path of the image.

@@ -67,6 +67,10 @@ struct Cell<'t> {
 impl<'t> LeafTable<'t> {
     /// Reads a table.
     pub fn read(page: &'t RonFile) -> Result<Self> {
+        if page.text.contains('\r') && !page.text.contains('\n') {
+            let help = "save it with line feeds, as Unix or Windows programs do";
+            return Err(page.about_bytes(0..1, "this table ends its lines with carriage returns alone", help));
+        }
         let mut heads: Option<Vec<(&'static str, &'static str)>> = None;
         let (mut rows, mut start): (Vec<Row<'t>>, usize) = (Vec::new(), 0);
         for line in page.text.split_inclusive('\n') {
@@ -305,6 +309,7 @@ mod tests {
             (format!("{HEAD}{first}1,12,,,6,7,1\n"), 3, 1, "7 cells"),
             (format!("{HEAD}{first}1,12,,,6,5,7,1,\n"), 3, 1, "9 cells"),
             ("leaf;stage;kind\n1;10;a\n".to_owned(), 1, 1, "semicolons or tabs"),
+            (format!("{HEAD}{first}").replace('\n', "\r"), 1, 1, "carriage returns alone"),
             (format!("{HEAD}{first}2,12,leaf,,,7,1,50\n"), 3, 1, "leaf 2 has no blade_mm yet"),
             (format!("{HEAD}{first}{first}"), 3, 1, "is also in line 2"),
             (format!("{HEAD}2,10,seed,2,5,3,1,70\n1,12,leaf,1,5,3,1,70\n"), 3, 1, "comes later than leaf 2"),
