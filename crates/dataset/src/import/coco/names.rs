@@ -28,6 +28,8 @@ pub(super) fn find(document: &Path, folder: &Path, split: Option<Split>, file_na
     if let Some(path) = written.as_ref().ok().filter(|path| path.is_file()) {
         return Ok(Found { path: path.clone(), warning: None });
     }
+    // A path of a server begins with a slash; any other path out of the folder is refused.
+    let written = if file_name.starts_with('/') { written } else { Ok(written?) };
     let slashes = file_name.replace('\\', "/");
     // Of a URL, without its query and fragment.
     let path_end = if slashes.contains("://") { slashes.find(['?', '#']) } else { None };
@@ -87,6 +89,7 @@ mod tests {
         for name in ["..\\outside.png", "%2e%2e/outside.png"] {
             assert!(found(name).is_err(), "{name}");
         }
+        assert!(found("../b%20.png").err().unwrap().message().contains("does not lie in the folder"));
         assert!(found("../outside.png").err().unwrap().message().contains("does not lie in the folder"));
     }
 }
