@@ -42,7 +42,11 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
             (Some(nm), Some(share)) => points.push((nm, share)),
             // A first row that begins with a letter is a header.
             _ if line == 1 && row.get(0).is_some_and(|cell| cell.starts_with(char::is_alphabetic)) => {}
-            _ => return Err(wrong(format!("row {line} is not two numbers"))),
+            _ => {
+                let comma =
+                    if row.iter().any(|cell| cell.contains(',')) { "; are its commas decimal commas?" } else { "" };
+                return Err(wrong(format!("row {line} is not two numbers{comma}")));
+            }
         }
     }
     if let Some(pair) = points.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
@@ -98,7 +102,7 @@ mod tests {
             ("", "no line with numbers"),
             ("400,0.1\n700,x\n", "row 2 is not two numbers"),
             ("400,0,1\n1000,0,4\n", "row 1 has 3 cells, not two; are its commas decimal commas?"),
-            ("400;0,1\n1000;0,4\n", "row 2 is not two numbers"),
+            ("400;0,1\n1000;0,4\n", "row 1 is not two numbers; are its commas decimal commas?"),
             ("400;0.1;0.01\n1000;0.4;0.01\n", "row 1 has 3 cells, not two"),
             ("400,10\n1000,40\n", "in percent?"),
             ("0.4,0.1\n1.0,0.4\n", "in micrometres?"),
