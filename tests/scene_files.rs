@@ -190,13 +190,16 @@ fn every_mistake_gets_exactly_the_words_beside_it() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Expected: `trace check` refuses a model without a class with the words of a render, and warns of nothing else.
+/// Expected: `trace check` refuses a model without a class, or far away, with the words of a render, and warns of nothing else.
 #[test]
-fn a_check_refuses_a_model_without_class_as_a_render_does() {
-    let page = Path::new("tests/bad/model_without_class.ron");
-    let done = Command::new(env!("CARGO_BIN_EXE_trace")).arg("check").arg(page).output().unwrap();
-    assert_eq!(done.status.code(), Some(2));
-    assert_eq!(String::from_utf8(done.stderr).unwrap(), std::fs::read_to_string(page.with_extension("txt")).unwrap());
+fn a_check_refuses_models_as_a_render_does() {
+    for name in ["model_without_class", "model_far_away"] {
+        let page = Path::new("tests/bad").join(name).with_extension("ron");
+        let done = Command::new(env!("CARGO_BIN_EXE_trace")).arg("check").arg(&page).output().unwrap();
+        assert_eq!(done.status.code(), Some(2), "{name}");
+        let expected = std::fs::read_to_string(page.with_extension("txt")).unwrap();
+        assert_eq!(String::from_utf8(done.stderr).unwrap(), expected, "{name}");
+    }
 }
 
 /// Rationale: a scene file with several mistakes would otherwise take one run for each. Expected: `trace check`, and every

@@ -53,7 +53,7 @@ impl Source {
         library.decodes_all = true;
         let mut found = self.warnings(Asked { drawn, library, warnings })?;
         known::species(drawn, library)?;
-        models::warn_of_sizes(self.page(), library, &self.desc.models)?;
+        models::check_sizes(self.page(), library, &self.desc.models)?;
         let sight = sight::sight(drawn, warnings)?;
         let estimate = estimate::estimate(drawn, library, &sight)?;
         estimate.check(drawn.memory()).map_err(|(at, error)| self.page().blame(&at, error))?;

@@ -22,7 +22,7 @@ use furrow_render::material::{Material, ModelSurface, SurfaceOverride};
 use furrow_render::scene::tag::{Class, MOST_PLANTS, Tag};
 use furrow_render::scene::{Instance, Part};
 use std::collections::{BTreeMap, BTreeSet};
-use std::f32::consts::TAU;
+use std::f32::consts::{FRAC_1_SQRT_2, TAU};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -87,13 +87,16 @@ impl Entry<'_> {
             let words = format!("`{part}` of this model is {size:.0} m large");
             Error::input(words).help("lengths are in metres; a file in millimetres needs scale: 0.001")
         } else {
-            let words = format!(
-                "`{part}` of this model reaches {reach:.0} m from the field's origin; at most {FARTHEST} m are possible"
-            );
-            Error::input(words).help("move it to the origin in your program, or give another position_m")
+            too_far(part)
         };
         Err(drawn.page.blame(&self.place(), fault))
     }
+}
+
+/// The error about a part that reaches farther than [`FARTHEST`]. It names no distance, so that it is the same before a model is placed.
+fn too_far(part: &str) -> Error {
+    Error::input(format!("`{part}` of this model reaches more than {FARTHEST} m from the field's origin"))
+        .help("move it to the origin in your program, or give another position_m")
 }
 
 /// Adds all models to `parts`. `numbered` is the number of plants that already have a label number. Returns the plants among the models.
@@ -137,17 +140,32 @@ pub(super) fn load(page: &RonFile, library: &mut Library, k: usize, desc: &Model
     Ok(model)
 }
 
-/// Warns of models of an unusual size, before they are placed.
-pub(super) fn warn_of_sizes(page: &RonFile, library: &mut Library, models: &[ModelDesc]) -> Result<()> {
+/// Refuses models that are too far away wherever they are placed, and warns of those of an unusual size.
+pub(super) fn check_sizes(page: &RonFile, library: &mut Library, models: &[ModelDesc]) -> Result<()> {
     for (k, desc) in models.iter().enumerate() {
         let model = load(page, library, k, desc)?;
         let (least, most) = desc.scale.usual();
+        for part in &model.parts {
+            let Some((lo, hi)) = part.mesh.bounds() else { continue };
+            // At the least scale. A turn divides the distance from the axis between x and y, so that one of them is at least 1/√2 of it.
+            let middle = (0.5 * (lo + hi) * least.to_f32()).abs();
+            let reach = middle.z.max(middle.truncate().length() * FRAC_1_SQRT_2 - farthest_position(desc));
+            if reach > FARTHEST && (hi - lo).max_element() * most.to_f32() <= FARTHEST {
+                return Err(page.blame(&[Step::Field("models"), Step::Item(k)], too_far(&part.name)));
+            }
+        }
         let extent = size(model.parts.iter().map(|part| &part.mesh)).map(|size| size * (0.5 * (least + most)).to_f32());
         if let Some(words) = extent.and_then(|size| odd_size(size, desc.class)) {
             library.warn(page, &desc.file, &words)?;
         }
     }
     Ok(())
+}
+
+/// Returns the largest usual |x| or |y| of a model's `position_m`, metres.
+fn farthest_position(desc: &ModelDesc) -> f32 {
+    let (x, y) = (desc.position_m.0.usual(), desc.position_m.1.usual());
+    [x.0, x.1, y.0, y.1].map(f64::abs).into_iter().fold(0.0, f64::max).to_f32()
 }
 
 /// Returns what is wrong with the labels of a model file: an unknown class, or numbers that contradict the class.
