@@ -97,13 +97,12 @@ fn results(run: &Path) -> Results {
 }
 
 #[test]
-fn eight_images_are_learnt_by_every_network_and_judged_so() {
+fn eight_images_are_learnt_by_networks_and_judged_so() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    for (network, steps, rate) in
-        [("basic-segnet", 60, "0.003"), ("unet", 80, "0.003"), ("segnet", 40, "0.001"), ("lite-unet", 100, "0.003")]
-    {
+    // SegNet and the U-Net are as these two, with tens of millions of weights, which take a minute to train here.
+    for (network, steps, rate) in [("basic-segnet", 60, "0.003"), ("lite-unet", 100, "0.003")] {
         let out = folder.join(network);
         let more = format!(
             "--network {network} --steps {steps} --rate {rate} --augment none --class-weights none --validate-every 1000"

@@ -313,7 +313,7 @@ fn every_pixel_of_the_teaching_scenes_shows_the_nearest_of_all_triangles() {
     });
     pages.sort();
     for page in pages {
-        let field = open(&page, &Options { width: Some(120), ..Options::default() });
+        let field = open(&page, &Options { width: Some(90), ..Options::default() });
         check_every_pixel(&page.file_stem().unwrap().to_string_lossy(), &field.scene);
     }
 }

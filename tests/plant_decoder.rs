@@ -157,7 +157,7 @@ fn what_has_no_decoder_is_refused() {
     let scratch = tempfile::tempdir().unwrap();
     let at = |name: &str| scratch.path().join(name);
     let segnet = at("segnet");
-    let how = "--network segnet --size 64x48 --steps 1 --batch 1";
+    let how = "--network basic-segnet --size 64x48 --steps 1 --batch 1";
     succeed(&format!("fit --set {}@0..1 --out {} {how}", set.display(), segnet.display()));
     let out = at("out");
     let words = refused(&format!("plants {} --set {} --out {}", segnet.display(), set.display(), out.display()));

@@ -166,7 +166,7 @@ mod tests {
 
     /// Expected: of equal squares that the network predicts as crop, those between rows become weed and those in rows stay crop.
     /// With random positions and a certain network, rows are found by chance in one image of six (the upper tail of a normal
-    /// distribution above 1: 2.5 of 16, standard deviation 1.5); all other images keep the network's classes, bit for bit. Of two
+    /// distribution above 1: 1.3 of 8, standard deviation 1.0); all other images keep the network's classes, bit for bit. Of two
     /// isolated squares the small one becomes weed if the network is undecided and stays crop if it is certain. Source: the rule.
     #[test]
     fn weeds_are_found_between_rows_and_seldom_where_there_are_none() {
@@ -191,8 +191,8 @@ mod tests {
             refine((300, 300), &mut p, None, true);
             p != voted
         };
-        let changed = (0..16).filter(changed).count();
-        assert!(changed <= 8, "{changed} of 16");
+        let changed = (0..8).filter(changed).count();
+        assert!(changed <= 5, "{changed} of 8");
 
         let two = [(100, 150, 20), (250, 60, 5)];
         for (crop, expected) in [(0.45, 2), (0.88, 1)] {
