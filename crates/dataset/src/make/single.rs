@@ -5,8 +5,8 @@ use crate::make::render::describe;
 use crate::model::recipe::{ImageOrigin, Recipe, Rendering};
 use crate::model::sample::Sample;
 use crate::model::split::Shares;
-use furrow_base::Result;
 use furrow_base::math::ToInt;
+use furrow_base::{Error, Result};
 use furrow_job::{Image, Renderer, SceneFile};
 
 /// Returns the sample of a whole image of a field of `scene`: with the number that the image has in a dataset, and the
@@ -19,7 +19,13 @@ pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Resul
     let captures = scene.captures() * lights;
     let day = field.day.and_then(|day| days.iter().position(|other| *other == day)).unwrap_or_default();
     let a_day = captures / days.len().max(1).to_u64();
-    let index = field.index * captures + day.to_u64() * a_day + field.capture.to_u64() * lights + field.light;
+    let within = day.to_u64() * a_day + field.capture.to_u64() * lights + field.light;
+    let index = field.index.checked_mul(captures).and_then(|first| first.checked_add(within));
+    let last = index.and_then(|index| index.checked_add(1));
+    let (Some(index), Some(count)) = (index, last) else {
+        let words = format!("field {} has no image number: there are {captures} images of each field", field.index);
+        return Err(Error::misuse(words).help("give a smaller --index"));
+    };
     let rendering = Rendering {
         edit: image.field().edit().label(),
         captures,
@@ -29,7 +35,7 @@ pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Resul
     let recipe = Recipe {
         furrow: env!("CARGO_PKG_VERSION").into(),
         made: ImageOrigin::Rendered(Box::new(rendering)),
-        count: index + 1,
+        count,
         split: Shares::default(),
         formats: Vec::new(),
         labelling: crate::model::labelling::Labelling::default(),
