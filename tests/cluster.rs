@@ -540,7 +540,7 @@ fn xargs_does_the_same_where_gnu_parallel_is_not_installed() {
     let (_keep, folder) = scratch();
     let tools = without_parallel(&folder);
     assert!(!tools.join("parallel").exists());
-    // The script handles signals itself, with either program: one of them tests that of the other.
+    // The signal handlers are those of the script, whichever program it starts.
     stop_and_go(&["TERM"], Some(&tools));
 }
 

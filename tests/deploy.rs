@@ -62,7 +62,7 @@ fn model(learnt: &TrainedModel) -> Model {
 fn cases(network: Network) -> Vec<(usize, (u32, u32))> {
     let least = network.least_side().max(16);
     let (own, small) = ([(1, training::SIZE), (2, training::SIZE)], (least + 3, least + 1));
-    // Networks of thirty million parameters take a second an image in NumPy.
+    // NumPy computes the largest networks slowly.
     let rest = if matches!(network, Network::Segnet | Network::VitUnet) {
         vec![(4, small)]
     } else {

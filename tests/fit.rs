@@ -101,7 +101,7 @@ fn eight_images_are_learnt_by_networks_and_judged_so() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path();
     let set = set(folder, 8);
-    // SegNet and the U-Net are as these two, with tens of millions of weights, which take a minute to train here.
+    // The two kinds of decoder: unpooling, and skip connections. SegNet and the U-Net have the same with many more weights.
     for (network, steps, rate) in [("basic-segnet", 60, "0.003"), ("lite-unet", 100, "0.003")] {
         let out = folder.join(network);
         let more = format!(

@@ -3,8 +3,8 @@
 //! Rationale: a network with a wrong stride, skip connection or normalisation statistic still learns, only worse, and
 //! is not the published one. Expected: the published numbers of parameters, and outputs equal to 1e-4 of the largest,
 //! for trained weights and for random ones with non-initial statistics, on images of odd size. Source:
-//! `tests/train/reference.py`, written from the papers, in NumPy (double precision) and, if a Python has it, in
-//! PyTorch.
+//! `tests/train/reference.py`, written from the papers, in NumPy (double precision; all but the largest networks) and, if
+//! a Python has it, in PyTorch.
 
 use crate::common::python::{ask, python, torch};
 use crate::common::training::{self, SET, learnt, normalised, pictures, random};
@@ -73,7 +73,7 @@ fn networks_compute_what_an_independent_program_does() {
     }
     for (engine, python) in [("numpy", python("import numpy, safetensors")), ("torch", torch())] {
         if let Some(python) = python {
-            // NumPy takes half a minute for a network of thirty million parameters.
+            // NumPy computes the largest networks slowly; its results for SegNet are compared in `deploy`.
             let asked = recorded.iter().filter(|(is_large, _)| engine == "torch" || !is_large);
             // One process for all networks: PyTorch alone takes seconds to import.
             let arguments: Vec<&str> =

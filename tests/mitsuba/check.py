@@ -28,7 +28,7 @@ import time
 sys.dont_write_bytecode = True
 BLOCKS = 8
 # Samples per pixel and block.
-SPP = 12
+SPP = 24
 # Samples per pixel of our image, as rendered by the test.
 SPP_OURS = 128
 # Probability that the regions of a correct scene fail.
