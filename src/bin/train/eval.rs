@@ -1,6 +1,6 @@
 //! `train eval`.
 
-use crate::inference::InferenceArgs;
+use crate::inference::{AFTER, InferenceArgs};
 use crate::machine::MachineArgs;
 use crate::report;
 use furrow_base::Result;
@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `train eval`.
 #[derive(clap::Args)]
+#[command(after_help = AFTER)]
 pub(crate) struct Args {
     /// Folder of a run, name of a network that ships (`train zoo`), or folder of runs with several seeds, whose probabilities are averaged.
     run: PathBuf,

@@ -5,6 +5,16 @@ use furrow_train::ModelCard;
 use furrow_train::data::Resize;
 use furrow_train::refine::Refine;
 
+/// Explains the steps of `--refine`, behind the options.
+pub(crate) const AFTER: &str = "\
+Steps of --refine:
+  colour      pixels of similar colour tend to be of the same kind, plant or soil
+  smooth      the class of a plant pixel follows from the plant pixels within about a leaf around it
+  plants      connected plant pixels are of one class; instead of smooth
+  separate    plants are those of the plant decoder, not connected pixels; needs plants
+  rows        crop rows and plant sizes help to separate crop from weed; needs plants
+  appearance  so do appearance features, learnt from all images given, which should be of one field; needs rows";
+
 /// Input sizes and refinement.
 #[derive(clap::Args)]
 pub(crate) struct InferenceArgs {
@@ -15,12 +25,8 @@ pub(crate) struct InferenceArgs {
     /// Ground sampling distance of the images in millimetres a pixel: they are resized to that of the network's training images.
     #[arg(long, value_name = "MM")]
     pixel_mm: Option<f64>,
-    /// Refinement of predictions: none, or a comma-separated list of colour (pixels of similar colour tend to be of the same kind, plant or
-    /// soil), smooth (the class of a plant pixel follows from the plant pixels within about a leaf around it), plants (connected plant
-    /// pixels are of one class; instead of smooth), separate (plants are those of the plant decoder, not connected pixels; needs plants),
-    /// rows (crop rows and plant sizes help to separate crop from weed; needs plants) and appearance (so do appearance features, learnt
-    /// from all images given, which should be of one field; needs rows). Default: as set in training; colour,smooth for a network of
-    /// `train make`, which knows the crop.
+    /// Refinement of predictions: none, or a comma-separated list of the steps below. Default: as set in training; colour,smooth for a
+    /// network of `train make`, which knows the crop.
     #[arg(long, value_name = "NAMES", value_parser = Refine::parse)]
     refine: Option<Refine>,
 }

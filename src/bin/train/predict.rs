@@ -1,6 +1,6 @@
 //! `train predict`.
 
-use crate::inference::InferenceArgs;
+use crate::inference::{AFTER, InferenceArgs};
 use crate::machine::MachineArgs;
 use furrow_base::math::{ToFloat, ToInt};
 use furrow_base::{Error, Result};
@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// Arguments of `train predict`.
 #[derive(clap::Args)]
+#[command(after_help = AFTER)]
 pub(crate) struct Args {
     /// Folder of a run, name of a network that ships (`train zoo`), or folder of runs with several seeds, whose probabilities are averaged.
     run: PathBuf,

@@ -26,6 +26,9 @@ fn verb(page: &mut String, command: &Command, name: &str) {
     for arg in shown {
         let _ = writeln!(page, "| {} | {} | {} |", code(&flag(arg)), meaning(arg), default(arg));
     }
+    if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
+        let _ = write!(page, "\n```text\n{}\n```\n", after.to_string().trim());
+    }
     for inner in command.get_subcommands().filter(|inner| !inner.is_hide_set() && inner.get_name() != "help") {
         verb(page, inner, &format!("{name} {}", inner.get_name()));
     }
