@@ -36,20 +36,23 @@ fn done(command: &mut Command) -> String {
     String::from_utf8(stdout).expect("text")
 }
 
-/// Builds the wheel in `folder` with the program built for the tests: `tests/python/stand-in` has a `cargo` that
-/// compiles nothing.
-fn wheel(python: &Path, folder: &Path) -> PathBuf {
+/// Returns the wheel with the program built for the tests: `tests/python/stand-in` has a `cargo` that compiles nothing. `None` where
+/// the Python packages that build it are missing.
+static WHEEL: LazyLock<Option<PathBuf>> = LazyLock::new(|| {
+    let python = python(PROBE)?;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-wheels");
+    let _ = std::fs::remove_dir_all(&folder);
     let cargo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/stand-in/cargo");
     let tools = python.parent().expect("a folder").display().to_string();
     let path = std::env::var("PATH").unwrap_or_default();
     let mut build = Command::new(source().join("build_wheel.sh"));
-    build.args(["--profile", "dev"]).env("WHEELS", folder).env("PATH", format!("{tools}:{path}"));
+    build.args(["--profile", "dev"]).env("WHEELS", &folder).env("PATH", format!("{tools}:{path}"));
     build.env("CARGO", cargo).env("REAL_CARGO", env!("CARGO")).env("BUILT_TRACE", env!("CARGO_BIN_EXE_trace"));
     done(&mut build);
-    let built = names(folder);
+    let built = names(&folder);
     assert!(built.len() == 1 && built[0].contains("-py3-none-manylinux_2_"), "{built:?}");
-    folder.join(&built[0])
-}
+    Some(folder.join(&built[0]))
+});
 
 /// Creates an environment with the wheel; numpy and Pillow are taken from `python`'s environment, so nothing is
 /// downloaded.
@@ -66,9 +69,9 @@ fn environment(python: &Path, wheel: &Path, folder: &Path) -> PathBuf {
 #[test]
 fn an_installed_wheel_needs_nothing_else() {
     let Some(python) = python(PROBE) else { return };
+    let Some(wheel) = &*WHEEL else { return };
     let (_keep, folder) = scratch();
-    let wheel = wheel(&python, &folder.join("wheels"));
-    let venv = environment(&python, &wheel, &folder.join("venv"));
+    let venv = environment(&python, wheel, &folder.join("venv"));
     let empty = folder.join("empty");
     std::fs::create_dir(&empty).expect("a folder");
     let run = |arguments: &[&str]| {
@@ -104,6 +107,20 @@ fn an_installed_wheel_needs_nothing_else() {
     let mut check = Command::new(venv.join("bin/python"));
     check.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_module.py"));
     check.arg(&*DATASET).arg(&empty).env_remove("FURROW_TRACE").env("PATH", "/usr/bin:/bin");
+    done(&mut check);
+}
+
+/// Expected: the conda package of the wheel has the program, Embree, the data and the module where conda's installers put them, and
+/// they work there.
+#[test]
+fn the_conda_package_works_in_its_own_folders() {
+    let Some(python) = python("import rattler_build, zstandard, numpy, PIL") else { return };
+    let Some(wheel) = &*WHEEL else { return };
+    let (_keep, folder) = scratch();
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let mut check = Command::new(python);
+    check.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_conda.py"));
+    check.arg(source().join("conda")).arg(wheel).arg(folder).env("PYTHONDONTWRITEBYTECODE", "1");
     done(&mut check);
 }
 
