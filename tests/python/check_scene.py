@@ -93,6 +93,8 @@ assert pickle.loads(pickle.dumps(error)).place == error.place
 del scene["crops"][0]["spacies"]
 assert fails(lambda: fw.load("fild")).help.startswith("did you mean field")
 assert fails(lambda: fw.render(file, spp=0)).kind == "misuse"
+error = fails(lambda: fw.render(file, index=2**64 - 1, **SIZE))
+assert error.kind == "misuse" and "has no image number" in str(error), error
 error = fails(lambda: list(fw.stream(file, count=1, crop_=1)), TypeError)
 error = fails(lambda: scene.render(wdith=3), TypeError)
 assert "'wdith'; did you mean 'width'?" in str(error), error

@@ -20,12 +20,11 @@ pub fn sample(scene: &SceneFile, renderer: &Renderer, image: Image<'_>) -> Resul
     let day = field.day.and_then(|day| days.iter().position(|other| *other == day)).unwrap_or_default();
     let a_day = captures / days.len().max(1).to_u64();
     let within = day.to_u64() * a_day + field.capture.to_u64() * lights + field.light;
-    let index = field.index.checked_mul(captures).and_then(|first| first.checked_add(within));
-    let last = index.and_then(|index| index.checked_add(1));
-    let (Some(index), Some(count)) = (index, last) else {
+    let count = field.index.checked_mul(captures).and_then(|first| first.checked_add(within + 1)).ok_or_else(|| {
         let words = format!("field {} has no image number: there are {captures} images of each field", field.index);
-        return Err(Error::misuse(words).help("give a smaller --index"));
-    };
+        Error::misuse(words).help("give a smaller --index")
+    })?;
+    let index = count - 1;
     let rendering = Rendering {
         edit: image.field().edit().label(),
         captures,

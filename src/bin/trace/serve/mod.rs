@@ -19,8 +19,11 @@ use scene::{Kept, SceneSource};
 use serde::Deserialize;
 use serde_json::Value;
 use std::cell::RefCell;
-use std::io::{self, BufRead, IsTerminal};
+use std::io::{self, BufRead, IsTerminal, Read};
 use std::path::PathBuf;
+
+/// Length in bytes that no line of a request exceeds.
+const LONGEST: u64 = 64 << 20;
 
 /// No options.
 #[derive(clap::Args)]
@@ -82,10 +85,9 @@ pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
         return Err(Error::misuse("stdin is a terminal, and requests come from a program")
             .help("use the Python module `furrow`, or see `trace serve --help`"));
     }
-    let mut kept = Kept::default();
-    for line in io::stdin().lock().split(b'\n') {
-        let line = line.map_err(|e| Error::failed(format!("cannot read stdin: {e}")))?;
-        let answer = supervised(|| answer(&line, &mut kept)).and_then(|answer| answer);
+    let (mut kept, mut input) = (Kept::default(), io::stdin().lock());
+    while let Some(line) = line(&mut input).map_err(|e| Error::failed(format!("cannot read stdin: {e}")))? {
+        let answer = line.and_then(|line| supervised(|| answer(&line, &mut kept)).and_then(|answer| answer));
         if answer.is_err() {
             // An error may have interrupted a change of what is kept.
             kept = Kept::default();
@@ -97,7 +99,23 @@ pub(crate) fn run(_: &Args) -> Result<Vec<PathBuf>> {
     Ok(Vec::new())
 }
 
-/// Reads a request. Errors name a byte that is not UTF-8, and unknown keys.
+/// Reads a line without its end; `None` at the end of the input. A line that is too long is passed over and becomes an error.
+fn line(input: &mut impl BufRead) -> io::Result<Option<Result<Vec<u8>>>> {
+    let mut line = Vec::new();
+    if input.take(LONGEST + 1).read_until(b'\n', &mut line)? == 0 {
+        return Ok(None);
+    }
+    if line.last() == Some(&b'\n') {
+        line.pop();
+    } else if line.len() as u64 > LONGEST {
+        input.skip_until(b'\n')?;
+        let words = format!("this is not a request: its line is longer than {} MiB", LONGEST >> 20);
+        return Ok(Some(Err(Error::misuse(words).help("see `trace serve --help`"))));
+    }
+    Ok(Some(Ok(line)))
+}
+
+/// Parses a request. Errors name a byte that is not UTF-8, and unknown keys.
 fn request(line: &[u8]) -> Result<Request> {
     let wrong = |what: String| Error::misuse(format!("this is not a request: {what}")).help("see `trace serve --help`");
     let text = std::str::from_utf8(line).map_err(|e| {
@@ -167,6 +185,21 @@ mod tests {
         let error = answer(line, &mut Kept::default()).err().expect("an error");
         assert_eq!(error.exit_code(), 2);
         error.to_string()
+    }
+
+    /// Rationale: a line without an end filled the memory. Expected: an error, after which the next line is read; the last line
+    /// needs no end.
+    #[test]
+    fn lines_have_a_limit() {
+        let text = io::repeat(b'a').take(LONGEST + 9).chain(&b"\nnext\n\nlast"[..]);
+        let mut input = io::BufReader::new(text);
+        let mut next = || line(&mut input).expect("a line");
+        let error = next().expect("a line").expect_err("too long");
+        assert!(error.exit_code() == 2 && error.to_string().contains("longer than 64 MiB"), "{error}");
+        for expected in ["next", "", "last"] {
+            assert_eq!(next().expect("a line").expect("a short line"), expected.as_bytes());
+        }
+        assert!(next().is_none());
     }
 
     /// Rationale: a line that was not UTF-8 ended the server, and a misspelt key or an argument without effect was passed
