@@ -25,7 +25,12 @@ macro_rules! message {
 /// Implements [`message!`](crate::message).
 pub fn print_message(words: fmt::Arguments<'_>) {
     // One write per line, so that lines of several threads do not interleave.
-    let _ = io::stderr().write_all(format!("{words}\n").as_bytes());
+    let _ = io::stderr().write_all(format!("{}\n", harmless(&words.to_string())).as_bytes());
+}
+
+/// Replaces the control characters of a message, except for ends of lines: names from foreign files may contain commands of a terminal.
+fn harmless(words: &str) -> String {
+    words.replace(|c: char| c.is_control() && c != '\n', "·")
 }
 
 /// Parses the command line. Prints help and version (with that of the ray tracing kernels) to stdout, and errors to stderr; in these cases
@@ -279,6 +284,11 @@ fn numbers(text: &str) -> Result<Vec<u32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn messages_contain_no_commands_of_a_terminal() {
+        assert_eq!(harmless("a: `\u{1b}[2Jleaf\0\r`\nhelp: é"), "a: `·[2Jleaf··`\nhelp: é");
+    }
 
     #[test]
     fn crops_are_checked() {
