@@ -140,16 +140,18 @@ pub(super) fn load(page: &RonFile, library: &mut Library, k: usize, desc: &Model
     Ok(model)
 }
 
-/// Refuses models that are too far away wherever they are placed, and warns of those of an unusual size.
+/// Refuses models that are too far away at any usual scale and position, and warns of those of an unusual size.
 pub(super) fn check_sizes(page: &RonFile, library: &mut Library, models: &[ModelDesc]) -> Result<()> {
     for (k, desc) in models.iter().enumerate() {
         let model = load(page, library, k, desc)?;
         let (least, most) = desc.scale.usual();
+        let places = [desc.position_m.0.usual(), desc.position_m.1.usual(), desc.lift_m.usual()];
+        let [x, y, lift] = places.map(|(lo, hi)| lo.abs().max(hi.abs()).to_f32());
         for part in &model.parts {
             let Some((lo, hi)) = part.mesh.bounds() else { continue };
             // At the least scale. A turn divides the distance from the axis between x and y, so that one of them is at least 1/√2 of it.
             let middle = (0.5 * (lo + hi) * least.to_f32()).abs();
-            let reach = middle.z.max(middle.truncate().length() * FRAC_1_SQRT_2 - farthest_position(desc));
+            let reach = (middle.z - lift).max(middle.truncate().length() * FRAC_1_SQRT_2 - x.max(y));
             if reach > FARTHEST && (hi - lo).max_element() * most.to_f32() <= FARTHEST {
                 return Err(page.blame(&[Step::Field("models"), Step::Item(k)], too_far(&part.name)));
             }
@@ -160,12 +162,6 @@ pub(super) fn check_sizes(page: &RonFile, library: &mut Library, models: &[Model
         }
     }
     Ok(())
-}
-
-/// Returns the largest usual |x| or |y| of a model's `position_m`, metres.
-fn farthest_position(desc: &ModelDesc) -> f32 {
-    let (x, y) = (desc.position_m.0.usual(), desc.position_m.1.usual());
-    [x.0, x.1, y.0, y.1].map(f64::abs).into_iter().fold(0.0, f64::max).to_f32()
 }
 
 /// Returns what is wrong with the labels of a model file: an unknown class, or numbers that contradict the class.

@@ -89,7 +89,7 @@ impl Reader<'_> {
 
     /// Visits the nodes of the scene, parents before children. Returns their indices in this order, and the transforms
     /// of all nodes into the model's frame; the identity for nodes outside the scene.
-    fn nodes(&self, up: Up) -> Result<(Vec<usize>, Vec<DMat4>), ModelError> {
+    fn nodes(&mut self, up: Up) -> Result<(Vec<usize>, Vec<DMat4>), ModelError> {
         let nodes = &self.document.nodes;
         let (mut order, mut world) = (Vec::new(), vec![DMat4::IDENTITY; nodes.len()]);
         let mut seen = vec![false; nodes.len()];
@@ -99,7 +99,8 @@ impl Reader<'_> {
             if std::mem::replace(&mut seen[index], true) {
                 return Err(format!("node {index} has two parents").into());
             }
-            world[index] = above * placement(node);
+            let name = node.name.clone().unwrap_or_else(|| format!("node {index}"));
+            world[index] = above * placement(node, &name, &mut self.notes)?;
             open.extend(node.children.iter().rev().map(|child| (*child, world[index])));
             order.push(index);
         }

@@ -1,6 +1,7 @@
 //! Meshes at rest: transforms of nodes, morph targets and skins.
 
 use super::super::document::{Document, Node, Primitive, item};
+use super::super::notes::Notes;
 use super::super::settle::ModelError;
 use super::accessors::Accessors;
 use furrow_base::geometry::Mesh;
@@ -9,17 +10,36 @@ use furrow_base::math::{DMat3, DMat4, DQuat, DVec3, ToFloat, ToInt, Vec3};
 /// Largest difference of the matrices of a skin that leaves its mesh where the mesh's own node puts it.
 const AT_REST: f64 = 1e-5;
 
-/// Returns the transform of a node relative to its parent.
-pub(super) fn placement(node: &Node) -> DMat4 {
+/// Largest difference of a quaternion's length from 1, and of the last row of a matrix from 0, 0, 0, 1, that rounding explains.
+const ROUNDING: f64 = 1e-3;
+
+/// Returns the transform of a node relative to its parent. An error states why the node has none; `name` is its name.
+pub(super) fn placement(node: &Node, name: &str, notes: &mut Notes) -> Result<DMat4, ModelError> {
     if let Some(matrix) = &node.matrix {
-        return DMat4::from_cols_array(matrix);
+        let matrix = DMat4::from_cols_array(matrix);
+        let affine = DMat4::IDENTITY.row(3);
+        if !matrix.row(3).abs_diff_eq(affine, ROUNDING) {
+            let what = format!(
+                "the last row of the matrix of `{name}` is not 0, 0, 0, 1: it is no translation, rotation and scale"
+            );
+            return Err(what.into());
+        }
+        if node.translation.is_some() || node.rotation.is_some() || node.scale.is_some() {
+            notes.about("passed over: translation, rotation and scale of nodes that have a matrix", name);
+        }
+        return Ok(matrix);
     }
     let scale = node.scale.map_or(DVec3::ONE, DVec3::from);
-    // A zero quaternion is treated as the identity.
     let rotation = node.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
-    let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+    let length = rotation.length();
+    if length == 0.0 {
+        return Err(format!("the rotation of `{name}` is a quaternion of length 0").into());
+    }
+    if (length - 1.0).abs() > ROUNDING {
+        notes.about("quaternions whose length is not 1, which were normalized", name);
+    }
     let translation = node.translation.map_or(DVec3::ZERO, DVec3::from);
-    DMat4::from_scale_rotation_translation(scale, rotation, translation)
+    Ok(DMat4::from_scale_rotation_translation(scale, rotation.normalize(), translation))
 }
 
 /// Adds the displacements of a primitive's morph targets, as the mesh or its node weighs them, to `values` of an

@@ -89,6 +89,39 @@ fn a_plain_square_has_no_warnings() {
     assert_eq!(corner(&model, vec2(1.0, 1.0)), vec3(1.0, 1.0, 0.0));
 }
 
+/// Rationale: transforms that the format forbids were read in silence. Expected: projections and rotations of length 0 are refused by
+/// name; other lengths, and what stands beside a matrix, are warned of. Source: 3.5.3.
+#[test]
+fn transforms_that_are_none_are_refused_or_warned_of() {
+    let with = |node: Value| square(|document, _| document["nodes"][0].as_object_mut().unwrap().extend(object(node)));
+    let matrix = |edit: fn(&mut [f64; 16])| {
+        let mut matrix = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 5.0, 0.0, 0.0, 1.0];
+        edit(&mut matrix);
+        json!({ "matrix": matrix })
+    };
+    for (node, words) in [
+        (matrix(|m| m[3] = 0.5), "the last row of the matrix of `leaf` is not 0, 0, 0, 1"),
+        (matrix(|m| m[15] = 2.0), "the last row of the matrix of `leaf` is not 0, 0, 0, 1"),
+        (json!({ "rotation": [0, 0, 0, 0] }), "the rotation of `leaf` is a quaternion of length 0"),
+    ] {
+        let error = with(node).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    let mut both = matrix(|_| ());
+    both["scale"] = json!([2, 2, 2]);
+    let model = with(both).unwrap();
+    assert_eq!(corner(&model, vec2(1.0, 1.0)), vec3(6.0, 1.0, 0.0));
+    assert_eq!(model.warnings, ["passed over: translation, rotation and scale of nodes that have a matrix: `leaf`"]);
+    let model = with(json!({ "rotation": [0, 0, 2, 0] })).unwrap();
+    assert!((corner(&model, vec2(1.0, 1.0)) - vec3(-1.0, -1.0, 0.0)).length() < 1e-6);
+    assert_eq!(model.warnings, ["quaternions whose length is not 1, which were normalized: `leaf`"]);
+    assert!(with(json!({ "rotation": [0, 0, 0.6, 0.80005] })).unwrap().warnings.is_empty());
+}
+
+fn object(value: Value) -> serde_json::Map<String, Value> {
+    serde_json::from_value(value).unwrap()
+}
+
 /// Source: 3.9.5: alpha is ignored under OPAQUE.
 #[test]
 fn alpha_counts_under_mask_and_blend_alone() {
