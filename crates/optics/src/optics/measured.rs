@@ -23,6 +23,7 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
     let has = |sign: char| text.lines().any(|line| !line.starts_with('#') && line.contains(sign));
     let delimiter =
         [(';', b';'), ('\t', b'\t')].into_iter().find(|(sign, _)| has(*sign)).map_or(b',', |(_, byte)| byte);
+    let decimal = |likely: bool| if likely { "; are its commas decimal commas?" } else { "" };
     let mut table = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .delimiter(delimiter)
@@ -34,8 +35,7 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
         let row = row.map_err(|e| wrong(format!("it is not a table: {e}")))?;
         // Of decimal commas between cells, `400,0,25`, the share would be read as 0.
         if row.len() > 2 {
-            let comma = if delimiter == b',' { "; are its commas decimal commas?" } else { "" };
-            return Err(wrong(format!("row {line} has {} cells, not two{comma}", row.len())));
+            return Err(wrong(format!("row {line} has {} cells, not two{}", row.len(), decimal(delimiter == b','))));
         }
         let number = |column: usize| row.get(column).and_then(|cell| cell.parse::<f64>().ok());
         match (number(0), number(1)) {
@@ -43,14 +43,16 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>> {
             // A first row that begins with a letter is a header.
             _ if line == 1 && row.get(0).is_some_and(|cell| cell.starts_with(char::is_alphabetic)) => {}
             _ => {
-                let comma =
-                    if row.iter().any(|cell| cell.contains(',')) { "; are its commas decimal commas?" } else { "" };
-                return Err(wrong(format!("row {line} is not two numbers{comma}")));
+                let has_comma = row.iter().any(|cell| cell.contains(','));
+                return Err(wrong(format!("row {line} is not two numbers{}", decimal(has_comma))));
             }
         }
     }
     if let Some(pair) = points.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
         return Err(wrong(format!("wavelengths must rise, and {} follows {}", pair[1].0, pair[0].0)));
+    }
+    if let Some((nm, _)) = points.iter().find(|(nm, _)| !(*nm > 0.0 && nm.is_finite())) {
+        return Err(wrong(format!("a wavelength of {nm} nm is not positive and finite")));
     }
     if let Some((nm, share)) = points.iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
         let percent = if *share > 1.0 { "; is it in percent?" } else { "" };
@@ -109,6 +111,9 @@ mod tests {
             ("400,0.1\n700,0.2\n", "goes from 400 to 700 nm"),
             ("1000,0.4\n400,0.1\n", "wavelengths must rise"),
             ("400,NaN\n1000,0.4\n", "not between 0 and 1"),
+            ("-400,0.1\n1000,0.4\n", "a wavelength of -400 nm is not positive"),
+            ("0,0.1\n1000,0.4\n", "a wavelength of 0 nm is not positive"),
+            ("400,0.1\ninf,0.4\n", "a wavelength of inf nm is not positive and finite"),
         ] {
             let error = reflectance(text).unwrap_err();
             assert!(error.to_string().contains(words), "{text:?}: {error}");

@@ -189,10 +189,31 @@ fn check_jpeg(bytes: &[u8]) -> Result<(), Fault> {
     if is_cut_short(bytes) {
         return Err(Fault::new(CUT_SHORT, "copy it from the camera again"));
     }
-    if components(bytes) == Some(4) {
+    let Some(frame) = frame(bytes) else { return Ok(()) };
+    if frame.get(5) == Some(&4) {
         return Err(Fault::new("this JPEG is in CMYK, the colours of a printer", "save it in RGB (sRGB)"));
     }
+    if is_ambiguous(bytes, frame) {
+        let what = "this JPEG contradicts itself: one of its headers states YCbCr, another one RGB";
+        return Err(Fault::new(what, "open it in the program that shows its colours correctly, and save it again"));
+    }
     Ok(())
+}
+
+/// Returns `true` for a JPEG of three components that decoders convert by different rules: of JFIF (always YCbCr), of the transform in
+/// Adobe's segment (0: RGB, 1: YCbCr), and of the identifiers R, G and B. Sources: JFIF 1.02; Adobe Technical Note 5116.
+fn is_ambiguous(bytes: &[u8], frame: &[u8]) -> bool {
+    const APP0: u8 = 0xe0;
+    const APP14: u8 = 0xee;
+    /// Offset of the transform in Adobe's segment.
+    const TRANSFORM: usize = 11;
+    let segments = || Segments::of(bytes).into_iter().flatten();
+    let jfif = segments().any(|(marker, data)| marker == APP0 && data.starts_with(b"JFIF\0"));
+    let adobe = segments().find(|(marker, data)| *marker == APP14 && data.starts_with(b"Adobe"));
+    let transform = adobe.and_then(|(_, data)| data.get(TRANSFORM));
+    let ycbcr = jfif || transform.is_some_and(|transform| *transform != 0);
+    let named_rgb = matches!(frame, [.., b'R', _, _, b'G', _, _, b'B', _, _]);
+    frame.get(5) == Some(&3) && ycbcr && (transform == Some(&0) || named_rgb)
 }
 
 /// Message about a JPEG for which [`is_cut_short`] holds.
@@ -207,11 +228,11 @@ pub fn is_cut_short(bytes: &[u8]) -> bool {
     found.is_none() || !segments.rest.windows(2).any(|pair| pair == [0xff, 0xd9])
 }
 
-/// Returns the number of colour components in the frame header of a JPEG.
-fn components(bytes: &[u8]) -> Option<u8> {
+/// Returns the data of the frame header of a JPEG: depth (one byte), height and width (two each), number of components (one), and for each
+/// of them its identifier and two more bytes.
+fn frame(bytes: &[u8]) -> Option<&[u8]> {
     let is_frame = |marker: u8| matches!(marker, 0xc0..=0xcf) && ![0xc4, 0xc8, 0xcc].contains(&marker);
-    let (_, frame) = Segments::of(bytes)?.find(|(marker, _)| is_frame(*marker))?;
-    frame.get(5).copied()
+    Segments::of(bytes)?.find(|(marker, _)| is_frame(*marker)).map(|(_, frame)| frame)
 }
 
 /// Segments of a JPEG up to the first scan: marker and data.
@@ -420,6 +441,35 @@ mod tests {
         }
         assert_eq!(refused(b"words"), "this is not an image; PNG and JPEG can be read");
         assert!(decode(&png(), 20).unwrap_err().words().contains("sides of more than 20 pixels"));
+    }
+
+    /// Rationale: decoders disagree about the colours of a file whose headers do. Expected: refused where JFIF or Adobe's segment states
+    /// YCbCr and another header RGB; read where all state the same, or one of them nothing.
+    #[test]
+    fn a_jpeg_whose_headers_disagree_about_its_colours_is_refused() {
+        let plain = jpeg(None);
+        assert!(plain[6..].starts_with(b"JFIF\0"));
+        let jfif = 4 + usize::from(u16::from_be_bytes([plain[4], plain[5]]));
+        let bare = [&plain[..2], &plain[jfif..]].concat();
+        let adobe = |transform: u8| [&[0xff, 0xee, 0, 14][..], b"Adobe\0\x64\0\0\0\0", &[transform]].concat();
+        let with = |base: &[u8], segment: &[u8]| [&base[..2], segment, &base[2..]].concat();
+        let named = |base: &[u8]| {
+            let mut bytes = base.to_vec();
+            let frame = bytes.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
+            let scan = bytes.windows(2).position(|pair| pair == [0xff, 0xda]).unwrap();
+            for (k, letter) in b"RGB".iter().enumerate() {
+                bytes[frame + 10 + 3 * k] = *letter;
+                bytes[scan + 5 + 2 * k] = *letter;
+            }
+            bytes
+        };
+        for bytes in [&plain, &bare, &with(&plain, &adobe(1)), &with(&bare, &adobe(0)), &named(&bare)] {
+            assert!(decode(bytes, MAX).is_ok());
+        }
+        for bytes in [with(&plain, &adobe(0)), named(&plain), named(&with(&bare, &adobe(1)))] {
+            let words = decode(&bytes, MAX).unwrap_err().words();
+            assert!(words.contains("contradicts itself"), "{words}");
+        }
     }
 
     /// Returns a zlib stream of one stored block, with its checksum (Adler-32).
