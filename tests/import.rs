@@ -168,6 +168,25 @@ fn what_a_source_leaves_out_is_warned_of() {
     assert_eq!(Set::open(&out).unwrap().recipe.count, 3);
 }
 
+/// Images and masks in one folder, and a file without the suffixes of the others. Expected: a warning with their number.
+#[test]
+fn images_without_the_suffix_are_warned_of() {
+    let (kept, out) = scratch();
+    let root = kept.path();
+    for name in ["a_rgb", "b"] {
+        write_png(&root.join(format!("{name}.png")), W, H, &ImageData::Rgb(&photo(7)), "").unwrap();
+    }
+    for name in ["a_mask", "c_mask"] {
+        write_png(&root.join(format!("{name}.png")), W, H, &ImageData::Gray(&classes()), "").unwrap();
+    }
+    let folders = ["--format", "masks", "--images", text(root), "--masks", text(root)];
+    let output = import(&out, &[&folders[..], &["--image-suffix", "_rgb", "--mask-suffix", "_mask"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("1 pictures were left out, such as b.png: their names do not end in `_rgb`"), "{said}");
+    assert!(said.contains("1 masks have no image"), "{said}");
+}
+
 /// A folder of COCO files with one that is not named after a split, and one image in two of them. Expected: a warning for each.
 #[test]
 fn files_beside_those_of_splits_are_warned_of() {
@@ -262,12 +281,43 @@ fn an_import_goes_on_where_it_was_stopped_and_makes_the_same_bytes() {
     std::fs::remove_dir_all(out.join("images/000001")).unwrap();
     std::fs::write(out.join("images/000002/rgb.png"), "damaged").unwrap();
     std::fs::remove_file(out.join("manifest.json")).unwrap();
+    for verb in ["verify", "finish"] {
+        let output = trace(&["dataset", verb, text(&out)]).output().unwrap();
+        let words = String::from_utf8_lossy(&output.stderr);
+        let helps = words.contains("the command that imported this folder") && !words.contains("dataset render");
+        assert!(!output.status.success() && helps, "{verb}: {words}");
+    }
     imported(&out, &arguments);
     assert!(whole == files(&out), "other bytes after resuming");
     // Other images cannot be imported into the same folder.
     let other = [&arguments[..], &["--others", "ignore"]].concat();
     assert!(refused(&out, &other).contains("another dataset is in this folder"));
     assert!(whole == files(&out), "a refused import has changed files");
+}
+
+/// Rationale: an option that is passed over is missed when the labels are wrong; masks with the class `leaf` lost its pixels. Expected:
+/// refused by name before anything is read or written.
+#[test]
+fn what_a_format_does_not_take_is_refused() {
+    let kept = tempfile::tempdir().unwrap();
+    let out = kept.path().join("set");
+    let masks = ["--format", "masks", "--images", "i", "--masks", "m"];
+    let coco = ["--format", "coco", "--from", "a.json"];
+    for (format, more, words) in [
+        (&masks[..], ["--classes", "0=soil,1=leaf"], "the class leaf"),
+        (&masks[..], ["--colors", "0,0,0=soil;9,9,9=leaf"], "the class leaf"),
+        (&masks[..], ["--from", "x"], "--from"),
+        (&coco[..], ["--others", "ignore"], "--others"),
+        (&coco[..], ["--mask-suffix", "_m"], "--mask-suffix"),
+        (&coco[..], ["--nir", "x"], "--nir"),
+    ] {
+        let message = refused(&out, &[format, &more[..]].concat());
+        assert!(
+            message.contains("without effect with this --format") && message.contains(words),
+            "{more:?}: {message}"
+        );
+    }
+    assert!(!out.exists());
 }
 
 /// Returns whether the recipe of a set states that its images came with near infrared.
@@ -657,6 +707,13 @@ fn photographs_are_turned_as_viewers_show_them() {
             write_png(&root.join("masks/a.png"), 32, 16, &ImageData::Gray(&mask), "").unwrap();
             let words = refused(&root.join("other"), &arguments);
             assert!(words.contains("masks/a.png") && words.contains("EXIF orientation 6"), "{words}");
+            let document = r#"{"images": [{"id": 1, "file_name": "a.jpg"}], "categories": [{"id": 1, "name": "crop"}], "annotations":
+                [{"id": 1, "image_id": 1, "category_id": 1, "segmentation": {"size": [16, 32], "counts": [0, 16, 496]}}]}"#;
+            std::fs::write(root.join("a.json"), document).unwrap();
+            let annotations = root.join("a.json");
+            let coco = ["--format", "coco", "--from", text(&annotations), "--images", text(&images)];
+            let words = refused(&root.join("other"), &coco);
+            assert!(words.contains("a.jpg") && words.contains("EXIF orientation 6"), "{words}");
         }
     }
 }

@@ -77,10 +77,15 @@ fn split_folders(folder: &Path) -> Result<Vec<(PathBuf, Split)>> {
 const MOST_DEPTH: usize = 4;
 
 /// Returns warnings that count the pictures in a folder and below that are left out: those of other formats, and those that
-/// are not among `read` although their names end in `suffix`.
-pub(super) fn unread<'a>(folder: &Path, suffix: &str, read: impl Iterator<Item = &'a PathBuf>) -> Vec<String> {
+/// are not among `read`. Of these, the ones whose names end in one of `others` are no images.
+pub(super) fn unread<'a>(
+    folder: &Path,
+    suffix: &str,
+    others: &[&str],
+    read: impl Iterator<Item = &'a PathBuf>,
+) -> Vec<String> {
     let read: BTreeSet<&PathBuf> = read.collect();
-    let (mut others, mut elsewhere) = (0_usize, Vec::new());
+    let (mut unreadable, mut elsewhere, mut unnamed) = (0_usize, Vec::new(), Vec::new());
     let mut open = vec![(folder.to_path_buf(), 0)];
     while let Some((within, depth)) = open.pop() {
         for entry in std::fs::read_dir(within).ok().into_iter().flatten().filter_map(Result::ok) {
@@ -91,25 +96,28 @@ pub(super) fn unread<'a>(folder: &Path, suffix: &str, read: impl Iterator<Item =
             }
             let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
             let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            others += usize::from(OTHERS.contains(&ending.as_str()));
-            if PICTURES.contains(&ending.as_str()) && stem.ends_with(suffix) && !read.contains(&path) {
+            unreadable += usize::from(OTHERS.contains(&ending.as_str()));
+            if !PICTURES.contains(&ending.as_str()) || read.contains(&path) {
+                continue;
+            }
+            if stem.ends_with(suffix) {
                 elsewhere.push(path);
+            } else if !others.iter().any(|other| stem.ends_with(other)) {
+                unnamed.push(path);
             }
         }
     }
-    elsewhere.sort();
     let place = folder.display();
     let mut warnings = Vec::new();
-    if others > 0 {
-        warnings.push(format!("{place}: {others} pictures that are neither PNG nor JPEG were left out"));
+    if unreadable > 0 {
+        warnings.push(format!("{place}: {unreadable} pictures that are neither PNG nor JPEG were left out"));
     }
-    if let Some(first) = elsewhere.first() {
-        warnings.push(format!(
-            "{place}: {} pictures were left out, such as {}: images are read in this folder, or, if there are such, in its \
-             folders train, val and test",
-            elsewhere.len(),
-            first.strip_prefix(folder).unwrap_or(first).display()
-        ));
+    let places = "images are read in this folder, or, if there are such, in its folders train, val and test".to_owned();
+    for (left, why) in [(elsewhere, places), (unnamed, format!("their names do not end in `{suffix}`"))] {
+        if let Some(first) = left.iter().min() {
+            let first = first.strip_prefix(folder).unwrap_or(first).display();
+            warnings.push(format!("{place}: {} pictures were left out, such as {first}: {why}", left.len()));
+        }
     }
     warnings
 }

@@ -117,7 +117,9 @@ impl Masks {
         }
         // Masks and infrared images in the same folder are no images that were left out.
         let read = files.iter().flat_map(|of| [Some(&of.image), Some(&of.mask), of.nir.as_ref()]).flatten();
-        let mut warnings = unread(&folders.images, &folders.image_suffix, read);
+        let suffixes = [folders.mask_suffix.as_str(), folders.nir_suffix.as_str()];
+        let others: Vec<&str> = suffixes.into_iter().filter(|suffix| !suffix.is_empty()).collect();
+        let mut warnings = unread(&folders.images, &folders.image_suffix, &others, read);
         for (left, what, folder) in
             [(&masks, "masks", Some(&folders.masks)), (&nirs, "infrared images", folders.nir.as_ref())]
         {

@@ -4,7 +4,7 @@ use crate::format::labels::LeftOut;
 use crate::make::pack::store;
 use crate::make::push;
 use crate::make::task::{Task, remaining};
-use crate::model::recipe::{FILE, ImageOrigin, MANIFEST, Recipe};
+use crate::model::recipe::{FILE, MANIFEST, Recipe};
 use crate::model::warnings::Totals;
 use crate::read::checksum::Checksum;
 use crate::read::checksum_record::ChecksumRecord;
@@ -60,9 +60,12 @@ fn with_a_way_out(set: &Set, error: Error) -> Error {
         return error;
     }
     let folder = set.folder.display();
-    error.help(format!(
-        "`trace dataset render {folder}` renders damaged images again; `trace dataset verify {folder}` lists all damage"
-    ))
+    let again = if set.recipe.is_imported() {
+        "the command that imported this folder imports damaged images again".to_owned()
+    } else {
+        format!("`trace dataset render {folder}` renders damaged images again")
+    };
+    error.help(format!("{again}; `trace dataset verify {folder}` lists all damage"))
 }
 
 fn written(set: &Set) -> Result<Vec<PathBuf>> {
@@ -93,6 +96,9 @@ fn written(set: &Set) -> Result<Vec<PathBuf>> {
 /// scheduler.
 pub fn lacks(set: &Set, missing: &[u64], shards: Option<u64>) -> Error {
     let again = match shards {
+        _ if set.recipe.is_imported() => {
+            "run the command that imported this folder again; it imports the missing images".to_owned()
+        }
         None => "run `trace dataset render` again; it renders the missing images".to_owned(),
         Some(of) => {
             let lacking: BTreeSet<u64> = missing.iter().map(|k| set.recipe.unit_of(*k) % of).collect();
@@ -121,7 +127,7 @@ pub fn ranges(numbers: &[u64]) -> String {
 /// one if no pixel is crop or weed. Empty for a rendered dataset.
 pub fn dropped(set: &Set) -> Result<Vec<String>> {
     let mut totals = Totals::default();
-    if !matches!(set.recipe.made, ImageOrigin::Imported { .. }) {
+    if !set.recipe.is_imported() {
         return Ok(totals.lines());
     }
     let (mut plants, mut ignored) = (0_u64, 0_u64);

@@ -328,6 +328,11 @@ impl Recipe {
         matches!(&self.made, ImageOrigin::Rendered(rendering) if rendering.image_format.is_none())
     }
 
+    /// Returns whether the images were imported instead of rendered.
+    pub fn is_imported(&self) -> bool {
+        matches!(self.made, ImageOrigin::Imported { .. })
+    }
+
     /// Returns the render parameters; an error for imported images.
     pub fn rendering(&self) -> Result<&Rendering> {
         match &self.made {

@@ -7,7 +7,7 @@ use furrow_base::math::ToInt;
 use furrow_base::{Error, Result};
 use furrow_cli::cli;
 use furrow_cli::cli::signal::Signals;
-use furrow_dataset::import::classes::{Colors, Names};
+use furrow_dataset::import::classes::{Colors, Meaning, Names};
 use furrow_dataset::import::coco::{Coco, Crowds};
 use furrow_dataset::import::masks::{Coding, Folders, Masks};
 use furrow_dataset::import::phenobench::PhenoBench;
@@ -49,7 +49,7 @@ pub(crate) struct Args {
     /// Suffix of near-infrared image names.
     #[arg(long, value_name = "TEXT", default_value = "")]
     nir_suffix: String,
-    /// Meaning of the numbers in masks or of the categories in coco: soil, crop, weed, leaf or ignore. Default for
+    /// Meaning of the numbers in masks or of the categories in coco: soil, crop, weed, ignore, or leaf (coco). Default for
     /// masks: 0=soil,1=crop,2=weed,255=ignore; for coco: categories with these names.
     #[arg(long, value_name = "NAME=CLASS,…", value_parser = Names::parse)]
     classes: Option<Names>,
@@ -133,18 +133,27 @@ fn source(args: &Args) -> Result<Box<dyn Source>> {
             Error::misuse(format!("this --format needs {option}")).help("see `trace dataset import --help`")
         })
     };
+    let has_leaf = args.classes.iter().flat_map(|names| names.0.values()).any(|meaning| *meaning == Meaning::Leaf)
+        || args.colors.iter().flat_map(|colors| colors.0.values()).any(|meaning| *meaning == Meaning::Leaf);
     let useless = [
         (
             args.masks.is_some() || args.nir.is_some() || args.colors.is_some(),
             args.format != Format::Masks,
             "--masks, --nir and --colors",
         ),
+        (
+            args.others != Others::Error
+                || [&args.image_suffix, &args.mask_suffix, &args.nir_suffix].iter().any(|s| !s.is_empty()),
+            args.format != Format::Masks,
+            "--others, --image-suffix, --mask-suffix and --nir-suffix",
+        ),
         (args.from.is_some(), args.format == Format::Masks, "--from"),
+        (has_leaf, args.format == Format::Masks, "the class leaf"),
         (args.crowds != CrowdMeaning::Class, args.format != Format::Coco, "--crowds"),
         (args.images.is_some() || args.classes.is_some(), args.format == Format::Phenobench, "--images and --classes"),
     ];
     if let Some((.., options)) = useless.into_iter().find(|(given, useless, _)| *given && *useless) {
-        return Err(Error::misuse(format!("{options} have no effect with this --format")).help("leave them out"));
+        return Err(Error::misuse(format!("without effect with this --format: {options}")).help("leave them out"));
     }
     Ok(match args.format {
         Format::Masks => {

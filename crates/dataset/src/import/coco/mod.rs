@@ -349,7 +349,8 @@ impl Source for Coco {
         let image = &self.images[place];
         let Shot { size, pixels: rgb, mut warnings, stored, orientation } =
             photograph(furrow_output::open_photo(&image.path)?);
-        if let Some(listed) = image.size.filter(|listed| *listed != wide(size)) {
+        let as_stored = || image.things.iter().any(|thing| thing.segmentation.has_size(stored)).then(|| wide(stored));
+        if let Some(listed) = image.size.or_else(as_stored).filter(|listed| *listed != wide(size)) {
             return Err(image.other_size(listed, size, stored, orientation));
         }
         warnings.extend(image.warnings.iter().cloned());
@@ -483,6 +484,11 @@ fn doubts(image: &Annotated, (w, h): (u32, u32), masks: &[(usize, Vec<u32>)], cr
 }
 
 impl Segmentation {
+    /// Returns whether it is run lengths of an image of this width and height.
+    fn has_size(&self, (w, h): (u32, u32)) -> bool {
+        matches!(self, Self::Runs(rle) if rle.size == [h, w])
+    }
+
     fn reaches_beyond(&self, w: u32, h: u32) -> bool {
         let Self::Polygons(polygons) = self else { return false };
         let outside = |[x, y]: &[f64; 2]| *x < -1.0 || *y < -1.0 || *x > f64::from(w) + 1.0 || *y > f64::from(h) + 1.0;
