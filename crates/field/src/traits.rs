@@ -10,7 +10,7 @@ use furrow_grow::plant::{LeafAxis, OrganKind};
 use furrow_render::scene::Part;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Traits of a leaf.
@@ -85,22 +85,23 @@ fn sheet(part: &Part) -> MeshKey {
 }
 
 impl Traits {
-    /// Measures a field. Call it inside a thread pool.
+    /// Measures a field and all of its plants. Call it inside a thread pool.
     pub fn of(field: &Field) -> Self {
-        Self::default().of_next_image(field)
+        Self::default().of_next_image(field, |_| true)
     }
 
-    /// Returns the traits for another image of the same field: plants and leaves are kept, only the canopy is measured again. If `self`
-    /// is empty, everything is measured.
+    /// Returns the traits for another image of the same field: the canopy is measured again, and so are the plants whose numbers `wanted`
+    /// accepts, unless they are measured already.
     #[must_use]
-    pub fn of_next_image(self, field: &Field) -> Self {
+    pub fn of_next_image(mut self, field: &Field, wanted: impl Fn(u32) -> bool + Sync) -> Self {
         let view = View::of(field);
-        let measured = !self.plants.is_empty();
-        let seen = |part: &Part| view.as_ref().is_some_and(|view| view.may_hold(part));
-        // If plants are measured already, only parts in the image are needed, for the canopy.
+        let is_new = |plant: u32| wanted(plant) && !self.plants.contains_key(&plant);
+        // The canopy consists of blades alone.
+        let of_canopy =
+            |part: &Part, kind: OrganKind| is_blade(kind) && view.as_ref().is_some_and(|view| view.may_hold(part));
         let parts: Vec<(&Part, OrganKind)> = (field.scene.parts.par_iter().zip(&field.kinds))
             .filter_map(|(part, kind)| Some((part, kind.organ()?)))
-            .filter(|(part, _)| !measured || seen(part))
+            .filter(|(part, kind)| is_new(part.tag.plant) || of_canopy(part, *kind))
             .collect();
         // Evaluate the mask once per mesh, however many instances it has: a lookup for each triangle is expensive.
         let sheets: BTreeMap<MeshKey, &Part> = parts.iter().map(|(part, _)| (sheet(part), *part)).collect();
@@ -110,25 +111,34 @@ impl Traits {
             sheets.iter().map(|part| sheet(part)).zip(looked.iter().map(Vec::as_slice)).collect();
         let organs: Vec<Organ<'_>> =
             parts.into_par_iter().map(|(part, kind)| Organ::new(part, kind, shown[&sheet(part)])).collect();
-        let canopy = view.and_then(|view| Canopy::of(field, &view, &organs));
-        if measured {
-            return Self { canopy, ..self };
-        }
         let mut by_plant: BTreeMap<u32, Vec<&Organ<'_>>> = BTreeMap::new();
         for organ in &organs {
             by_plant.entry(organ.part.tag.plant).or_default().push(organ);
         }
-        let grown: Vec<_> = field.plants.iter().filter_map(|p| Some((p, by_plant.get(&p.number)?))).collect();
+        let new = field.plants.iter().filter(|plant| is_new(plant.number));
+        let grown: Vec<_> = new.filter_map(|plant| Some((plant, by_plant.get(&plant.number)?))).collect();
         let measured: Vec<_> = (grown.par_iter())
             .map(|(plant, organs)| (plant.number, measure(organs, &plant.leaf_axes, plant.position)))
             .collect();
-        let mut all = Self { canopy, ..Self::default() };
         for (number, (plant, leaves)) in measured {
-            all.plants.insert(number, plant);
-            all.leaves.extend(leaves.into_iter().map(|(leaf, traits)| ((number, leaf), traits)));
+            self.plants.insert(number, plant);
+            self.leaves.extend(leaves.into_iter().map(|(leaf, traits)| ((number, leaf), traits)));
         }
-        all
+        self.canopy = view.as_ref().and_then(|view| Canopy::of(field, view, &organs));
+        self
     }
+}
+
+/// Returns the numbers of the plants that may be above the ground that the field's camera sees, by the bounding boxes of their parts; of all
+/// plants if it sees the horizon.
+pub fn near_view(field: &Field) -> BTreeSet<u32> {
+    let view = View::of(field);
+    let near = |part: &&Part| view.as_ref().is_none_or(|view| view.may_hold(part));
+    field.scene.parts.iter().filter(near).map(|part| part.tag.plant).collect()
+}
+
+fn is_blade(kind: OrganKind) -> bool {
+    matches!(kind, OrganKind::Blade | OrganKind::Cotyledon)
 }
 
 /// The part of the plane z = 0 that a camera sees.
@@ -195,8 +205,7 @@ impl<'a> Organ<'a> {
     fn new(part: &'a Part, kind: OrganKind, shown: &'a [TriangleCoverage]) -> Self {
         let area =
             |(i, (_, share)): (u32, &TriangleCoverage)| 0.5 * f64::from(normal(part.corners(i)).length()) * share;
-        let blade = matches!(kind, OrganKind::Blade | OrganKind::Cotyledon);
-        let areas = if blade { (0..).zip(shown).map(area).collect() } else { Vec::new() };
+        let areas = if is_blade(kind) { (0..).zip(shown).map(area).collect() } else { Vec::new() };
         Self { part, shown, areas }
     }
 }

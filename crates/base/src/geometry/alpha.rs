@@ -186,23 +186,28 @@ impl AlphaMask {
         let hi = (t[0].max(t[1]).max(t[2]) + 0.01).floor();
         let (lo, hi) =
             ([lo.x.trunc_to::<i32>(), lo.y.trunc_to::<i32>()], [hi.x.trunc_to::<i32>(), hi.y.trunc_to::<i32>()]);
+        let edges = Edges::of(&t);
         let (mut any_opaque, mut any_transparent) = (false, false);
         for tile_y in lo[1].div_euclid(8)..=hi[1].div_euclid(8) {
+            let rows = lo[1].max(8 * tile_y)..=hi[1].min(8 * tile_y + 7);
             for tile_x in lo[0].div_euclid(8)..=hi[0].div_euclid(8) {
                 let corner = vec2(tile_x.to_f32(), tile_y.to_f32()) * 8.0;
-                if !touches(&t, corner, 8.0) {
+                if !edges.touch(corner, 8.0) {
                     continue;
                 }
                 match self.tile(tile_x, tile_y) {
                     0 => any_transparent = true,
                     u64::MAX => any_opaque = true,
                     bits => {
-                        for bit in 0..64u32 {
-                            let (x, y) = (tile_x * 8 + (bit & 7).to_i32(), tile_y * 8 + (bit >> 3).to_i32());
-                            let inside = x >= lo[0] && x <= hi[0] && y >= lo[1] && y <= hi[1];
-                            if inside && touches(&t, vec2(x.to_f32(), y.to_f32()), 1.0) {
-                                any_opaque |= bits >> bit & 1 == 1;
-                                any_transparent |= bits >> bit & 1 == 0;
+                        for y in rows.clone() {
+                            for x in lo[0].max(8 * tile_x)..=hi[0].min(8 * tile_x + 7) {
+                                let is_opaque = bits >> ((y & 7) * 8 + (x & 7)) & 1 == 1;
+                                // Of each kind, one texel is enough.
+                                let is_known = if is_opaque { any_opaque } else { any_transparent };
+                                if !is_known && edges.touch(vec2(x.to_f32(), y.to_f32()), 1.0) {
+                                    any_opaque |= is_opaque;
+                                    any_transparent |= !is_opaque;
+                                }
                             }
                         }
                     }
@@ -216,22 +221,31 @@ impl AlphaMask {
     }
 }
 
-/// Returns `true` if the triangle may touch the square at `corner`, widened by 0.01 texel. Tests only the separating
-/// axes normal to the triangle's edges.
-fn touches(t: &[Vec2; 3], corner: Vec2, side: f32) -> bool {
-    let half = 0.5 * side;
-    let centre = corner + half;
-    let orientation = (t[1] - t[0]).perp_dot(t[2] - t[0]);
-    if orientation == 0.0 {
-        return true;
+/// Edges of a triangle: a corner on each, and its normal to the inside, as long as the edge. `None` for a triangle without area.
+struct Edges(Option<[(Vec2, Vec2); 3]>);
+
+impl Edges {
+    fn of(t: &[Vec2; 3]) -> Self {
+        let orientation = (t[1] - t[0]).perp_dot(t[2] - t[0]);
+        let edge = |i: usize| {
+            let edge = (t[(i + 1) % 3] - t[i]) * orientation.signum();
+            (t[i], vec2(-edge.y, edge.x))
+        };
+        Self((orientation != 0.0).then(|| [edge(0), edge(1), edge(2)]))
     }
-    (0..3).all(|i| {
-        let (a, b) = (t[i], t[(i + 1) % 3]);
-        let edge = (b - a) * orientation.signum();
-        let inward = vec2(-edge.y, edge.x);
-        let reach = (half + 0.01) * (inward.x.abs() + inward.y.abs());
-        inward.dot(centre - a) >= -reach
-    })
+
+    /// Returns `true` if the triangle may touch the square at `corner`, widened by 0.01 texel. Tests only the separating axes
+    /// normal to the triangle's edges.
+    fn touch(&self, corner: Vec2, side: f32) -> bool {
+        let half = 0.5 * side;
+        let centre = corner + half;
+        self.0.is_none_or(|edges| {
+            edges.iter().all(|(a, inward)| {
+                let reach = (half + 0.01) * (inward.x.abs() + inward.y.abs());
+                inward.dot(centre - *a) >= -reach
+            })
+        })
+    }
 }
 
 /// Triangles of a mesh classified by its mask. Fully transparent triangles are in neither list.

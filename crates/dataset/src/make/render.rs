@@ -16,7 +16,7 @@ use furrow_base::{Error, Result};
 use furrow_field::PlantRecord;
 use furrow_field::drive::Capture;
 use furrow_field::profile::Phase;
-use furrow_field::traits::{PlantTraits, Traits};
+use furrow_field::traits::{PlantTraits, Traits, near_view};
 use furrow_job::{Image, Known, PreparedField, Renderer, Request, SceneFile};
 use furrow_output::Provenance;
 use furrow_render::film::{Film, Pixel};
@@ -166,11 +166,12 @@ impl CachedField {
         self.view = CachedView::default();
     }
 
-    /// Measures the traits of the plants in the field, which its images share.
+    /// Measures the traits of the plants near the view, which its images share.
     pub(crate) fn measure_traits(&mut self) {
         if let Some(field) = &self.field {
-            let before = self.traits.take().unwrap_or_default();
-            self.traits = Some(field.threads().install(|| before.of_next_image(field.grown())));
+            let (before, near) = (self.traits.take().unwrap_or_default(), near_view(field.grown()));
+            let measure = || before.of_next_image(field.grown(), |plant| near.contains(&plant));
+            self.traits = Some(field.threads().install(measure));
         }
     }
 }
@@ -363,7 +364,7 @@ fn labelled(
     };
     (sample.record.classes, sample.record.ignored) = annotate::classes(&sample);
     let before = known.take().unwrap_or_default();
-    let traits = known.insert(before.of_next_image(field));
+    let traits = known.insert(before.of_next_image(field, |plant| extents.contains_key(&(plant, 0))));
     sample.record.canopy = traits.canopy;
     sample.record.plants = plants(field, traits, &extents, &sample);
     let boxes = if formats.iter().any(|(_, format)| format.needs_boxes()) {
