@@ -334,6 +334,21 @@ fn traits_of_instances_are_those_of_their_copies() {
     }
 }
 
+/// Rationale: an image's record needs the plants in view alone. Expected: plants that are asked for in two calls have the traits that
+/// measuring the whole field gives, the others none; the canopy is the same.
+#[test]
+fn traits_of_some_plants_are_those_of_the_whole_field() {
+    let field = meadow("Instanced", 0.0);
+    let mut all = Traits::of(&field);
+    let first = Traits::default().of_next_image(&field, |plant| plant % 3 == 0);
+    let both = first.of_next_image(&field, |plant| plant % 3 < 2);
+    let whole = all.plants.len();
+    all.plants.retain(|plant, _| plant % 3 < 2);
+    all.leaves.retain(|(plant, _), _| plant % 3 < 2);
+    assert!(all.plants.len() > 100 && all.plants.len() < whole && all.canopy.is_some());
+    assert_eq!(both, all);
+}
+
 /// Evaluates the BSDF of a part at one of its middle triangles, seen from above; `tinted` may change the interaction.
 fn sheet(field: &Field, k: usize, tinted: impl Fn(Interaction) -> Interaction) -> Leaf {
     let part = &field.scene.parts[k];
